@@ -4,11 +4,18 @@
 #include <stdio.h>
 #include <string.h>
 
-void board_init(struct board *b, const struct board_line *lines, unsigned count)
+void board_init(struct board *b, const struct board_line *lines, unsigned count, const struct board_cfg *cfg,
+                const struct board_io *io, struct sched *s)
 {
+    static const char *const afe_noise[BOARD_AXES] = {"afe.x", "afe.y", "afe.z"};
     memset(b, 0, sizeof *b);
+    b->cfg = *cfg;
+    b->io = *io;
+    b->sched = s;
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < count; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
+    for (unsigned i = 0; i < BOARD_AXES; i++)
+        afe_init(&b->afe[i], &cfg->afe[i], rng_stream(cfg->seed, cfg->serial, afe_noise[i]));
 }
 
 void board_put_truth(board_truth_fn *put, void *ctx, double value, const char *name, ...)

@@ -20,8 +20,12 @@ struct board {
     const struct board_type *type; /* set by the unit */
     struct trace trace;            /* lines numbered as in board_type.lines */
     struct line_faults line;
-    uint32_t faults; /* of the controller: bits of board_type.controller_faults; outlive resets and power */
-    bool observed;   /* board_io.event has a subscriber */
+    struct board_cfg cfg;
+    struct board_io io;
+    struct sched *sched;
+    struct afe afe[BOARD_AXES]; /* its analog inputs, if it has any */
+    uint32_t faults;            /* of the controller: bits of board_type.controller_faults; outlive resets and power */
+    bool observed;              /* board_io.event has a subscriber */
 };
 
 /* Fault of the controller, "controller.frozen_words", and its bit in board.faults. */
@@ -86,14 +90,21 @@ struct board_type {
                          int64_t t_ns); /* takes its inputs up to now; the physics may change abruptly after */
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
-    struct afe *(*afe)(struct board *b, unsigned axis);   /* for faults: sample_until() first; NULL: no analog inputs */
+    bool analog;                                          /* it has analog inputs; for faults: sample_until() first */
     void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const struct board *b, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */
 };
 
-/* The base of a board: its trace with these lines, no faults. */
-void board_init(struct board *b, const struct board_line *lines, unsigned count);
+/* The base of a board: its trace with these lines, its specimen's analog inputs, no faults. */
+void board_init(struct board *b, const struct board_line *lines, unsigned count, const struct board_cfg *cfg,
+                const struct board_io *io, struct sched *s);
+
+/* An event, a number in board_type.events. */
+static inline void board_notify(const struct board *b, unsigned event, int64_t t_ns)
+{
+    if (b->observed) b->io.event(b->io.ctx, event, t_ns);
+}
 
 /* A hidden parameter whose name has parts: "axis_x_gyro_bias_radps". */
 __attribute__((format(printf, 4, 5))) void board_put_truth(board_truth_fn *put, void *ctx, double value,

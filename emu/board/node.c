@@ -167,9 +167,7 @@ static uint32_t read_counter(struct board_node *n, const struct co_entry *e, str
 static double read_serial(const struct board_node *n, const struct co_entry *e)
 {
     (void)e;
-    uint32_t serial;
-    memcpy(&serial, (const char *)n->board + n->type->serial_at, sizeof serial);
-    return serial;
+    return ((const struct board *)n->board)->cfg.serial;
 }
 
 /* ---- whether the bus can carry the stream ---- */

@@ -9,7 +9,7 @@
  *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
  *     static const struct board_object objects[] = {{PSD1_OD_CODES, .value = read_code}, ...};
  *     static const struct board_node_type type = {.device = &psd1_device, BOARD_NODE_OBJECTS(objects),
- *                                                 .serial_at = offsetof(struct psd1, unit.serial), .period_ns = period_of};
+ *                                                 .period_ns = period_of};
  *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, BOARD_NODE_LIFE};
  *     static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
  *     {   board_node_init(can, &type, cfg, board, bus, s);  ((struct psd1 *)board)->reading = on_reading; ... }
@@ -43,7 +43,6 @@ struct board_node_type {
     const struct co_device *device;
     const struct board_object *objects;
     unsigned object_count;
-    size_t serial_at; /* object 1018h sub 4: a uint32_t in the board's struct; 0: the board's own objects answer */
     /* Of the stream as it is set now; NULL: the board checks its stream itself and sets `fits`. */
     int64_t (*period_ns)(const void *board);
     /* After each event of the node: selects the TPDOs. NULL: all of the device, after a reset. */

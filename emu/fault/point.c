@@ -87,7 +87,7 @@ static unsigned index_count(const struct board_type *t, enum fault_place place, 
     switch (place) {
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
-        return t->afe ? UNIT_AXES : 0;
+        return t->analog ? UNIT_AXES : 0;
     case FAULT_AT_CHIP:
         return t->part_count - 1;
     case FAULT_AT_LINE:

@@ -199,14 +199,14 @@ static bool apply_afe(struct fault *f, int64_t t_ns)
                                    .rate_per_s = f->value[FAULT_DRIFT_PPM_PER_S] * 1e-6,
                                    .frequency_hz = f->value[FAULT_FREQUENCY_HZ],
                                    .from_ns = t_ns};
-    afe_fault_add(u->type->afe(u->board, f->point.index), &f->as.afe);
+    afe_fault_add(&u->board->afe[f->point.index], &f->as.afe);
     return true;
 }
 
 static void lift_afe(struct fault *f, int64_t t_ns)
 {
     struct unit *u = settled_unit(f, t_ns);
-    afe_fault_remove(u->type->afe(u->board, f->point.index), &f->as.afe);
+    afe_fault_remove(&u->board->afe[f->point.index], &f->as.afe);
 }
 
 // clang-format off

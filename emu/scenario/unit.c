@@ -196,7 +196,7 @@ enum { SOME_HAVE = sizeof some_have / sizeof *some_have };
 
 static bool has_key(const struct board_type *t, unsigned i)
 {
-    if (some_have[i].of == OF_INPUTS) return t->afe;
+    if (some_have[i].of == OF_INPUTS) return t->analog;
     return some_have[i].of == OF_CAPABILITY ? board_has(t, some_have[i].key) : t->frame_forms > 0;
 }
 

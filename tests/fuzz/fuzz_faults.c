@@ -210,7 +210,7 @@ static void op(struct world *w, struct script *s)
         if (w->attached) trace_attach(&w->b.base.trace, &w->ear.sink);
         return;
     case 8:
-        w->b.io.event = on_event;
+        w->b.base.io.event = on_event;
         w->b.base.observed = b & 0x80;
         return;
     case 9:

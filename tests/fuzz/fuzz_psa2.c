@@ -215,7 +215,7 @@ static void restore(struct world *to, const struct world *from)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct script s = script_of(data, size);
-    if (!began[0][0].b.sched) prepare();
+    if (!began[0][0].b.base.sched) prepare();
     const unsigned ready = script_byte(&s) & 1;
     restore(&watched, &began[ready][0]);
     restore(&unwatched, &began[ready][1]);

@@ -22,8 +22,6 @@ struct fake_chip {
 
 struct fake_board {
     struct board base;
-    struct sched *sched;
-    struct afe afe[BOARD_AXES];
     bool on;
     uint32_t cycles, resets;
     int64_t sampled_ns;
@@ -58,7 +56,7 @@ static enum board_cycle_result fake_submit(struct board *board, struct board_cyc
     if (!c->write && c->address == 1) return BOARD_CYCLE_WRITE_ONLY;
     if (c->write && c->address == 2 && c->data == 13) return BOARD_CYCLE_BAD_VALUE;
     b->cycle = c;
-    sched_at(b->sched, &b->end, t_ns + strobe_ns);
+    sched_at(b->base.sched, &b->end, t_ns + strobe_ns);
     return BOARD_CYCLE_OK;
 }
 
@@ -83,7 +81,7 @@ static void fake_reset(struct board *board, int64_t t_ns)
     struct board_cycle *c = b->cycle;
     b->resets++;
     b->cycle = NULL;
-    sched_cancel(b->sched, &b->end);
+    sched_cancel(b->base.sched, &b->end);
     if (c) c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);
 }
 
@@ -95,11 +93,6 @@ static bool fake_ready(const struct board *board)
 static void fake_sample(struct board *board, int64_t t_ns)
 {
     ((struct fake_board *)board)->sampled_ns = t_ns;
-}
-
-static struct afe *fake_afe(struct board *board, unsigned axis)
-{
-    return &((struct fake_board *)board)->afe[axis];
 }
 
 static void fake_truth(const struct board *board, board_truth_fn *put, void *ctx)
@@ -192,7 +185,7 @@ static const struct board_type fake_type = {
     .reset = fake_reset,
     .ready = fake_ready,
     .sample_until = fake_sample,
-    .afe = fake_afe,
+    .analog = true,
     .truth = fake_truth,
 };
 
@@ -200,10 +193,10 @@ static const struct board_type fake_type = {
 static inline void fake_unit(struct unit *u, struct fake_board *b, const char *name, struct lab *lab, struct sched *s)
 {
     memset(b, 0, sizeof *b);
-    b->sched = s;
     b->on = true;
     sched_ev(&b->end, fake_end, b);
-    board_init(&b->base, fake_lines, fake_type.line_count);
+    board_init(&b->base, fake_lines, fake_type.line_count, &(struct board_cfg){.serial = 0},
+               &(struct board_io){.ctx = b}, s);
     b->base.type = &fake_type;
     u->cfg = unit_default(name);
     u->cfg.type = &fake_type;

@@ -132,7 +132,7 @@ static double read_setting(const struct board_node *n, const struct co_entry *e)
     const struct row *r = row_of(e);
     if (r) return *value_of(&b->set, r, e->sub);
     if (e->index == GYRO_OD_HEADING) return gyro_heading_deg(b);
-    return b->cfg.level_node;
+    return b->base.cfg.level_node;
 }
 
 static uint32_t reject_setting(struct board_node *n, uint32_t abort, const char *why)
@@ -234,11 +234,8 @@ static int64_t period_ns(const void *board)
     return ((const struct gyro *)board)->profile.step_ns;
 }
 
-static const struct board_node_type type = {.device = &gyro_device,
-                                            BOARD_NODE_OBJECTS(objects),
-                                            .serial_at = offsetof(struct gyro, cfg.serial),
-                                            .period_ns = period_ns,
-                                            .rx_other = on_level_frame};
+static const struct board_node_type type = {
+    .device = &gyro_device, BOARD_NODE_OBJECTS(objects), .period_ns = period_ns, .rx_other = on_level_frame};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)
@@ -246,7 +243,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     struct gyro_can *c = can;
     struct gyro *b = (struct gyro *)board;
     board_node_init(can, &type, cfg, board, bus, s);
-    c->level_id = b->cfg.level_node ? (uint32_t)XY_COB + b->cfg.level_node : 0;
+    c->level_id = b->base.cfg.level_node ? (uint32_t)XY_COB + b->base.cfg.level_node : 0;
     gyro_attach(b, &(struct gyro_host){.ctx = can, .reading = on_reading, .condition = on_condition});
 }
 

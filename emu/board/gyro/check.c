@@ -54,7 +54,7 @@ void gyro_condition(struct gyro *b, enum gyro_flag what, bool active, int64_t t_
     if (active == ((b->standing & what) != 0)) return;
     b->standing = active ? b->standing | what : b->standing & ~(unsigned)what;
     if (active) record_flag(b, what);
-    if (active) gyro_notify_event(b, GYRO_EV_FAULT, t_ns);
+    if (active) board_notify(&b->base, GYRO_EV_FAULT, t_ns);
     if (b->host.condition) b->host.condition(b->host.ctx, what, active, t_ns);
 }
 

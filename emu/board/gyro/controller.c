@@ -129,7 +129,7 @@ static void drive_torquers(struct gyro *b, int64_t t_ns)
         gyro_run_stop(b, GYRO_LEVEL);
         gyro_report_encoder_fault(b, t_ns);
     }
-    if (b->io.platform) b->io.platform->torque(b->io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
+    if (b->base.io.platform) b->base.io.platform->torque(b->base.io.ctx, b->u_radps[0], b->u_radps[1], t_ns);
 }
 
 static void put_lines(struct gyro *b, int64_t t_ns)
@@ -154,7 +154,7 @@ static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
         .flags = b->flags | (b->standing & (GYRO_ENCODER_FAULT | GYRO_NOT_SETTLED)),
         .u1_radps = b->u_radps[0],
         .u2_radps = b->u_radps[1],
-        .encoder_rad = b->io.platform ? b->io.platform->encoder_rad(b->io.ctx, t_ns) : 0.0,
+        .encoder_rad = b->base.io.platform ? b->base.io.platform->encoder_rad(b->base.io.ctx, t_ns) : 0.0,
         .beta_rad = b->level.beta_rad,
         .gamma_rad = b->level.gamma_rad,
         .level_seq = b->inlet.seq,
@@ -167,7 +167,7 @@ static void publish_reading(struct gyro *b, int64_t t_ns)
     if (!(b->base.faults & GYRO_FAULT_FROZEN_WORDS)) b->latest = make_reading(b, t_ns);
     b->latest.step = b->number;
     put_lines(b, t_ns);
-    gyro_notify_event(b, GYRO_EV_STEP, t_ns);
+    board_notify(&b->base, GYRO_EV_STEP, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, &b->latest, t_ns);
 }
 
@@ -181,12 +181,12 @@ static int64_t next_step_ns(const struct gyro *b, int64_t after_ns)
 static void run_step(void *ctx, int64_t t_ns)
 {
     struct gyro *b = ctx;
-    sched_at(b->sched, &b->step, t_ns + b->profile.step_ns);
-    if (!b->ready) gyro_notify_event(b, GYRO_EV_READY, t_ns);
+    sched_at(b->base.sched, &b->step, t_ns + b->profile.step_ns);
+    if (!b->ready) board_notify(&b->base, GYRO_EV_READY, t_ns);
     b->ready = true;
     b->counters.steps++;
     b->flags = take_inlet(b, t_ns) ? 0 : GYRO_LEVEL_LOST;
-    b->servo_rad = b->io.platform ? b->io.platform->servo_rad(b->io.ctx, t_ns) : 0.0;
+    b->servo_rad = b->base.io.platform ? b->base.io.platform->servo_rad(b->base.io.ctx, t_ns) : 0.0;
     gyro_run_step(b, t_ns);
     drive_torquers(b, t_ns);
     const bool at_work = b->run.mode != GYRO_OFF;
@@ -203,11 +203,8 @@ void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_
 {
     memset(b, 0, sizeof *b);
     b->profile = *p;
-    b->cfg = *cfg;
-    b->io = *io;
-    b->sched = s;
+    board_init(&b->base, gyro_lines, GYRO_LINES, cfg, io, s);
     sched_ev(&b->step, run_step, b);
-    board_init(&b->base, gyro_lines, GYRO_LINES);
 }
 
 void gyro_attach(struct gyro *b, const struct gyro_host *host)
@@ -233,7 +230,7 @@ static void reset_state(struct gyro *b, int64_t t_ns)
     b->number = 0;
     gyro_past_begin(b);
     trace_put(&b->base.trace, TRACE_FIRST(GYRO_LINES), 0, t_ns);
-    if (b->io.platform) b->io.platform->torque(b->io.ctx, 0.0, 0.0, t_ns);
+    if (b->base.io.platform) b->base.io.platform->torque(b->base.io.ctx, 0.0, 0.0, t_ns);
 }
 
 void gyro_power_up(struct gyro *b, int64_t t_ns)
@@ -241,17 +238,17 @@ void gyro_power_up(struct gyro *b, int64_t t_ns)
     if (b->on) return;
     b->on = true;
     reset_state(b, t_ns);
-    gyro_notify_event(b, GYRO_EV_POWER_UP, t_ns);
-    sched_at(b->sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
+    board_notify(&b->base, GYRO_EV_POWER_UP, t_ns);
+    sched_at(b->base.sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
 }
 
 void gyro_power_down(struct gyro *b, int64_t t_ns)
 {
     if (!b->on) return;
     b->on = false;
-    sched_cancel(b->sched, &b->step);
+    sched_cancel(b->base.sched, &b->step);
     reset_state(b, t_ns);
-    gyro_notify_event(b, GYRO_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, GYRO_EV_POWER_DOWN, t_ns);
 }
 
 void gyro_reset(struct gyro *b, int64_t t_ns)
@@ -259,8 +256,8 @@ void gyro_reset(struct gyro *b, int64_t t_ns)
     if (!b->on) return;
     b->counters.res++;
     reset_state(b, t_ns);
-    gyro_notify_event(b, GYRO_EV_RES, t_ns);
-    sched_at(b->sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
+    board_notify(&b->base, GYRO_EV_RES, t_ns);
+    sched_at(b->base.sched, &b->step, next_step_ns(b, t_ns + b->profile.start_ns));
 }
 
 /* No input of its own. */

@@ -4,11 +4,6 @@
 
 #include "board/gyro/gyro.h"
 
-static inline void gyro_notify_event(const struct gyro *b, enum gyro_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 /* gyro/run.c: the phases at this step, before the rates are computed; then the rates asked, u1 and u2. */
 void gyro_run_step(struct gyro *b, int64_t t_ns);
 void gyro_run_rates(struct gyro *b, int64_t t_ns, double u_radps[2]);

@@ -44,9 +44,9 @@ static void begin_turn(struct gyro *b, double to_deg, int64_t t_ns)
     b->run.turn =
         gyro_turn_of(b->run.q_ref_rad, to_deg * GYRO_RAD_PER_DEG, fmin(b->set.slew_dps * GYRO_RAD_PER_DEG, limit_radps),
                      b->set.slew_dps2 * GYRO_RAD_PER_DEG, t_ns);
-    if (b->io.platform) b->io.platform->reposition(b->io.ctx, t_ns);
+    if (b->base.io.platform) b->base.io.platform->reposition(b->base.io.ctx, t_ns);
     enter_phase(b, GYRO_SLEWING, t_ns);
-    gyro_notify_event(b, GYRO_EV_SLEW, t_ns);
+    board_notify(&b->base, GYRO_EV_SLEW, t_ns);
 }
 
 static void begin_position(struct gyro *b, unsigned position, int64_t t_ns)
@@ -59,7 +59,7 @@ static const char *mode_error(const struct gyro *b, enum gyro_mode mode)
 {
     if (!b->ready) return "the gyroscope runs up, or there is no power";
     if (mode == GYRO_OFF) return NULL;
-    if (b->cfg.level_node == 0) return "no level unit is fitted: the scenario's unit key level names it";
+    if (b->base.cfg.level_node == 0) return "no level unit is fitted: the scenario's unit key level names it";
     if (b->silent) return "the level unit is silent: it has to be operational and send frame form 0";
     if (mode == GYRO_COMPASS && b->set.count * b->set.repeat > GYRO_RUN_MAX)
         return "count times repeat is more than 127 positions";
@@ -81,7 +81,7 @@ const char *gyro_set_mode(struct gyro *b, enum gyro_mode mode, int64_t t_ns)
     b->run.servoed = mode >= GYRO_HOLD && mode <= GYRO_CALIBRATE;
     b->run.q_ref_rad = servoed && mode != GYRO_HOLD ? q_ref_rad : b->servo_rad;
     b->run.positions = (unsigned)(b->set.count * b->set.repeat);
-    gyro_notify_event(b, GYRO_EV_MODE, t_ns);
+    board_notify(&b->base, GYRO_EV_MODE, t_ns);
     if (mode == GYRO_SLEW) begin_turn(b, b->set.slew_deg, t_ns);
     if (mode == GYRO_COMPASS) begin_position(b, 1, t_ns);
     if (mode == GYRO_CALIBRATE) enter_phase(b, GYRO_SETTLING, t_ns);
@@ -113,7 +113,7 @@ static void end_settling(struct gyro *b, int64_t t_ns)
     b->run.frozen = b->set.freeze != 0.0 && b->run.servo_steps > 0;
     b->run.frozen_radps = b->run.frozen ? b->run.servo_radps / b->run.servo_steps : 0.0;
     enter_phase(b, GYRO_WINDOW, t_ns);
-    gyro_notify_event(b, GYRO_EV_WINDOW, t_ns);
+    board_notify(&b->base, GYRO_EV_WINDOW, t_ns);
 }
 
 static void step_settling(struct gyro *b, int64_t t_ns)
@@ -137,7 +137,7 @@ static void step_window(struct gyro *b, int64_t t_ns)
     const double length_s = b->run.mode == GYRO_CALIBRATE ? b->set.calibration_s : b->set.window_s;
     if (t_ns - b->run.phase_ns < ns_of(length_s)) return;
     b->counters.windows++;
-    gyro_notify_event(b, GYRO_EV_WINDOW_END, t_ns);
+    board_notify(&b->base, GYRO_EV_WINDOW_END, t_ns);
     const bool more = b->run.mode == GYRO_COMPASS && b->run.position < b->run.positions;
     if (more) begin_position(b, b->run.position + 1, t_ns);
     else gyro_run_stop(b, GYRO_HOLD);

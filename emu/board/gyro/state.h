@@ -59,10 +59,7 @@ struct gyro_past {
 struct gyro {
     struct board base;
     struct gyro_profile profile;
-    struct board_cfg cfg;
-    struct board_io io;
     struct gyro_host host;
-    struct sched *sched;
     struct gyro_counters counters;
 
     bool on, ready;

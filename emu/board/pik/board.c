@@ -128,11 +128,6 @@ static void observe(struct board *board, bool on)
     pik_observe((struct pik *)board, on);
 }
 
-static struct afe *afe(struct board *board, unsigned axis)
-{
-    return &((struct pik *)board)->channel[axis].afe;
-}
-
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct pik *b = (const struct pik *)board;
@@ -165,8 +160,8 @@ static void add_channel(struct sha256 *s, const struct pik *b, unsigned i)
     board_digest_u64(s, c->minus_from);
     board_digest_real(s, c->due_vs);
     board_digest_real(s, c->noise_v);
-    board_digest_real(s, c->afe.state_v);
-    board_digest_noise(s, &c->afe.noise);
+    board_digest_real(s, b->base.afe[i].state_v);
+    board_digest_noise(s, &b->base.afe[i].noise);
     board_digest_noise(s, &c->noise);
 }
 
@@ -221,7 +216,7 @@ const struct board_type pik_board = {
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
     .observe = observe,
-    .afe = afe,
+    .analog = true,
     .digest = digest,
     .truth = truth,
 };

@@ -113,7 +113,7 @@ enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t
     b->cycle = c;
     if (!c->write) c->data = word_at(b, c->address);
     bus_lines_begin(&b->base.trace, &bus_lines, c, c->data, t_ns);
-    sched_at(b->sched, &b->cycle_end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
+    sched_at(b->base.sched, &b->cycle_end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
 
@@ -122,7 +122,7 @@ void pik_bus_cut(struct pik *b, int64_t t_ns)
     struct board_cycle *c = b->cycle;
     if (!c) return;
     b->cycle = NULL;
-    sched_cancel(b->sched, &b->cycle_end);
+    sched_cancel(b->base.sched, &b->cycle_end);
     b->counters.cycles_refused++;
     bus_lines_end(&b->base.trace, &bus_lines, t_ns);
     c->done(c->ctx, c, BOARD_CYCLE_OFF, t_ns);

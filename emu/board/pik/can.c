@@ -87,10 +87,8 @@ static void on_saturated(void *ctx, bool on, int64_t t_ns)
     else co_node_error_end(n, PIK_EMCY_SATURATED, t_ns);
 }
 
-static const struct board_node_type type = {.device = &pik_device,
-                                            BOARD_NODE_OBJECTS(objects),
-                                            .serial_at = offsetof(struct pik, cfg.serial),
-                                            .period_ns = pik_period_ns};
+static const struct board_node_type type = {
+    .device = &pik_device, BOARD_NODE_OBJECTS(objects), .period_ns = pik_period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)

@@ -43,7 +43,7 @@ static void notify_saturation(struct pik *b, bool now, int64_t t_ns)
     if (now == b->saturated) return;
     if (!now && (double)(t_ns - b->saturated_ns) < b->profile.saturated_ms * 1e6) return;
     b->saturated = now;
-    if (now) pik_notify_event(b, PIK_EV_SATURATED, t_ns);
+    if (now) board_notify(&b->base, PIK_EV_SATURATED, t_ns);
     if (b->host.saturated) b->host.saturated(b->host.ctx, now, t_ns);
 }
 
@@ -56,39 +56,29 @@ static void look_at_inputs(void *ctx, int64_t t_ns)
     pik_sample_until(b, t_ns);
     for (unsigned i = 0; i < PIK_AXES; i++) saturated |= check_saturation(&b->channel[i]);
     if (t_ns >= b->warm_ns) {
-        pik_warm(b, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns));
+        pik_warm(b, b->base.io.temp_degc(b->base.io.ctx, BOARD_SENSOR, t_ns));
         b->warm_ns = t_ns + WARM_NS;
     }
     for (unsigned i = 0; b->noise_v > 0.0 && i < PIK_AXES; i++)
         b->channel[i].noise_v = b->noise_v * rng_gauss(&b->channel[i].noise);
     notify_saturation(b, saturated, t_ns);
     b->look_tick += pace;
-    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+    sched_at(b->base.sched, &b->look, pik_tick_ns(b, b->look_tick));
 }
 
 /* ---- life ---- */
 
-static void init_channel(struct pik *b, unsigned i)
-{
-    static const char *const afe_noise[PIK_AXES] = {"afe.x", "afe.y", "afe.z"};
-    static const char *const noise[PIK_AXES] = {"pik.x", "pik.y", "pik.z"};
-    struct pik_channel *c = &b->channel[i];
-    afe_init(&c->afe, &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
-    c->noise = rng_stream(b->cfg.seed, b->cfg.serial, noise[i]);
-}
-
 void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg *cfg, const struct board_io *io,
               struct sched *s)
 {
+    static const char *const noise[PIK_AXES] = {"pik.x", "pik.y", "pik.z"};
     memset(b, 0, sizeof *b);
     b->profile = *p;
-    b->cfg = *cfg;
-    b->io = *io;
-    b->sched = s;
+    board_init(&b->base, pik_lines, PIK_LINES, cfg, io, s);
     b->specimen = pik_specimen_draw(p, cfg->seed, cfg->serial);
     set_clock(b, 0, 0);
     pik_warm(b, 25.0);
-    for (unsigned i = 0; i < PIK_AXES; i++) init_channel(b, i);
+    for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = rng_stream(cfg->seed, cfg->serial, noise[i]);
     sched_ev(&b->look, look_at_inputs, b);
     pik_lines_init(b);
     pik_latch_init(b);
@@ -121,8 +111,8 @@ void pik_power_up(struct pik *b, int64_t t_ns)
     b->fed_ns = b->warm_ns = t_ns;
     b->clk_shown_tick = 0;
     pik_lines_rest(b, true, t_ns);
-    pik_notify_event(b, PIK_EV_POWER_UP, t_ns);
-    sched_at(b->sched, &b->look, t_ns);
+    board_notify(&b->base, PIK_EV_POWER_UP, t_ns);
+    sched_at(b->base.sched, &b->look, t_ns);
     pik_latch_restart(b, t_ns);
 }
 
@@ -134,12 +124,12 @@ void pik_power_down(struct pik *b, int64_t t_ns)
     pik_lines_clock(b, t_ns);
     b->on = false;
     b->any = b->saturated = false;
-    sched_cancel(b->sched, &b->look);
-    sched_cancel(b->sched, &b->latch);
-    sched_cancel(b->sched, &b->latch_end);
+    sched_cancel(b->base.sched, &b->look);
+    sched_cancel(b->base.sched, &b->latch);
+    sched_cancel(b->base.sched, &b->latch_end);
     pik_bus_cut(b, t_ns);
     pik_lines_rest(b, false, t_ns);
-    pik_notify_event(b, PIK_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, PIK_EV_POWER_DOWN, t_ns);
 }
 
 void pik_reset(struct pik *b, int64_t t_ns)
@@ -148,13 +138,13 @@ void pik_reset(struct pik *b, int64_t t_ns)
     b->counters.resets++;
     pik_sample_until(b, t_ns);
     pik_bus_cut(b, t_ns);
-    pik_notify_event(b, PIK_EV_RES, t_ns);
+    board_notify(&b->base, PIK_EV_RES, t_ns);
     pik_latch_restart(b, t_ns);
 }
 
 void pik_observe(struct pik *b, bool on)
 {
-    if (on && !b->base.observed) b->heard_ns = b->sched->now_ns; /* earlier events are not notified */
+    if (on && !b->base.observed) b->heard_ns = b->base.sched->now_ns; /* earlier events are not notified */
     b->base.observed = on;
 }
 
@@ -175,7 +165,7 @@ void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns)
     b->clock_fault_ppm = ppm;
     set_clock(b, tick, tick_ns);
     pik_warm(b, b->degc);
-    sched_at(b->sched, &b->look, pik_tick_ns(b, b->look_tick));
+    sched_at(b->base.sched, &b->look, pik_tick_ns(b, b->look_tick));
 }
 
 void pik_stick(struct pik *b, unsigned axis, const struct chip_fault *f, int64_t t_ns)

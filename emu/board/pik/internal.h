@@ -20,11 +20,6 @@ static inline int64_t pik_tick_ns(const struct pik *b, int64_t tick)
 uint64_t pik_count_plus(const struct pik_channel *c); /* as the counter has it */
 uint64_t pik_count_minus(const struct pik_channel *c);
 
-static inline void pik_notify_event(const struct pik *b, enum pik_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 /* pik/specimen.c */
 struct pik_specimen pik_specimen_draw(const struct pik_profile *p, uint64_t seed, uint32_t serial);
 int64_t pik_tick_hz(const struct pik *b);  /* thousandths of it, with all that the generator is off by */

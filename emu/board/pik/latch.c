@@ -46,15 +46,15 @@ void pik_latch_now(struct pik *b, int64_t t_ns)
     b->any = true;
     b->counters.readings++;
     latch_line(b, false, t_ns);
-    sched_at(b->sched, &b->latch_end, t_ns + b->profile.latch_ns);
-    pik_notify_event(b, PIK_EV_LATCH, t_ns);
+    sched_at(b->base.sched, &b->latch_end, t_ns + b->profile.latch_ns);
+    board_notify(&b->base, PIK_EV_LATCH, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, r, t_ns);
 }
 
 static void latch_periodically(void *ctx, int64_t t_ns)
 {
     struct pik *b = ctx;
-    sched_at(b->sched, &b->latch, t_ns + pik_period_ns(b));
+    sched_at(b->base.sched, &b->latch, t_ns + pik_period_ns(b));
     pik_latch_now(b, t_ns);
 }
 
@@ -75,8 +75,8 @@ void pik_latch_restart(struct pik *b, int64_t t_ns)
 void pik_set_period(struct pik *b, unsigned period_100us, int64_t t_ns)
 {
     b->period_100us = period_100us;
-    if (period_100us > 0) sched_at(b->sched, &b->latch, t_ns + pik_period_ns(b));
-    else sched_cancel(b->sched, &b->latch);
+    if (period_100us > 0) sched_at(b->base.sched, &b->latch, t_ns + pik_period_ns(b));
+    else sched_cancel(b->base.sched, &b->latch);
 }
 
 bool pik_period_fits(const struct pik *b, unsigned period_100us)

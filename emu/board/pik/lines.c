@@ -124,6 +124,5 @@ static void wake_lines(void *ctx, uint64_t mask)
 
 void pik_lines_init(struct pik *b)
 {
-    board_init(&b->base, pik_lines, PIK_LINES);
     b->base.trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
 }

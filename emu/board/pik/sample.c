@@ -19,8 +19,8 @@ static void integrate_input(struct pik *b, unsigned i, int64_t t_ns)
     const int64_t node_ns[2] = {b->fed_ns + within_ns, t_ns - 1 - within_ns};
     double v[2];
     for (unsigned n = 0; n < 2; n++) {
-        const double signal = b->io.accel(b->io.ctx, i, node_ns[n]);
-        v[n] = afe_out_v(&c->afe, signal, b->degc, node_ns[n]);
+        const double signal = b->base.io.accel(b->base.io.ctx, i, node_ns[n]);
+        v[n] = afe_out_v(&b->base.afe[i], signal, b->degc, node_ns[n]);
     }
     c->due_vs += 0.5 * (v[0] + v[1]) * span_ns * 1e-9;
     c->slope_v_per_s = (v[1] - v[0]) / (2.0 * GAUSS * 1e-9 * span_ns);
@@ -70,7 +70,7 @@ static void advance_pulses(struct pik *b, unsigned i, int64_t tick, int64_t t_ns
         pik_axis_advance(a, next);
         const int64_t begun_ns = pik_tick_ns(b, next);
         if (watched) pik_lines_pulse(b, i, begun_ns);
-        if (begun_ns >= b->heard_ns) pik_notify_event(b, (enum pik_event)(PIK_EV_FX + i), t_ns);
+        if (begun_ns >= b->heard_ns) board_notify(&b->base, PIK_EV_FX + i, t_ns);
     }
     pik_axis_advance(a, tick);
 }

@@ -109,7 +109,7 @@ void pik_warm(struct pik *b, double degc)
     const double k_hz_per_v = pik_profile_k_hz_per_v(p), step_v = pik_profile_step_v(p);
     b->degc = degc;
     b->k_hz_per_v = k_hz_per_v;
-    b->noise_v = p->noise_v_rthz * b->cfg.adc_noise_scale *
+    b->noise_v = p->noise_v_rthz * b->base.cfg.adc_noise_scale *
                  sqrt(0.5e-3 * (double)pik_tick_hz(b) / p->look_ticks); /* white, over a look */
     for (unsigned i = 0; i < PIK_AXES; i++) {
         struct pik_channel *c = &b->channel[i];

@@ -10,7 +10,6 @@ struct pik_specimen {
 };
 
 struct pik_channel {
-    struct afe afe;
     struct pik_axis axis;
     struct rng noise;
     double due_vs;                  /* of the input, that no tick has got yet */
@@ -30,10 +29,7 @@ struct pik_channel {
 struct pik {
     struct board base;
     struct pik_profile profile;
-    struct board_cfg cfg;
-    struct board_io io;
     struct pik_host host;
-    struct sched *sched;
     struct pik_specimen specimen;
     struct pik_channel channel[PIK_AXES];
     struct pik_counters counters;

@@ -102,11 +102,6 @@ static void set_faults(struct board *board, uint32_t faults)
     pmka_set_faults((struct pmka *)board, faults);
 }
 
-static struct afe *afe(struct board *board, unsigned axis)
-{
-    return &((struct pmka *)board)->afe[axis];
-}
-
 /* ---- what faults are measured by ---- */
 
 static unsigned pulses(const struct board *board)
@@ -152,7 +147,7 @@ static void put_integrator(const struct pmka *b, unsigned i, board_truth_fn *put
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct pmka *b = (const struct pmka *)board;
-    put(ctx, "temp_noise_scale", b->cfg.temp_noise_scale);
+    put(ctx, "temp_noise_scale", b->base.cfg.temp_noise_scale);
     put(ctx, "uref_v", b->uref_v);
     put(ctx, "adc_offset_lsb", b->specimen.adc_offset_lsb);
     put(ctx, "adc_gain", b->specimen.adc_gain);
@@ -251,7 +246,7 @@ const struct board_type pmka_board = {
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
     .set_faults = set_faults,
-    .afe = afe,
+    .analog = true,
     .digest = digest,
     .truth = truth,
 };

@@ -175,7 +175,7 @@ enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64
     b->bus.cycle = c;
     if (!c->write) b->bus.answer = read_register(b, c->address);
     bus_lines_begin(&b->base.trace, &bus_lines, c, c->write ? c->data : b->bus.answer, t_ns);
-    sched_at(b->sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
+    sched_at(b->base.sched, &b->bus.end, t_ns + (c->strobe_ns ? c->strobe_ns : b->profile.strobe_ns));
     return BOARD_CYCLE_OK;
 }
 
@@ -208,7 +208,7 @@ void pmka_bus_init(struct pmka *b)
 
 void pmka_bus_cut(struct pmka *b, int64_t t_ns)
 {
-    sched_cancel(b->sched, &b->bus.end);
+    sched_cancel(b->base.sched, &b->bus.end);
     b->bus.index = 0;
     b->bus.fresh = b->bus.overrun = false;
     if (b->bus.cycle) finish_cycle(b, BOARD_CYCLE_OFF, t_ns);

@@ -76,10 +76,8 @@ static int64_t period_ns(const void *board)
     return ((const struct pmka *)board)->profile.ts_ns;
 }
 
-static const struct board_node_type type = {.device = &pmka_device,
-                                            BOARD_NODE_OBJECTS(objects),
-                                            .serial_at = offsetof(struct pmka, cfg.serial),
-                                            .period_ns = period_ns};
+static const struct board_node_type type = {
+    .device = &pmka_device, BOARD_NODE_OBJECTS(objects), .period_ns = period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)

@@ -33,7 +33,7 @@ static double draw_gauss(struct rng *r, double sd)
 
 static struct rng noise_source(const struct pmka *b, const char *name)
 {
-    return rng_stream(b->cfg.seed, b->cfg.serial, name);
+    return rng_stream(b->base.cfg.seed, b->base.cfg.serial, name);
 }
 
 static double from_ppm(double x)
@@ -89,7 +89,7 @@ static double uref_at_v(const struct pmka *b, double degc)
 static void burn_rom(struct pmka *b)
 {
     struct pmka_rom_cfg cfg = {
-        .uref_nominal_v = b->profile.uref_v, .ts_s = 1e-9 * b->profile.ts_ns, .serial = b->cfg.serial};
+        .uref_nominal_v = b->profile.uref_v, .ts_s = 1e-9 * b->profile.ts_ns, .serial = b->base.cfg.serial};
     struct rng factory = noise_source(b, "pmka.factory");
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         cfg.integrator[i] = &b->channel[i].integrator.cfg;
@@ -104,8 +104,8 @@ static void burn_rom(struct pmka *b)
 static int16_t temp_code(struct pmka *b)
 {
     double k = b->board_degc + b->specimen.temp_offset_k;
-    if (b->profile.temp_noise_k > 0.0 && b->cfg.temp_noise_scale > 0.0)
-        k += b->profile.temp_noise_k * b->cfg.temp_noise_scale * rng_gauss(&b->temp_noise);
+    if (b->profile.temp_noise_k > 0.0 && b->base.cfg.temp_noise_scale > 0.0)
+        k += b->profile.temp_noise_k * b->base.cfg.temp_noise_scale * rng_gauss(&b->temp_noise);
     const double code = floor(128.0 * k + 0.5);
     return (int16_t)(code > 32767.0 ? 32767.0 : code < -32768.0 ? -32768.0 : code);
 }
@@ -113,7 +113,7 @@ static int16_t temp_code(struct pmka *b)
 static void begin_set(struct pmka *b, int64_t t_ns)
 {
     b->set_ns = t_ns;
-    b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    b->board_degc = b->base.io.temp_degc(b->base.io.ctx, 3, t_ns);
     b->uref_v = uref_at_v(b, b->board_degc);
     b->next.t_ns = t_ns;
     b->next.cal = b->rotation.cal;
@@ -125,7 +125,7 @@ static void begin_set(struct pmka *b, int64_t t_ns)
 
 static void end_set(struct pmka *b, int64_t t_ns)
 {
-    pmka_notify_event(b, PMKA_EV_READING, t_ns);
+    board_notify(&b->base, PMKA_EV_READING, t_ns);
     if (b->base.faults & PMKA_FAULT_FROZEN_WORDS && b->any) memcpy(b->next.code, b->latest.code, sizeof b->next.code);
     b->bus.overrun |= b->bus.fresh;
     b->bus.fresh = b->any = true;
@@ -184,12 +184,12 @@ static void run_stage(void *ctx, int64_t t_ns)
     const enum pmka_stage stage = b->stage;
     if (b->life == PMKA_STARTING) {
         b->life = PMKA_RUNNING;
-        pmka_notify_event(b, PMKA_EV_START, t_ns);
+        board_notify(&b->base, PMKA_EV_START, t_ns);
     }
     do_stage(b, stage, t_ns);
     b->stage = stage == PMKA_AT_READING ? PMKA_AT_X : (enum pmka_stage)(stage + 1);
     const int64_t ts_ns = stage == PMKA_AT_READING ? b->profile.ts_ns : 0;
-    sched_at(b->sched, &b->step, b->set_ns + ts_ns + stage_ns(b, b->stage));
+    sched_at(b->base.sched, &b->step, b->set_ns + ts_ns + stage_ns(b, b->stage));
 }
 
 /* ---- life ---- */
@@ -198,30 +198,25 @@ static void wake_lines(void *ctx, uint64_t mask)
 {
     struct pmka *b = ctx;
     (void)mask;
-    pmka_converter_wake(b, b->sched->now_ns);
+    pmka_converter_wake(b, b->base.sched->now_ns);
 }
 
 static void init_trace(struct pmka *b)
 {
-    board_init(&b->base, pmka_lines, PMKA_LINES);
     b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
 }
 
 void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s)
 {
-    static const char *const afe_noise[] = {"afe.x", "afe.y", "afe.z"};
     assert(io->accel && io->temp_degc);
     memset(b, 0, sizeof *b);
     b->profile = *p;
-    b->cfg = *cfg;
-    b->io = *io;
-    b->sched = s;
+    board_init(&b->base, pmka_lines, PMKA_LINES, cfg, io, s);
     init_trace(b);
     sched_ev(&b->step, run_stage, b);
     pmka_sample_init(b);
     pmka_bus_init(b);
-    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], noise_source(b, afe_noise[i]));
     draw_integrators(b);
     draw_specimen(b);
     burn_rom(b);
@@ -250,13 +245,13 @@ static void start_controller(struct pmka *b, int64_t t_ns)
         c->served = 0;
         c->count[PMKA_PLUS] = c->count[PMKA_MINUS] = 0;
     }
-    sched_at(b->sched, &b->step, t_ns + b->profile.start_ns);
+    sched_at(b->base.sched, &b->step, t_ns + b->profile.start_ns);
 }
 
 /* Ends all activity; the integrators keep their charge. */
 static void stop_controller(struct pmka *b, int64_t t_ns)
 {
-    sched_cancel(b->sched, &b->step);
+    sched_cancel(b->base.sched, &b->step);
     for (unsigned i = 0; i < PMKA_INTS; i++) pmka_cut_reset(b, i, t_ns);
     pmka_converter_stop(b, t_ns);
     pmka_keys_home(b, t_ns);
@@ -269,7 +264,7 @@ static void stop_controller(struct pmka *b, int64_t t_ns)
 static void empty_integrators(struct pmka *b, int64_t t_ns)
 {
     const int64_t from_ns = t_ns + b->profile.start_ns;
-    b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    b->board_degc = b->base.io.temp_degc(b->base.io.ctx, 3, t_ns);
     b->uref_v = uref_at_v(b, b->board_degc);
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         struct pmka_channel *c = &b->channel[i];
@@ -289,7 +284,7 @@ static void put_all_lines(struct pmka *b, bool rest, int64_t t_ns)
 void pmka_power_up(struct pmka *b, int64_t t_ns)
 {
     if (b->life != PMKA_OFF) return;
-    pmka_notify_event(b, PMKA_EV_POWER_UP, t_ns);
+    board_notify(&b->base, PMKA_EV_POWER_UP, t_ns);
     empty_integrators(b, t_ns);
     start_controller(b, t_ns);
     if (b->unpowered) put_all_lines(b, true, t_ns);
@@ -302,7 +297,7 @@ void pmka_reset(struct pmka *b, int64_t t_ns)
     b->counters.res++;
     stop_controller(b, t_ns);
     start_controller(b, t_ns);
-    pmka_notify_event(b, PMKA_EV_RES, t_ns);
+    board_notify(&b->base, PMKA_EV_RES, t_ns);
     pmka_bus_cut(b, t_ns);
 }
 
@@ -314,7 +309,7 @@ void pmka_power_down(struct pmka *b, int64_t t_ns)
     b->unpowered = true;
     b->any = false;
     put_all_lines(b, false, t_ns);
-    pmka_notify_event(b, PMKA_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, PMKA_EV_POWER_DOWN, t_ns);
     pmka_bus_cut(b, t_ns);
 }
 
@@ -332,7 +327,7 @@ void pmka_sample_until(struct pmka *b, int64_t t_ns)
 
 void pmka_set_faults(struct pmka *b, uint32_t faults)
 {
-    const int64_t t_ns = b->sched->now_ns;
+    const int64_t t_ns = b->base.sched->now_ns;
     pmka_sample_until(b, t_ns);
     b->base.faults = faults;
     b->channel[0].integrator.cap_left = faults & PMKA_FAULT_CAPACITOR ? 0.7 : 1.0;

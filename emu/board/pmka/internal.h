@@ -4,11 +4,6 @@
 
 #include "board/pmka/pmka.h"
 
-static inline void pmka_notify_event(const struct pmka *b, enum pmka_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 static inline void pmka_line(struct pmka *b, unsigned line, bool level, int64_t t_ns)
 {
     trace_set(&b->base.trace, line, level && b->life != PMKA_OFF, t_ns);

@@ -83,7 +83,7 @@ void pmka_release_axis(struct pmka *b, int64_t t_ns)
     r->asked_tau = 0;
     r->age = 0;
     b->counters.beats++;
-    pmka_notify_event(b, PMKA_EV_TAU, t_ns);
+    board_notify(&b->base, PMKA_EV_TAU, t_ns);
     put_tau_lines(b, t_ns);
     pmka_keys_home(b, t_ns);
 }

@@ -23,8 +23,8 @@ static double cell_vs(struct pmka *b, unsigned axis, int64_t t_ns)
     double v[PMKA_NODES];
     pmka_nodes(a->at_ns, t_ns, node_ns);
     for (unsigned n = 0; n < PMKA_NODES; n++) {
-        const double signal = b->io.accel(b->io.ctx, axis, node_ns[n]);
-        v[n] = afe_out_v(&b->afe[axis], signal, b->board_degc, node_ns[n]);
+        const double signal = b->base.io.accel(b->base.io.ctx, axis, node_ns[n]);
+        v[n] = afe_out_v(&b->base.afe[axis], signal, b->board_degc, node_ns[n]);
     }
     const double vs = pmka_integral_vs(v, t_ns - a->at_ns);
     a->integral_vs += vs;
@@ -84,16 +84,16 @@ static void start_reset(struct pmka *b, unsigned i, enum pmka_sign sign, int64_t
     c->count[sign]++;
     if (sign == PMKA_PLUS) b->counters.resets_plus++;
     else b->counters.resets_minus++;
-    pmka_notify_event(b, PMKA_EV_RESET, t_ns);
+    board_notify(&b->base, PMKA_EV_RESET, t_ns);
     put_reset_line(b, i, true, t_ns);
-    sched_at(b->sched, &c->reset_end, c->reset_until_ns);
+    sched_at(b->base.sched, &c->reset_end, c->reset_until_ns);
 }
 
 void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns)
 {
     struct pmka_channel *c = &b->channel[i];
     pmka_integrate(b, i, t_ns);
-    sched_cancel(b->sched, &c->reset_end);
+    sched_cancel(b->base.sched, &c->reset_end);
     put_reset_line(b, i, false, t_ns);
     c->resetting = false;
 }
@@ -125,8 +125,8 @@ static int16_t to_code(struct pmka *b, double out_v, bool *clipped)
 {
     const struct pmka_profile *p = &b->profile;
     double code = out_v * b->specimen.adc_gain / p->adc_range_v * 32768.0 + b->specimen.adc_offset_lsb;
-    if (p->adc_noise_lsb > 0.0 && b->cfg.adc_noise_scale > 0.0)
-        code += p->adc_noise_lsb * b->cfg.adc_noise_scale * rng_gauss(&b->adc_noise);
+    if (p->adc_noise_lsb > 0.0 && b->base.cfg.adc_noise_scale > 0.0)
+        code += p->adc_noise_lsb * b->base.cfg.adc_noise_scale * rng_gauss(&b->adc_noise);
     code = floor(code + 0.5);
     *clipped = code > 32767.0 || code < -32768.0;
     if (b->adc_stuck) return b->adc_stuck_level ? -1 : 0;
@@ -152,7 +152,7 @@ static void conversion_begins(void *ctx, int64_t t_ns)
 static void report_hold(struct pmka *b)
 {
     report_step(b, b->sampled_ns, SH, SH);
-    sched_at(b->sched, &b->conversion, b->sampled_ns + b->profile.hold_ns);
+    sched_at(b->base.sched, &b->conversion, b->sampled_ns + b->profile.hold_ns);
 }
 
 void pmka_converter_wake(struct pmka *b, int64_t t_ns)
@@ -161,13 +161,13 @@ void pmka_converter_wake(struct pmka *b, int64_t t_ns)
     if (b->life != PMKA_RUNNING || t_ns >= ends_ns || trace_watched(&b->base.trace, SH | CONV)) return;
     report_hold(b);
     if (begins_ns > t_ns) return;
-    sched_cancel(b->sched, &b->conversion);
+    sched_cancel(b->base.sched, &b->conversion);
     conversion_begins(b, begins_ns);
 }
 
 void pmka_converter_stop(struct pmka *b, int64_t t_ns)
 {
-    sched_cancel(b->sched, &b->conversion);
+    sched_cancel(b->base.sched, &b->conversion);
     b->sampled_ns = INT64_MIN / 2;
     pmka_line(b, PMKA_LINE_SH, false, t_ns);
     pmka_line(b, PMKA_LINE_CONV, false, t_ns);

@@ -64,11 +64,7 @@ struct pmka_bus {
 struct pmka {
     struct board base;
     struct pmka_profile profile;
-    struct board_cfg cfg;
-    struct board_io io;
     struct pmka_host host;
-    struct sched *sched;
-    struct afe afe[BOARD_AXES];
     struct pmka_specimen specimen;
     uint16_t rom[PMKA_ROM_WORDS];
     struct rng adc_noise, temp_noise;

@@ -114,14 +114,9 @@ static bool ready(const struct board *board)
     return psa2_ready((const struct psa2 *)board);
 }
 
-static struct afe *afe(struct board *board, unsigned axis)
-{
-    return &((struct psa2 *)board)->afe[axis];
-}
-
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
-    const struct board_cfg *c = &((const struct psa2 *)board)->cfg;
+    const struct board_cfg *c = &board->cfg;
     put(ctx, "temp_noise_scale", c->temp_noise_scale);
     put(ctx, "temp_adc_offset_v", c->temp_adc_offset_v);
     put(ctx, "temp_adc_gain_error", c->temp_adc_gain_error);
@@ -202,7 +197,7 @@ const struct board_type psa2_board = {
     .can = &psa2_can,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .afe = afe,
+    .analog = true,
     .digest = digest,
     .truth = truth,
 };

@@ -399,7 +399,7 @@ static void board_info(void *ctx, struct psa2_can_info *out)
     out->counters = b->counters;
     out->period_ns = ads1282_period_ns(&b->adc[0]);
     out->fclk_hz = b->profile.fclk_hz;
-    out->serial = b->cfg.serial;
+    out->serial = b->base.cfg.serial;
     out->word_bits = b->profile.word_bits;
 }
 

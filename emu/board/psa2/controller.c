@@ -28,7 +28,7 @@ static bool port_free(const struct psa2 *b)
 static void enter_run(struct psa2 *b, int64_t t_ns)
 {
     b->mode = PSA2_RUN;
-    psa2_notify_event(b, PSA2_EV_SETUP_DONE, t_ns);
+    board_notify(&b->base, PSA2_EV_SETUP_DONE, t_ns);
     psa2_arm_timeout(b, t_ns);
 }
 
@@ -174,7 +174,7 @@ static void on_accel_timeout(void *ctx, int64_t t_ns)
 {
     struct psa2 *b = ctx;
     if (t_ns < b->timeout_ns) {
-        sched_at(b->sched, &b->timeout, b->timeout_ns);
+        sched_at(b->base.sched, &b->timeout, b->timeout_ns);
         return;
     }
     b->counters.timeouts++;
@@ -203,7 +203,7 @@ enum psa2_result psa2_submit(struct psa2 *b, struct psa2_request *r, int64_t t_n
 
 static void drd_a_fell(struct psa2 *b, int64_t t_ns)
 {
-    b->board_degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    b->board_degc = b->base.io.temp_degc(b->base.io.ctx, 3, t_ns);
     b->period_ns = ads1282_period_ns(&b->adc[0]);
     b->drd_a_seen = true;
     b->drd_a_ns = t_ns;
@@ -222,7 +222,7 @@ static void accel_drdy(void *ctx, bool level, int64_t t_ns)
     if (port->axis != 0) return;
     psa2_line(b, PSA2_LINE_DRD_A, level, t_ns);
     if (level || b->mode == PSA2_OFF) return;
-    psa2_notify_event(b, PSA2_EV_DRD_A, t_ns);
+    board_notify(&b->base, PSA2_EV_DRD_A, t_ns);
     drd_a_fell(b, t_ns);
 }
 
@@ -237,7 +237,7 @@ static void temp_drdy(void *ctx, bool level, int64_t t_ns)
     struct psa2 *b = ctx;
     psa2_line(b, PSA2_LINE_DRD_T, level, t_ns);
     if (level || b->mode == PSA2_OFF) return;
-    psa2_notify_event(b, PSA2_EV_DRD_T, t_ns);
+    board_notify(&b->base, PSA2_EV_DRD_T, t_ns);
     if (b->mode == PSA2_SETUP) setup_event(b, PSA2_ON_DRD_T, t_ns);
     else if (b->mode == PSA2_RUN) temp_ready(b, t_ns);
 }
@@ -248,8 +248,8 @@ static double accel_vin_v(void *ctx, unsigned mux, int64_t t_ns)
     const struct psa2_port *port = ctx;
     struct psa2 *b = port->b;
     if (mux != 0 && mux != 3) return 0.0;
-    const double signal = b->io.accel(b->io.ctx, port->axis, t_ns);
-    return afe_out_v(&b->afe[port->axis], signal, b->board_degc, t_ns);
+    const double signal = b->base.io.accel(b->base.io.ctx, port->axis, t_ns);
+    return afe_out_v(&b->base.afe[port->axis], signal, b->board_degc, t_ns);
 }
 
 static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v)
@@ -257,8 +257,8 @@ static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsign
     const struct psa2_port *port = ctx;
     struct psa2 *b = port->b;
     const bool connected = mux == 0 || mux == 3;
-    for (unsigned i = 0; i < n; i++) vin_v[i] = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
-    if (connected) afe_out_row_v(&b->afe[port->axis], vin_v, b->board_degc, t_ns, n);
+    for (unsigned i = 0; i < n; i++) vin_v[i] = connected ? b->base.io.accel(b->base.io.ctx, port->axis, t_ns[i]) : 0.0;
+    if (connected) afe_out_row_v(&b->base.afe[port->axis], vin_v, b->board_degc, t_ns, n);
 }
 
 /* ---- life ---- */
@@ -267,12 +267,11 @@ static void wake_lines(void *ctx, uint64_t mask)
 {
     const uint32_t out_lines = 1u << PSA2_LINE_INT | 1u << PSA2_LINE_DATA | 1u << PSA2_LINE_CLK;
     struct psa2 *b = ctx;
-    if (mask & out_lines) psa2_out_wake(b, b->sched->now_ns);
+    if (mask & out_lines) psa2_out_wake(b, b->base.sched->now_ns);
 }
 
 static void init_trace(struct psa2 *b)
 {
-    board_init(&b->base, psa2_lines, PSA2_LINES);
     b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
     b->idle_lines = b->base.trace.level;
 }
@@ -280,18 +279,17 @@ static void init_trace(struct psa2 *b)
 static void init_accel(struct psa2 *b)
 {
     static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
-    static const char *const afe_noise[] = {"afe.x", "afe.y", "afe.z"};
     const struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
                                     .clk_hz = b->profile.fclk_hz,
                                     .vref_v = b->profile.adc_vref_v,
-                                    .noise_scale = b->cfg.adc_noise_scale,
-                                    .chain = (enum ads1282_chain)b->cfg.adc_chain};
+                                    .noise_scale = b->base.cfg.adc_noise_scale,
+                                    .chain = (enum ads1282_chain)b->base.cfg.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {
             .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
-        ads1282_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, adc_noise[i]));
-        afe_init(&b->afe[i], &b->cfg.afe[i], rng_stream(b->cfg.seed, b->cfg.serial, afe_noise[i]));
+        ads1282_init(&b->adc[i], &cfg, &io, b->base.sched,
+                     rng_stream(b->base.cfg.seed, b->base.cfg.serial, adc_noise[i]));
     }
 }
 
@@ -299,12 +297,12 @@ static void init_temp(struct psa2 *b)
 {
     const struct ads1256_cfg cfg = {.clkin_hz = b->profile.temp_clkin_hz,
                                     .vref_v = b->profile.temp_vref_v,
-                                    .noise_scale = b->cfg.temp_noise_scale,
-                                    .offset_v = b->cfg.temp_adc_offset_v,
-                                    .gain_error = b->cfg.temp_adc_gain_error,
+                                    .noise_scale = b->base.cfg.temp_noise_scale,
+                                    .offset_v = b->base.cfg.temp_adc_offset_v,
+                                    .gain_error = b->base.cfg.temp_adc_gain_error,
                                     .strict_timing = true};
     const struct ads1256_io io = {.ctx = b, .ain_v = psa2_temp_ain_v, .drdy = temp_drdy};
-    ads1256_init(&b->tadc, &cfg, &io, b->sched, rng_stream(b->cfg.seed, b->cfg.serial, "adc.t"));
+    ads1256_init(&b->tadc, &cfg, &io, b->base.sched, rng_stream(b->base.cfg.seed, b->base.cfg.serial, "adc.t"));
 }
 
 static void res_up(void *ctx, int64_t t_ns)
@@ -322,9 +320,7 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
     assert(io->accel && io->temp_degc);
     memset(b, 0, sizeof *b); /* no state of an earlier run */
     b->profile = *p;
-    b->cfg = *cfg;
-    b->io = *io;
-    b->sched = s;
+    board_init(&b->base, psa2_lines, PSA2_LINES, cfg, io, s);
     b->stream = true;
     b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
@@ -348,7 +344,7 @@ static void stop_all(struct psa2 *b, int64_t t_ns)
     b->seq = 0;
     b->drd_a_seen = b->fault_notified = false;
     b->sample = (struct psa2_sample){.due = false};
-    sched_cancel(b->sched, &b->timeout);
+    sched_cancel(b->base.sched, &b->timeout);
     psa2_spi_stop(b, t_ns);
     psa2_out_stop(b, t_ns);
     psa2_temp_restart(b);
@@ -360,7 +356,7 @@ static void enter_reset(struct psa2 *b, int64_t t_ns)
 {
     b->mode = PSA2_IN_RESET;
     stop_all(b, t_ns);
-    sched_at(b->sched, &b->res_up, t_ns + RES_LOW_NS);
+    sched_at(b->base.sched, &b->res_up, t_ns + RES_LOW_NS);
 }
 
 /* After a power-down: the lines that rest high rise. */
@@ -373,7 +369,7 @@ static void restore_idle_levels(struct psa2 *b, int64_t t_ns)
 
 void psa2_power_up(struct psa2 *b, int64_t t_ns)
 {
-    psa2_notify_event(b, PSA2_EV_POWER_UP, t_ns);
+    board_notify(&b->base, PSA2_EV_POWER_UP, t_ns);
     if (b->unpowered) restore_idle_levels(b, t_ns);
     enter_reset(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_up(&b->adc[i], t_ns);
@@ -385,7 +381,7 @@ void psa2_reset(struct psa2 *b, int64_t t_ns)
     if (b->mode == PSA2_OFF) return;
     b->counters.resets++;
     enter_reset(b, t_ns);
-    psa2_notify_event(b, PSA2_EV_RES, t_ns);
+    board_notify(&b->base, PSA2_EV_RES, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
 }
 
@@ -394,15 +390,15 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     if (b->mode == PSA2_OFF) return;
     b->mode = PSA2_OFF; /* from here on every line is low */
     b->unpowered = true;
-    sched_cancel(b->sched, &b->res_up);
+    sched_cancel(b->base.sched, &b->res_up);
     stop_all(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);
     ads1256_power_off(&b->tadc, t_ns);
     trace_steps(&b->base.trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
     b->stream = true;
     b->latest = (struct psa2_frame){0};
-    psa2_notify_event(b, PSA2_EV_RES, t_ns);
-    psa2_notify_event(b, PSA2_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, PSA2_EV_RES, t_ns);
+    board_notify(&b->base, PSA2_EV_POWER_DOWN, t_ns);
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
 }
 

@@ -85,8 +85,8 @@ static void word_event(void *ctx, int64_t t_ns)
         else report_word(b, t_ns);
         if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return;
         t_ns = clk_on(o->at, &o->bits).t_ns;
-    } while (sched_go_on(b->sched, t_ns));
-    sched_at(b->sched, &o->word, t_ns);
+    } while (sched_go_on(b->base.sched, t_ns));
+    sched_at(b->base.sched, &o->word, t_ns);
 }
 
 /* The frame under way, unwatched so far: its edges up to now as far as the trace still takes them, then as if it had been
@@ -107,14 +107,14 @@ void psa2_out_wake(struct psa2 *b, int64_t t_ns)
             report_word(b, t_ns);
         if ((unsigned)o->watched_words + 1 >= PSA2_WORDS) return; /* the last word is int_rise()'s */
     }
-    sched_at(b->sched, &o->word, next_ns);
+    sched_at(b->base.sched, &o->word, next_ns);
 }
 
 /* The rest of a watched frame, up to now, and idle lines. */
 static void finish_watched(struct psa2 *b, int64_t t_ns)
 {
     struct psa2_out *o = &b->out;
-    sched_cancel(b->sched, &o->word);
+    sched_cancel(b->base.sched, &o->word);
     if (o->watched_words < 0) return;
     while ((unsigned)o->watched_words < PSA2_WORDS && o->at.t_ns <= t_ns) report_word(b, t_ns);
     const uint32_t idle = b->mode == PSA2_OFF ? 0 : UINT32_C(1) << PSA2_LINE_INT;
@@ -128,13 +128,13 @@ static void int_rise(void *ctx, int64_t t_ns)
     finish_watched(b, t_ns);
     b->out.busy = false;
     b->counters.frames++;
-    psa2_notify_event(b, PSA2_EV_INT_RISE, t_ns);
+    board_notify(&b->base, PSA2_EV_INT_RISE, t_ns);
     if (b->host.frame) b->host.frame(b->host.ctx, &b->out.f, t_ns);
 }
 
 static void int_fall(void *ctx, int64_t t_ns)
 {
-    psa2_notify_event(ctx, PSA2_EV_INT_FALL, t_ns);
+    board_notify(ctx, PSA2_EV_INT_FALL, t_ns);
 }
 
 void psa2_out_init(struct psa2 *b)
@@ -166,16 +166,16 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns)
     f->t_int_fall_ns = o->start.t_ns;
     f->t_int_rise_ns = clk_on(o->start, &o->frame).t_ns;
     pack_words(&b->profile, f);
-    sched_at(b->sched, &o->rise, f->t_int_rise_ns);
-    if (trace_watched(&b->base.trace, out_lines)) sched_at(b->sched, &o->word, f->t_int_fall_ns);
-    if (b->base.observed) sched_at(b->sched, &o->fall, f->t_int_fall_ns);
+    sched_at(b->base.sched, &o->rise, f->t_int_rise_ns);
+    if (trace_watched(&b->base.trace, out_lines)) sched_at(b->base.sched, &o->word, f->t_int_fall_ns);
+    if (b->base.observed) sched_at(b->base.sched, &o->fall, f->t_int_fall_ns);
     o->f = *f;
 }
 
 void psa2_out_stop(struct psa2 *b, int64_t t_ns)
 {
     finish_watched(b, t_ns);
-    sched_cancel(b->sched, &b->out.rise);
-    sched_cancel(b->sched, &b->out.fall);
+    sched_cancel(b->base.sched, &b->out.rise);
+    sched_cancel(b->base.sched, &b->out.fall);
     b->out.busy = false;
 }

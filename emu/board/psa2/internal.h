@@ -7,11 +7,6 @@
 
 #define PSA2_TIMEOUT_NS INT64_C(100000000) /* E0: 100 ms beyond the settling time without data-ready is a fault */
 
-static inline void psa2_notify_event(const struct psa2 *b, enum psa2_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 /* A line that follows the controller or a converter: without power all are low. */
 static inline void psa2_line(struct psa2 *b, enum psa2_line line, bool level, int64_t t_ns)
 {

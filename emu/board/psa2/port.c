@@ -27,9 +27,9 @@ static void pulse_event(void *ctx, int64_t t_ns)
     const bool temp = p->group == PSA2_TEMP;
     p->active = !p->active;
     if (!p->skipped) pulse_edge(b, p->active != temp, t_ns);
-    if (!p->skipped && p->active != temp) psa2_notify_event(b, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
+    if (!p->skipped && p->active != temp) board_notify(&b->base, temp ? PSA2_EV_SYNC_T : PSA2_EV_SYNC_A, t_ns);
     if (p->active) {
-        sched_at(b->sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
+        sched_at(b->base.sched, &p->ev, t_ns + (temp ? psa2_tau_ns(b, SYNC_T_TAU) : psa2_tclk_ns(b, SYNC_A_TCLK)));
         return;
     }
     p->busy = false;
@@ -48,12 +48,12 @@ void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 
     b->pulse.skipped = group == PSA2_TEMP && b->base.faults & PSA2_FAULT_SKIP_SYNC_T;
     b->pulse.group = group;
     b->pulse.done = done;
-    sched_at(b->sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
+    sched_at(b->base.sched, &b->pulse.ev, clk_edge_ns(&half, k | 1));
 }
 
 void psa2_pulse_stop(struct psa2 *b, int64_t t_ns)
 {
-    sched_cancel(b->sched, &b->pulse.ev);
+    sched_cancel(b->base.sched, &b->pulse.ev);
     if (b->pulse.active) pulse_edge(b, b->pulse.group == PSA2_TEMP, t_ns);
     b->pulse.busy = b->pulse.active = false;
 }
@@ -76,7 +76,7 @@ bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns)
 void psa2_arm_timeout(struct psa2 *b, int64_t t_ns)
 {
     b->timeout_ns = t_ns + PSA2_TIMEOUT_NS + ads1282_settle_ns(&b->adc[0]);
-    if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->sched, &b->timeout, b->timeout_ns);
+    if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->base.sched, &b->timeout, b->timeout_ns);
 }
 
 void psa2_port_init(struct psa2 *b)

@@ -68,7 +68,7 @@ static void arm_phase(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 {
     b->spi.phase = phase;
     b->spi.due_ns = t_ns;
-    if (!b->spi.stepping) sched_at(b->sched, &b->spi.ev, t_ns);
+    if (!b->spi.stepping) sched_at(b->base.sched, &b->spi.ev, t_ns);
 }
 
 /* The first edge at or after t_ns that is not inside the byte before, from whose end on no division is needed. */
@@ -235,7 +235,7 @@ static bool read_at_once(struct psa2 *b)
     for (unsigned i = 0; i < 3; i++)
         if (!ads1282_only_shifts(&b->adc[i])) return false;
     const int64_t end_ns = after_ns(s, &s->read);
-    if (!sched_go_on(b->sched, end_ns)) return false;
+    if (!sched_go_on(b->base.sched, end_ns)) return false;
     for (unsigned i = 0; i < 3; i++) ads1282_shift(&b->adc[i], s->rx[i], s->x.count, end_ns);
     pass_bytes(b);
     end_byte(b, end_ns);
@@ -294,9 +294,9 @@ static void on_event(void *ctx, int64_t t_ns)
     s->due_ns = t_ns;
     s->stepping = true;
     do step[s->phase](b, s->due_ns);
-    while (s->phase != PSA2_SPI_IDLE && sched_go_on(b->sched, s->due_ns));
+    while (s->phase != PSA2_SPI_IDLE && sched_go_on(b->base.sched, s->due_ns));
     s->stepping = false;
-    if (s->phase != PSA2_SPI_IDLE) sched_at(b->sched, &s->ev, s->due_ns);
+    if (s->phase != PSA2_SPI_IDLE) sched_at(b->base.sched, &s->ev, s->due_ns);
 }
 
 void psa2_spi_init(struct psa2 *b)
@@ -316,7 +316,7 @@ void psa2_spi_init(struct psa2 *b)
 
 void psa2_spi_stop(struct psa2 *b, int64_t t_ns)
 {
-    sched_cancel(b->sched, &b->spi.ev);
+    sched_cancel(b->base.sched, &b->spi.ev);
     if (psa2_spi_busy(b) && b->spi.x.group == PSA2_TEMP) cst_up(b, t_ns);
     b->spi.phase = PSA2_SPI_IDLE;
 }

@@ -97,14 +97,10 @@ struct psa2_port { /* which converter a callback came from */
 struct psa2 {
     struct board base;
     struct psa2_profile profile;
-    struct board_cfg cfg;
-    struct board_io io;
     struct psa2_host host;
-    struct sched *sched;
     uint64_t idle_lines; /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
-    struct afe afe[3];
     struct psa2_port port[3];
     double board_degc; /* refreshed at each DRD_A */
     struct psa2_counters counters;

@@ -12,13 +12,13 @@ double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns)
 {
     const struct psa2 *b = ctx;
     if (ain >= SENSORS || ain >= b->profile.temp_channels) return 0.0;
-    const double temp_k = b->io.temp_degc(b->io.ctx, ain, t_ns) + KELVIN;
+    const double temp_k = b->base.io.temp_degc(b->base.io.ctx, ain, t_ns) + KELVIN;
     return b->profile.temp_sensor_a_per_k * temp_k * b->profile.temp_load_ohm;
 }
 
 void psa2_temp_await(struct psa2 *b, int64_t t_ns)
 {
-    sched_at(b->sched, &b->temp.timeout, t_ns + PSA2_TIMEOUT_NS + 4 * ads1256_settle_ns(&b->tadc));
+    sched_at(b->base.sched, &b->temp.timeout, t_ns + PSA2_TIMEOUT_NS + 4 * ads1256_settle_ns(&b->tadc));
 }
 
 void psa2_temp_timeout(struct psa2 *b, int64_t t_ns)
@@ -34,7 +34,7 @@ void psa2_temp_restart(struct psa2 *b)
 {
     const struct sched_ev timeout = b->temp.timeout;
     b->temp = (struct psa2_temp){.timeout = timeout};
-    sched_cancel(b->sched, &b->temp.timeout);
+    sched_cancel(b->base.sched, &b->temp.timeout);
 }
 
 static void wait_conversion(struct psa2 *b, int64_t t_ns)
@@ -86,7 +86,7 @@ bool psa2_temp_start(struct psa2 *b, int64_t t_ns)
 void psa2_temp_answered(struct psa2 *b)
 {
     b->temp.hold = b->temp.fault_notified = false;
-    sched_cancel(b->sched, &b->temp.timeout);
+    sched_cancel(b->base.sched, &b->temp.timeout);
 }
 
 void psa2_temp_ready(struct psa2 *b)

@@ -23,7 +23,7 @@ static int32_t code_of(double value, double per_code, int32_t low, int32_t high)
 static void read_rates(struct psd1 *b, int64_t t_ns, double w_radps[3])
 {
     w_radps[0] = w_radps[1] = w_radps[2] = 0.0;
-    if (b->io.rate_radps) b->io.rate_radps(b->io.ctx, t_ns, w_radps);
+    if (b->base.io.rate_radps) b->base.io.rate_radps(b->base.io.ctx, t_ns, w_radps);
 }
 
 /* Angle of dt_s with the rate w at its end, by the trapezoid; after an abrupt change w holds all the way. */
@@ -119,7 +119,7 @@ void psd1_aux_power_up(struct psd1 *b, int64_t t_ns)
 
 static uint16_t temp_code(const struct psd1 *b, unsigned channel, int64_t t_ns)
 {
-    const double t_degc = b->io.temp_degc(b->io.ctx, channel, t_ns) + b->temp_offset_k[channel];
+    const double t_degc = b->base.io.temp_degc(b->base.io.ctx, channel, t_ns) + b->temp_offset_k[channel];
     return CODE12(code_of(t_degc, b->profile.temp_k_per_code, -2048, 2047));
 }
 
@@ -142,7 +142,7 @@ static uint16_t self_test(const struct psd1 *b)
 /* The bench's supply by way of a divider that makes the profile's voltage of its nominal one (E0). */
 static double supply_v(const struct psd1 *b, int64_t t_ns)
 {
-    return b->io.supply_ratio ? b->supply_v * b->io.supply_ratio(b->io.ctx, t_ns) : b->supply_v;
+    return b->base.io.supply_ratio ? b->supply_v * b->base.io.supply_ratio(b->base.io.ctx, t_ns) : b->supply_v;
 }
 
 uint16_t psd1_aux_service(const struct psd1 *b, int64_t t_ns)
@@ -163,21 +163,21 @@ uint16_t psd1_aux_service(const struct psd1 *b, int64_t t_ns)
 static void draw_gyro(const struct psd1 *b, struct psd1_gyro *g, const char *of, const char *noise)
 {
     const struct psd1_profile *p = &b->profile;
-    struct rng r = rng_stream(b->unit.seed, b->unit.serial, of);
+    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, of);
     const double step_h = 1e-9 * WALK_POINTS * p->gyro_grid_ns / 3600.0;
     g->bias_radps = rng_gauss(&r) * p->gyro_bias_sd_degph * RAD_PER_DEG / 3600.0;
     g->scale = 1.0 + 1e-6 * rng_gauss(&r) * p->gyro_scale_sd_ppm;
     g->rate_offset_radps = rng_gauss(&r) * p->rate_offset_sd_dps * RAD_PER_DEG;
     g->rate_scale = 1.0 + 1e-6 * rng_gauss(&r) * p->rate_scale_sd_ppm;
-    g->arw_rad = b->unit.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(step_h);
-    g->noise = rng_stream(b->unit.seed, b->unit.serial, noise);
+    g->arw_rad = b->base.cfg.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(step_h);
+    g->noise = rng_stream(b->base.cfg.seed, b->base.cfg.serial, noise);
 }
 
 void psd1_aux_init(struct psd1 *b)
 {
     static const char *const of[] = {"psd1.gyro.x", "psd1.gyro.y", "psd1.gyro.z"};
     static const char *const noise[] = {"psd1.gyro.noise.x", "psd1.gyro.noise.y", "psd1.gyro.noise.z"};
-    struct rng r = rng_stream(b->unit.seed, b->unit.serial, "psd1.service");
+    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, "psd1.service");
     for (unsigned i = 0; i < 3; i++) draw_gyro(b, &b->gyros.axis[i], of[i], noise[i]);
     for (unsigned i = 0; i < 4; i++) b->temp_offset_k[i] = rng_gauss(&r) * b->profile.temp_offset_sd_k;
     b->supply_v = b->profile.supply_v + rng_gauss(&r) * b->profile.supply_sd_v;

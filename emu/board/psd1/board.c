@@ -87,11 +87,6 @@ static bool ready(const struct board *board)
     return ((const struct psd1 *)board)->ready;
 }
 
-static struct afe *afe(struct board *board, unsigned axis)
-{
-    return &((struct psd1 *)board)->afe[axis];
-}
-
 /* ---- what faults are measured by ---- */
 
 static unsigned pulses(const struct board *board)
@@ -222,7 +217,7 @@ const struct board_type psd1_board = {
     .bus = &psd1_bus,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,
-    .afe = afe,
+    .analog = true,
     .digest = digest,
     .truth = truth,
 };

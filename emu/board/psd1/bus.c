@@ -154,7 +154,7 @@ static void begin_read(struct psd1 *b, int64_t t_ns)
         b->counters.late++;
         b->now.status |= PSD1_CY_LATE;
     }
-    psd1_notify_event(b, PSD1_EV_STROBE, t_ns);
+    board_notify(&b->base, PSD1_EV_STROBE, t_ns);
 }
 
 static void end_read(struct psd1 *b)
@@ -199,7 +199,7 @@ static enum board_cycle_result begin_strobe(struct psd1 *b, struct board_cycle *
     s->cycle = r == BOARD_CYCLE_OK ? c : NULL;
     s->end_ns = t_ns + len_ns;
     put_strobe(b, c->write, c->address, data ? c->data : 0, t_ns);
-    sched_at(b->sched, &s->ev, s->end_ns);
+    sched_at(b->base.sched, &s->ev, s->end_ns);
     if (r != BOARD_CYCLE_OK || c->write || c->address > PSD1_REG_Z) return r;
     begin_read(b, t_ns);
     return r;
@@ -296,7 +296,7 @@ static void cut_cycle(struct board_cycle **of, int64_t t_ns)
 void psd1_bus_stop(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_strobe *s = &b->bus;
-    sched_cancel(b->sched, &s->ev);
+    sched_cancel(b->base.sched, &s->ev);
     if (s->busy) release_bus(b, t_ns);
     s->busy = s->takes = false;
     cut_cycle(&s->cycle, t_ns);

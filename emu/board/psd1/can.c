@@ -169,10 +169,8 @@ static int64_t period_ns(const void *board)
     return ad7712_period_ns(&((const struct psd1 *)board)->adc[0]);
 }
 
-static const struct board_node_type type = {.device = &psd1_device,
-                                            BOARD_NODE_OBJECTS(objects),
-                                            .serial_at = offsetof(struct psd1, unit.serial),
-                                            .period_ns = period_ns};
+static const struct board_node_type type = {
+    .device = &psd1_device, BOARD_NODE_OBJECTS(objects), .period_ns = period_ns};
 
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)

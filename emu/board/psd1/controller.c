@@ -51,7 +51,7 @@ static void setup_done(struct psd1 *b, int64_t t_ns)
 {
     b->ready = true;
     b->lost = psd1_lost(b);
-    psd1_notify_event(b, PSD1_EV_SETUP_DONE, t_ns);
+    board_notify(&b->base, PSD1_EV_SETUP_DONE, t_ns);
     if (b->profile.int0 == PSD1_INT0_AUTO) psd1_flags(b, true, true, t_ns);
 }
 
@@ -75,9 +75,9 @@ static void step_event(void *ctx, int64_t t_ns)
     struct psd1 *b = ctx;
     b->stepping = true;
     do t_ns = run_step(b, t_ns);
-    while (t_ns != SCHED_NEVER && sched_go_on(b->sched, t_ns));
+    while (t_ns != SCHED_NEVER && sched_go_on(b->base.sched, t_ns));
     b->stepping = false;
-    if (t_ns != SCHED_NEVER) sched_at(b->sched, &b->ev, t_ns);
+    if (t_ns != SCHED_NEVER) sched_at(b->base.sched, &b->ev, t_ns);
 }
 
 /* ---- data-ready and timeout ---- */
@@ -87,7 +87,7 @@ static void on_dr_timeout(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     if (t_ns < b->timeout_ns) {
-        sched_at(b->sched, &b->timeout, b->timeout_ns);
+        sched_at(b->base.sched, &b->timeout, b->timeout_ns);
         return;
     }
     b->counters.timeouts++;
@@ -99,7 +99,7 @@ static void on_dr_timeout(void *ctx, int64_t t_ns)
 
 static void refresh_degc(struct psd1 *b, int64_t t_ns)
 {
-    const double degc = b->io.temp_degc(b->io.ctx, 3, t_ns);
+    const double degc = b->base.io.temp_degc(b->base.io.ctx, 3, t_ns);
     if (degc == b->board_degc && b->per_vref > 0.0) return;
     b->board_degc = degc;
     b->vref_scale = 1.0 + b->vref_error + b->vref_tc_per_k * (b->board_degc - 25.0);
@@ -113,7 +113,7 @@ static void dr_fell(struct psd1 *b, int64_t t_ns)
     psd1_arm_timeout(b, t_ns);
     if (b->fault_notified && b->host.fault) b->host.fault(b->host.ctx, 0, t_ns);
     b->fault_notified = false;
-    psd1_notify_event(b, PSD1_EV_DR, t_ns);
+    board_notify(&b->base, PSD1_EV_DR, t_ns);
     psd1_job_dr(b, t_ns);
     start_next(b, t_ns);
 }
@@ -143,10 +143,10 @@ static void vin_row_v(void *ctx, unsigned channel, const int64_t *t_ns, unsigned
 {
     const struct psd1_port *port = ctx;
     struct psd1 *b = port->b;
-    struct afe *const afe = &b->afe[port->axis];
+    struct afe *const afe = &b->base.afe[port->axis];
     const bool connected = channel + 1 == b->profile.adc_input;
     for (unsigned i = 0; i < n; i++) {
-        const double signal = connected ? b->io.accel(b->io.ctx, port->axis, t_ns[i]) : 0.0;
+        const double signal = connected ? b->base.io.accel(b->base.io.ctx, port->axis, t_ns[i]) : 0.0;
         vin_v[i] = connected ? afe_out_v(afe, signal, b->board_degc, t_ns[i]) * b->per_vref : 0.0;
     }
 }
@@ -193,7 +193,6 @@ static uint64_t rest_levels(const struct psd1 *b)
 
 static void init_trace(struct psd1 *b)
 {
-    board_init(&b->base, psd1_lines, PSD1_LINES);
     b->base.trace.level = rest_levels(b);
     psd1_wave_init(b);
 }
@@ -203,11 +202,11 @@ static struct ad7712_cfg adc_cfg(const struct psd1 *b, unsigned axis)
     static const char *const of[] = {"psd1.adc.x", "psd1.adc.y", "psd1.adc.z"};
     static const enum ad7712_part part[] = {AD7712_PART_7712, AD7712_PART_7710, AD7712_PART_7711};
     const struct psd1_profile *p = &b->profile;
-    struct rng r = rng_stream(b->unit.seed, b->unit.serial, of[axis]);
+    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, of[axis]);
     struct ad7712_cfg c = {.part = part[p->part],
                            .clkin_hz = p->adc_clkin_hz,
                            .vref_v = p->adc_vref_v,
-                           .noise_scale = b->unit.adc_noise_scale,
+                           .noise_scale = b->base.cfg.adc_noise_scale,
                            .rfs_access_ns = (int32_t)p->rfs_access_ns,
                            .bit_access_ns = (int32_t)p->bit_access_ns,
                            .drdy_rise_ns = (int32_t)p->drdy_rise_ns,
@@ -222,8 +221,7 @@ static struct ad7712_cfg adc_cfg(const struct psd1 *b, unsigned axis)
 static void init_adc(struct psd1 *b)
 {
     static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
-    static const char *const afe_noise[] = {"afe.x", "afe.y", "afe.z"};
-    struct rng vref = rng_stream(b->unit.seed, b->unit.serial, "psd1.vref");
+    struct rng vref = rng_stream(b->base.cfg.seed, b->base.cfg.serial, "psd1.vref");
     b->vref_error = 1e-6 * rng_gauss(&vref) * b->profile.vref_sd_ppm;
     b->vref_tc_per_k = 1e-6 * rng_gauss(&vref) * b->profile.vref_tc_sd_ppm_per_k;
     for (unsigned i = 0; i < 3; i++) {
@@ -232,8 +230,8 @@ static void init_adc(struct psd1 *b)
         const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
         const struct ad7712_io io = {
             .ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
-        ad7712_init(&b->adc[i], &cfg, &io, b->sched, rng_stream(b->unit.seed, b->unit.serial, adc_noise[i]));
-        afe_init(&b->afe[i], &b->unit.afe[i], rng_stream(b->unit.seed, b->unit.serial, afe_noise[i]));
+        ad7712_init(&b->adc[i], &cfg, &io, b->base.sched,
+                    rng_stream(b->base.cfg.seed, b->base.cfg.serial, adc_noise[i]));
         b->drdy[i] = true;
     }
 }
@@ -244,9 +242,7 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
     assert(io->accel && io->temp_degc);
     memset(b, 0, sizeof *b); /* no state of an earlier run */
     b->profile = *p;
-    b->unit = *cfg;
-    b->io = *io;
-    b->sched = s;
+    board_init(&b->base, psd1_lines, PSD1_LINES, cfg, io, s);
     b->due_ns = SCHED_NEVER;
     b->dr = true;
     sched_ev(&b->ev, step_event, b);
@@ -291,7 +287,7 @@ static void enter_reset(struct psd1 *b, int64_t t_ns)
 void psd1_power_up(struct psd1 *b, int64_t t_ns)
 {
     if (b->phase != PSD1_OFF) return;
-    psd1_notify_event(b, PSD1_EV_POWER_UP, t_ns);
+    board_notify(&b->base, PSD1_EV_POWER_UP, t_ns);
     b->t0_ns = t_ns;
     b->phase = PSD1_IN_RESET;
     trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), rest_levels(b), t_ns);
@@ -306,7 +302,7 @@ void psd1_reset(struct psd1 *b, int64_t t_ns)
     if (b->phase == PSD1_OFF) return;
     b->counters.resets++;
     enter_reset(b, t_ns);
-    psd1_notify_event(b, PSD1_EV_RES, t_ns);
+    board_notify(&b->base, PSD1_EV_RES, t_ns);
 }
 
 void psd1_power_down(struct psd1 *b, int64_t t_ns)
@@ -315,13 +311,13 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns)
     stop_all(b, BOARD_CYCLE_OFF, t_ns);
     psd1_wave_power(b, false, t_ns);
     psd1_due(b, PSD1_OFF, SCHED_NEVER);
-    sched_cancel(b->sched, &b->timeout);
+    sched_cancel(b->base.sched, &b->timeout);
     b->fault_notified = false;
     for (unsigned i = 0; i < 3; i++) ad7712_power_off(&b->adc[i], t_ns);
     b->dr = true;
     trace_put(&b->base.trace, TRACE_FIRST(PSD1_LINES), 0, t_ns);
-    psd1_notify_event(b, PSD1_EV_RES, t_ns);
-    psd1_notify_event(b, PSD1_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, PSD1_EV_RES, t_ns);
+    board_notify(&b->base, PSD1_EV_POWER_DOWN, t_ns);
 }
 
 void psd1_sample_until(struct psd1 *b, int64_t t_ns)

@@ -31,7 +31,7 @@ int64_t psd1_cycle_start(struct psd1 *b, int64_t t_ns)
     b->conversions = conversion_count(b);
     psd1_a0(b, true, t_ns);
     psd1_aux_latch(b, &b->now, t_ns);
-    psd1_notify_event(b, PSD1_EV_A0, t_ns);
+    board_notify(&b->base, PSD1_EV_A0, t_ns);
     b->phase = PSD1_RF_FALL;
     return t_ns + PSD1_HALF_NS;
 }
@@ -44,7 +44,7 @@ int64_t psd1_rf_fall(struct psd1 *b, int64_t t_ns)
     psd1_rf(b, axis, false, t_ns);
     const uint32_t word = ad7712_read_word(&b->adc[axis], 16, &sclk);
     psd1_frame_begin(b, PSD1_FORM_READ16, word, t_ns);
-    psd1_notify_event(b, PSD1_EV_RFX + axis, t_ns);
+    board_notify(&b->base, PSD1_EV_RFX + axis, t_ns);
     b->phase = PSD1_RF_RISE;
     return t_ns + PSD1_READ16_NS;
 }
@@ -67,7 +67,7 @@ int64_t psd1_rf_rise(struct psd1 *b, int64_t t_ns)
     b->taken = false;
     if (axis == 2 && b->profile.a0_release == PSD1_A0_RFZ) psd1_a0(b, false, t_ns);
     b->phase = PSD1_READY;
-    psd1_notify_event(b, PSD1_EV_FL2, t_ns);
+    board_notify(&b->base, PSD1_EV_FL2, t_ns);
     return b->profile.host_strobe_ns ? t_ns + b->profile.host_strobe_ns : SCHED_NEVER;
 }
 
@@ -94,7 +94,7 @@ static int64_t cycle_end(struct psd1 *b, int64_t t_ns)
     b->counters.cycles++;
     b->latest = *c;
     b->phase = PSD1_IDLE;
-    psd1_notify_event(b, PSD1_EV_CYCLE, t_ns);
+    board_notify(&b->base, PSD1_EV_CYCLE, t_ns);
     if (b->host.cycle) b->host.cycle(b->host.ctx, &b->latest, t_ns);
     return b->due_ns;
 }

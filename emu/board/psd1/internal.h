@@ -29,11 +29,6 @@ static inline void psd1_put(struct psd1 *b, uint64_t lines, uint64_t level, int6
     trace_put(&b->base.trace, lines, level, t_ns);
 }
 
-static inline void psd1_notify_event(const struct psd1 *b, enum psd1_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 /* First edge of 1M25 strictly after t_ns: what moves at the very instant of an edge is seen by the next (E0). */
 static inline int64_t psd1_next_rise(const struct psd1 *b, int64_t t_ns)
 {
@@ -73,15 +68,15 @@ static inline void psd1_due(struct psd1 *b, enum psd1_phase phase, int64_t t_ns)
     b->phase = phase;
     b->due_ns = t_ns;
     if (b->stepping) return;
-    if (t_ns == SCHED_NEVER) sched_cancel(b->sched, &b->ev);
-    else sched_at(b->sched, &b->ev, t_ns);
+    if (t_ns == SCHED_NEVER) sched_cancel(b->base.sched, &b->ev);
+    else sched_at(b->base.sched, &b->ev, t_ns);
 }
 
 /* A fault if DR does not fall in time. */
 static inline void psd1_arm_timeout(struct psd1 *b, int64_t t_ns)
 {
     b->timeout_ns = t_ns + PSD1_TIMEOUT_NS + 12 * ad7712_period_ns(&b->adc[0]);
-    if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->sched, &b->timeout, b->timeout_ns);
+    if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->base.sched, &b->timeout, b->timeout_ns);
 }
 
 /* ---- steps: at the instant of the phase; the next one's is returned, the phase set ---- */

@@ -100,7 +100,7 @@ int64_t psd1_tfs_fall(struct psd1 *b, int64_t t_ns)
         ad7712_write_word(&b->adc[i], psd1_rk_give_word(&b->rk), PSD1_RK_BITS, &sclk);
     }
     psd1_frame_begin(b, PSD1_FORM_WRITE24, word, t_ns);
-    psd1_notify_event(b, PSD1_EV_UC, t_ns);
+    board_notify(&b->base, PSD1_EV_UC, t_ns);
     b->phase = PSD1_TFS_RISE;
     return t_ns + PSD1_FRAME24_NS;
 }
@@ -212,7 +212,7 @@ static void begin_job(struct psd1 *b, int64_t t_ns)
 {
     struct psd1_job *j = &b->job;
     j->waits = false;
-    sched_cancel(b->sched, &j->ev);
+    sched_cancel(b->base.sched, &j->ev);
     if (j->request->command == PSD1_CMD_UC1) b->uc1 = j->request->word;
     if (j->request->command == PSD1_CMD_UC2) b->uc2 = j->request->word;
     b->counters.commands++;
@@ -239,7 +239,7 @@ enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, con
     j->request = r;
     j->waits = true;
     if (b->phase == PSD1_IDLE || b->phase == PSD1_START) begin_job(b, t_ns);
-    else sched_at(b->sched, &j->ev, t_ns + JOB_WAIT_NS);
+    else sched_at(b->base.sched, &j->ev, t_ns + JOB_WAIT_NS);
     return BOARD_CYCLE_OK;
 }
 
@@ -248,7 +248,7 @@ static void on_wait_timeout(void *ctx, int64_t t_ns)
 {
     struct psd1 *b = ctx;
     if (b->phase != PSD1_READY || (b->bus.busy && b->bus.takes)) {
-        sched_at(b->sched, &b->job.ev, t_ns + JOB_RETRY_NS);
+        sched_at(b->base.sched, &b->job.ev, t_ns + JOB_RETRY_NS);
         return;
     }
     psd1_cut(b, t_ns);
@@ -284,7 +284,7 @@ void psd1_job_stop(struct psd1 *b, enum board_cycle_result result, int64_t t_ns)
     tfs_up(b, t_ns);
     for (unsigned i = 0; i < 3; i++) psd1_rf(b, i, true, t_ns);
     psd1_a0(b, false, t_ns);
-    sched_cancel(b->sched, &j->ev);
+    sched_cancel(b->base.sched, &j->ev);
     j->at = NULL;
     j->request = NULL;
     j->waits = j->data_first = false;

@@ -76,12 +76,8 @@ struct psd1_port { /* which converter a callback came from */
 struct psd1 {
     struct board base;
     struct psd1_profile profile;
-    struct board_cfg unit;
-    struct board_io io;
     struct psd1_host host;
-    struct sched *sched;
     struct ad7712 adc[3];
-    struct afe afe[3];
     struct psd1_port port[3];
     /* specimen */
     double vref_error, vref_tc_per_k, temp_offset_k[4], supply_v;

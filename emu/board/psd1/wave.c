@@ -189,7 +189,7 @@ static void join_clock(struct psd1 *b, int64_t t_ns)
 static void wake_lines(void *ctx, uint64_t mask)
 {
     struct psd1 *b = ctx;
-    const int64_t t_ns = b->sched->now_ns;
+    const int64_t t_ns = b->base.sched->now_ns;
     if (b->phase == PSD1_OFF) return;
     const bool clock = mask & CLK && !b->wave.clock_on;
     const bool frame = mask & (SCLK | SDAT) && b->frame.active;
@@ -205,7 +205,7 @@ static int64_t report_lines(void *ctx, int64_t t_ns)
     if (w->clock_on && !w->frame_on && !trace_watched(&b->base.trace, CLK)) w->on = w->clock_on = false;
     if (!w->on) return t_ns;
     const int64_t room_ns = w->clock_on && !w->frame_on ? w->clock_ns + CLOCK_CHUNK * (int64_t)PSD1_HALF_NS : t_ns;
-    const int64_t now_ns = t_ns < b->sched->now_ns ? t_ns : b->sched->now_ns;
+    const int64_t now_ns = t_ns < b->base.sched->now_ns ? t_ns : b->base.sched->now_ns;
     report_until(b, room_ns < now_ns ? room_ns : now_ns);
     return room_ns < now_ns ? room_ns : t_ns;
 }

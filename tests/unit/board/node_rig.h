@@ -13,12 +13,12 @@ enum { NODE = 6, SEEN_MAX = 1024, COUNTERS_MAX = 64, ADDRESSES = 4, OWN_OBJECT =
 
 /* The fake board: what it will say, and what it was asked. */
 struct fake {
+    struct board base; /* first */
     uint32_t counter[COUNTERS_MAX];
     enum board_cycle_result accept;
     struct board_cycle *cycle;
     unsigned submits, resets;
     int64_t period_ns;
-    uint32_t serial;
 };
 
 struct rig {
@@ -151,7 +151,6 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     type = (struct board_node_type){.device = d,
                                     .objects = own,
                                     .object_count = sizeof own / sizeof own[0],
-                                    .serial_at = offsetof(struct fake, serial),
                                     .period_ns = fake_period,
                                     .defaults = on_defaults,
                                     .sync = on_sync,
@@ -161,7 +160,7 @@ static inline struct rig *rig_of_device(const struct co_device *d, uint32_t bitr
     r->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = r};
     can_attach(&r->bus, &r->host);
     r->board.period_ns = NS_PER_S / 1000;
-    r->board.serial = 4711;
+    r->board.base.cfg.serial = 4711;
     const struct board_can_cfg cfg = {.name = "unit", .type = &board, .node_id = NODE, .refused = on_refused, .ctx = r};
     board_node_init(&r->can, &type, &cfg, &r->board, &r->bus, &r->s);
     board_node_power_up(&r->can, 0);

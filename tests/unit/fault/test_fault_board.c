@@ -195,7 +195,7 @@ static void the_least_that_is_seen_is_accepted(void **state)
     for (size_t i = 0; i < COUNT(lines); i++) assert_says(lines[i], "'ok':true");
     assert_int_equal(r.board.sampled_ns, 5);
     assert_non_null(r.unit[0].sensor_faults[1]);
-    assert_non_null(r.board.afe[0].faults);
+    assert_non_null(r.board.base.afe[0].faults);
     assert_int_equal(r.board.base.line.slot[0].f.frame_line, fake_type.frame_line);
     assert_int_equal(r.board.base.line.slot[0].f.line, fake_type.pulse_line);
 }
@@ -293,7 +293,7 @@ static void every_kind_of_chips_lines_and_sensors_fits_a_board_and_every_part_ha
         for (unsigned i = 0; (kind = fault_kind(i)) != NULL; i++) {
             const unsigned here = points_for(kind);
             const bool any = kind->places & (UINT64_C(1) << FAULT_AT_SENSOR | UINT64_C(1) << FAULT_AT_AFE);
-            if (any && here != ((*t)->afe ? UNIT_AXES : 0))
+            if (any && here != ((*t)->analog ? UNIT_AXES : 0))
                 fail_msg("%s fits %u axes of %s", kind->name, here, (*t)->title);
             if (strcmp(kind->name, "line.stuck") == 0) assert_int_equal(here, (*t)->line_count);
             if (strcmp(kind->name, "line.missing_pulse") == 0) assert_int_equal(here, (*t)->pulses ? 1 : 0);

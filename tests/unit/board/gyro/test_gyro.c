@@ -195,7 +195,7 @@ static void a_mode_that_cannot_be_is_refused_with_the_reason(void **state)
     assert_null(mode(GYRO_OFF));
     r.mute = false;
     rig_run(&r, 0.1);
-    r.b.cfg.level_node = 0;
+    r.b.base.cfg.level_node = 0;
     assert_non_null(strstr(mode(GYRO_HOLD), "no level unit"));
     gyro_reset(&r.b, r.s.now_ns);
     assert_non_null(strstr(mode(GYRO_OFF), "runs up"));

@@ -245,7 +245,7 @@ static void noise_walks(void **state)
     const double sd_vs = sqrt(sum2 / 300.0) / 2000.0;
     assert_true(fabs(sd_vs / (20e-3 * sqrt(0.5)) - 1.0) < 0.15);
     rig_up(&r, &p, 3);
-    r.b.cfg.adc_noise_scale = 0.0;
+    r.b.base.cfg.adc_noise_scale = 0.0;
     r.input[0].v = 2.0;
     rig_run_until(&r, 10 * NS_PER_S);
     assert_true(fabs(rig_count(&r, 0) - 40000.0) <= 1.0);

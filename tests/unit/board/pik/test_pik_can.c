@@ -257,7 +257,7 @@ static void what_the_table_says(void **state)
     assert_true(r.b.base.faults);
     r.b.base.faults = 0;
     assert_false(r.b.base.faults);
-    assert_ptr_equal(pik_board.afe(&r.b.base, 2), &r.b.channel[2].afe);
+    assert_true(pik_board.analog && r.b.base.afe[2].cfg.load_ohm > 0.0);
     for (unsigned i = 0; pik_board.port_lines[i]; i++)
         assert_true(trace_find(&r.b.base.trace, pik_board.port_lines[i]) >= 0);
 }

@@ -156,8 +156,8 @@ static void a_board_may_be_initialised_again(void **state)
     first = rig.frame[0];
     rig_run(&rig, 5300000); /* in the middle of things */
     const struct psa2_profile p = rig.b.profile;
-    const struct board_cfg u = rig.b.cfg;
-    const struct board_io io = rig.b.io;
+    const struct board_cfg u = rig.b.base.cfg;
+    const struct board_io io = rig.b.base.io;
     const struct psa2_host host = rig.b.host;
     sched_init(&rig.s);
     psa2_init(&rig.b, &p, &u, &io, &rig.s);

@@ -25,7 +25,7 @@ static void init(bool watched, bool events)
     const struct psa2_profile p = psa2_profile_file("article");
     rig_init(&rig, &p, 1.0);
     tolds = 0;
-    rig.b.io.event = on_event;
+    rig.b.base.io.event = on_event;
     rig.b.base.observed = events;
     if (watched) trace_attach(&rig.b.base.trace, &rig.sink);
     rig.edges = 0; /* without the levels at the beginning */

@@ -260,7 +260,7 @@ static void the_supply_is_told_as_it_is(void **state)
         rig_write(&rig, PSD1_REG_SERVICE, 1);
         assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), 0x1000 | 1250);
     }
-    rig.b.io.supply_ratio = NULL;
+    rig.b.base.io.supply_ratio = NULL;
     rig_write(&rig, PSD1_REG_SERVICE, 0);
     assert_int_equal(rig_read(&rig, PSD1_REG_SERVICE), 2500);
 }

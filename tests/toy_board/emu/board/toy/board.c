@@ -109,11 +109,6 @@ static bool is_ready(const struct board *board)
     return b->on && b->latest.seq > 0;
 }
 
-static struct afe *afe_of(struct board *board, unsigned axis)
-{
-    return &((struct toy *)board)->afe[axis];
-}
-
 /* All that its future depends on. */
 static void add_digest(const struct board *board, struct sha256 *s)
 {
@@ -124,8 +119,8 @@ static void add_digest(const struct board *board, struct sha256 *s)
     board_digest_u64(s, b->latest.clipped);
     for (unsigned i = 0; i < BOARD_AXES; i++) {
         board_digest_u64(s, (uint16_t)b->latest.code[i]);
-        board_digest_real(s, b->afe[i].state_v);
-        board_digest_noise(s, &b->afe[i].noise);
+        board_digest_real(s, b->base.afe[i].state_v);
+        board_digest_noise(s, &b->base.afe[i].noise);
     }
 }
 
@@ -159,6 +154,6 @@ const struct board_type toy_board = {
     .can = &toy_can,
     BOARD_LIFE_FUNCTIONS,
     .ready = is_ready,
-    .afe = afe_of,
+    .analog = true,
     .digest = add_digest,
 };

@@ -47,7 +47,6 @@ static int64_t period_ns(const void *board)
 static const struct board_node_type type = {
     .device = &toy_device,
     BOARD_NODE_OBJECTS(objects),
-    .serial_at = offsetof(struct toy, cfg.serial),
     .period_ns = period_ns,
 };
 

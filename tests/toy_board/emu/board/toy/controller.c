@@ -14,17 +14,12 @@ const struct board_line toy_lines[TOY_LINES] = {
 };
 const char *const toy_events[TOY_EVENTS] = {"RES", "SAMPLE", "POWER_DOWN", "POWER_UP"};
 
-static void notify_event(const struct toy *b, enum toy_event e, int64_t t_ns)
-{
-    if (b->base.observed) b->io.event(b->io.ctx, e, t_ns);
-}
-
 /* ---- inputs ---- */
 
 static double input_v(struct toy *b, unsigned axis, int64_t t_ns)
 {
-    const double signal = b->io.accel(b->io.ctx, axis, t_ns);
-    return afe_out_v(&b->afe[axis], signal, b->io.temp_degc(b->io.ctx, BOARD_SENSOR, t_ns), t_ns);
+    const double signal = b->base.io.accel(b->base.io.ctx, axis, t_ns);
+    return afe_out_v(&b->base.afe[axis], signal, b->base.io.temp_degc(b->base.io.ctx, BOARD_SENSOR, t_ns), t_ns);
 }
 
 static int16_t convert_input(struct toy *b, double volts, bool *clipped)
@@ -117,11 +112,11 @@ static void take_sample(struct toy *b, int64_t t_ns)
 static void sample_periodically(void *ctx, int64_t t_ns)
 {
     struct toy *b = ctx;
-    sched_at(b->sched, &b->sample_ev, t_ns + toy_period_ns(&b->profile));
+    sched_at(b->base.sched, &b->sample_ev, t_ns + toy_period_ns(&b->profile));
     take_sample(b, t_ns);
     b->sample_ns = t_ns;
     shift_out(b);
-    notify_event(b, TOY_EV_SAMPLE, t_ns);
+    board_notify(&b->base, TOY_EV_SAMPLE, t_ns);
     if (b->on_sample) b->on_sample(b->can, &b->latest, t_ns);
 }
 
@@ -135,35 +130,32 @@ void toy_sample_until(struct toy *b, int64_t t_ns)
 void toy_init(struct toy *b, const struct toy_profile *p, const struct board_cfg *cfg, const struct board_io *io,
               struct sched *s)
 {
-    static const char *const noise[BOARD_AXES] = {"afe.x", "afe.y", "afe.z"};
-    *b = (struct toy){.profile = *p, .cfg = *cfg, .io = *io, .sched = s};
-    board_init(&b->base, toy_lines, TOY_LINES);
+    *b = (struct toy){.profile = *p};
+    board_init(&b->base, toy_lines, TOY_LINES, cfg, io, s);
     b->base.trace.source = (struct trace_source){.wake = wake_lines, .ctx = b};
     sched_ev(&b->sample_ev, sample_periodically, b);
-    for (unsigned i = 0; i < BOARD_AXES; i++)
-        afe_init(&b->afe[i], &cfg->afe[i], rng_stream(cfg->seed, cfg->serial, noise[i]));
 }
 
 static void restart_samples(struct toy *b, int64_t t_ns)
 {
     b->latest = (struct toy_sample){.seq = 0};
     rest_lines(b, t_ns);
-    sched_at(b->sched, &b->sample_ev, t_ns + toy_period_ns(&b->profile));
+    sched_at(b->base.sched, &b->sample_ev, t_ns + toy_period_ns(&b->profile));
 }
 
 void toy_power_up(struct toy *b, int64_t t_ns)
 {
     b->on = true;
     restart_samples(b, t_ns);
-    notify_event(b, TOY_EV_POWER_UP, t_ns);
+    board_notify(&b->base, TOY_EV_POWER_UP, t_ns);
 }
 
 void toy_power_down(struct toy *b, int64_t t_ns)
 {
     b->on = false;
-    sched_cancel(b->sched, &b->sample_ev);
+    sched_cancel(b->base.sched, &b->sample_ev);
     rest_lines(b, t_ns);
-    notify_event(b, TOY_EV_POWER_DOWN, t_ns);
+    board_notify(&b->base, TOY_EV_POWER_DOWN, t_ns);
 }
 
 void toy_reset(struct toy *b, int64_t t_ns)
@@ -171,5 +163,5 @@ void toy_reset(struct toy *b, int64_t t_ns)
     if (!b->on) return;
     b->counters.resets++;
     restart_samples(b, t_ns);
-    notify_event(b, TOY_EV_RES, t_ns);
+    board_notify(&b->base, TOY_EV_RES, t_ns);
 }

@@ -44,13 +44,9 @@ struct toy_counters {
 struct toy {
     struct board base; /* first */
     struct toy_profile profile;
-    struct board_cfg cfg;
-    struct board_io io;
-    struct sched *sched;
     struct sched_ev sample_ev;
     void (*on_sample)(void *can, const struct toy_sample *s, int64_t t_ns); /* NULL: not on a bus */
     void *can;
-    struct afe afe[BOARD_AXES];
     enum chip_stuck dout; /* of the converter */
     struct toy_counters counters;
     struct toy_sample latest;
