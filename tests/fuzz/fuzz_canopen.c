@@ -3,7 +3,7 @@
 #include "fuzz.h"
 
 #include "base/bits.h"
-#include "board/psa2/can.h"
+#include "board/psa2/board.h"
 
 #include <string.h>
 

@@ -6,7 +6,6 @@
 
 #include "base/can_fault.h"
 #include "board/psa2/board.h"
-#include "board/psa2/can.h"
 
 #include <string.h>
 

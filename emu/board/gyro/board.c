@@ -1,7 +1,6 @@
 #include "board/gyro/board.h"
 
 #include "board/digest.h"
-#include "board/gyro/can.h"
 #include "board/gyro/gyro.h"
 #include "board/life.h"
 

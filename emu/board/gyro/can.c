@@ -1,4 +1,4 @@
-#include "board/gyro/can.h"
+#include "board/gyro/board.h"
 
 #include "board/gyro/gyro.h"
 #include "gen/gyro_od.h"

@@ -2,7 +2,6 @@
 
 #include "board/digest.h"
 #include "board/life.h"
-#include "board/pik/can.h"
 #include "board/pik/pik.h"
 
 #include <stdio.h>
@@ -211,7 +210,7 @@ const struct board_type pik_board = {
     .parts = parts,
     .part_count = PARTS,
     .controller_faults = controller_faults,
-    .can = &pik_can_side,
+    .can = &pik_can,
     .bus = &pik_bus,
     BOARD_LIFE_FUNCTIONS,
     .ready = ready,

@@ -1,10 +1,15 @@
-/* PIK, PIK-5 and PIK-6 as a type of board. */
+/* A PIK on CAN: proto/pik.yaml behind the common node. */
 #ifndef PSABENCH_BOARD_PIK_BOARD_H
 #define PSABENCH_BOARD_PIK_BOARD_H
 
-#include "board/pik/can.h"
+#include "board/node.h"
 #include "board/pik/pik.h"
 
-extern const struct board_type pik_board;
+struct pik_can {
+    struct board_node node; /* first */
+};
+
+extern const struct board_type pik_board; /* the board as the bench knows it */
+extern const struct board_can pik_can;
 
 #endif

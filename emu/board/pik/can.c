@@ -1,4 +1,4 @@
-#include "board/pik/can.h"
+#include "board/pik/board.h"
 
 #include "base/bits.h"
 #include "board/pik/pik.h"
@@ -97,4 +97,4 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     pik_attach((struct pik *)board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
 }
 
-const struct board_can pik_can_side = {.size = sizeof(struct pik_can), .init = init_can, BOARD_NODE_LIFE};
+const struct board_can pik_can = {.size = sizeof(struct pik_can), .init = init_can, BOARD_NODE_LIFE};

@@ -2,7 +2,6 @@
 
 #include "board/digest.h"
 #include "board/life.h"
-#include "board/pmka/can.h"
 #include "board/pmka/pmka.h"
 
 #include <stdio.h>

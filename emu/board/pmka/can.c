@@ -1,4 +1,4 @@
-#include "board/pmka/can.h"
+#include "board/pmka/board.h"
 
 #include "board/pmka/pmka.h"
 #include "gen/pmka_od.h"

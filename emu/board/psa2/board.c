@@ -2,7 +2,6 @@
 
 #include "board/digest.h"
 #include "board/life.h"
-#include "board/psa2/can.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "board/psa2/can.h"
+#include "board/psa2/board.h"
 
 #include <string.h>
 

@@ -1,4 +1,4 @@
-#include "board/psa2/can_form.h"
+#include "board/psa2/board.h"
 
 #include "base/canbits.h"
 #include "gen/psabench_can.h"

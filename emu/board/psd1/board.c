@@ -2,7 +2,6 @@
 
 #include "board/digest.h"
 #include "board/life.h"
-#include "board/psd1/can.h"
 #include "board/psd1/psd1.h"
 
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "board/psd1/can.h"
+#include "board/psd1/board.h"
 
 #include "gen/psabench_can.h"
 #include "gen/psd1_od.h"

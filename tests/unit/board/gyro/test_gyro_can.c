@@ -1,7 +1,7 @@
 /* The gyro unit on CAN: readings as three PDOs, settings and modes by SDO, the level unit's frames off the bus. */
 #include "gyro_rig.h"
 
-#include "board/gyro/can.h"
+#include "board/gyro/board.h"
 #include "canopen/co_node.h"
 #include "gen/gyro_od.h"
 #include "gen/psabench_can.h"

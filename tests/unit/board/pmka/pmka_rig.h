@@ -5,7 +5,6 @@
 #include "rig.h"
 
 #include "board/pmka/board.h"
-#include "board/pmka/can.h"
 #include "board/pmka/pmka.h"
 
 #include <math.h>

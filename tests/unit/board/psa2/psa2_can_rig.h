@@ -4,7 +4,7 @@
 
 #include "host_wire.h"
 
-#include "board/psa2/can.h"
+#include "board/psa2/board.h"
 #include "gen/psabench_can.h"
 #include "unit/unit.h"
 

@@ -1,7 +1,6 @@
 /* A unit whose CAN controller or power fails, as a host on the bus sees it. */
 #include "base/can_fault.h"
 #include "board/psa2/board.h"
-#include "board/psa2/can.h"
 #include "unit/unit.h"
 
 #include "rig.h"

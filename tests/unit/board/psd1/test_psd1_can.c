@@ -3,7 +3,6 @@
 #include "psd1_rig.h"
 
 #include "board/psd1/board.h"
-#include "board/psd1/can.h"
 #include "gen/psabench_can.h"
 #include "gen/psd1_od.h"
 
