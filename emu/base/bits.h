@@ -28,6 +28,13 @@ static inline int64_t bits_round_shift(int64_t v, unsigned shift)
     return (int64_t)((biased >> shift) - (zero >> shift));
 }
 
+static inline unsigned bits_log2(unsigned power_of_two)
+{
+    unsigned n = 0;
+    while (power_of_two >> (n + 1)) n++;
+    return n;
+}
+
 /* Little-endian put and get of n (1..8) bytes. */
 static inline void bits_put_le(uint8_t *p, uint64_t v, size_t n)
 {

@@ -72,8 +72,8 @@ struct ads1256_io {
     double (*ain_v)(void *ctx, unsigned ain, int64_t t_ns);
     /* Resistance behind that voltage, INFINITY: nothing connected. NULL: 0, inputs and currents do not load it. */
     double (*source_ohm)(void *ctx, unsigned ain, int64_t t_ns);
-    void (*drdy)(void *ctx, bool level, int64_t t_ns);             /* DRDY pin, active low; called on changes only */
-    void (*dout)(void *ctx, bool level, int64_t t_ns);             /* NULL, or changes of DOUT while pins drive SCLK */
+    void (*drdy)(void *ctx, bool level, int64_t t_ns); /* NULL, or DRDY pin, active low; called on changes only */
+    void (*dout)(void *ctx, bool level, int64_t t_ns); /* NULL, or changes of DOUT while pins drive SCLK */
     void (*gpio)(void *ctx, unsigned d, bool level, int64_t t_ns); /* NULL, or changes of D0..D3 as outputs */
 };
 

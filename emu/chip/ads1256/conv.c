@@ -20,7 +20,7 @@ void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
     if (level == a->drdy) return;
     a->drdy = level;
     reg_poke(&a->regs, ADS1256_STATUS, (uint8_t)((ads1256_value(a, ADS1256_STATUS) & ~ADS1256_STATUS_DRDY) | level));
-    a->io.drdy(a->io.ctx, level, t_ns);
+    if (a->io.drdy) a->io.drdy(a->io.ctx, level, t_ns);
 }
 
 /* Fraction of full scale for volts at the input of the uncalibrated path. */

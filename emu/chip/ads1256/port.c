@@ -23,7 +23,7 @@ static void auto_calibrate(struct ads1256 *a, int64_t t_ns)
     if (changed && (now[ADS1256_STATUS] & ADS1256_STATUS_ACAL)) ads1256_calibrate(a, ADS1256_SELFCAL, t_ns);
 }
 
-typedef void op_fn(struct ads1256 *a, uint8_t opcode, int64_t t_ns);
+typedef void op_fn(struct ads1256 *a, int64_t t_ns);
 
 /* The modulator takes a little longer to settle than after SYNC; nothing is to be sent until DRDY (sources 2.4, 2.6). */
 static void leave_standby(struct ads1256 *a, int64_t t_ns)
@@ -44,69 +44,64 @@ static int64_t wakeup_ns(const struct ads1256 *a, int64_t t_ns)
     return a->first_ns + ads1256_settle_ns(a) > t_ns ? a->first_ns : t_ns;
 }
 
-static void op_wakeup(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_wakeup(struct ads1256 *a, int64_t t_ns)
 {
-    (void)opcode;
     if (a->mode == ADS1256_SYNC_WAIT) ads1256_restart(a, 0, wakeup_ns(a, t_ns));
     else if (a->mode == ADS1256_STANDBY) leave_standby(a, wakeup_ns(a, t_ns));
 }
 
-static void op_rdata(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_rdata(struct ads1256 *a, int64_t t_ns)
 {
-    (void)opcode;
     (void)t_ns;
     a->port = ADS1256_WORD;
     a->word_left = 3;
     a->awaiting_data = true;
 }
 
-static void op_rdatac(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_rdatac(struct ads1256 *a, int64_t t_ns)
 {
-    op_rdata(a, opcode, t_ns);
+    op_rdata(a, t_ns);
     a->rdatac = true;
 }
 
-static void op_sdatac(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_sdatac(struct ads1256 *a, int64_t t_ns)
 {
-    (void)opcode;
     (void)t_ns;
     a->rdatac = false;
     a->after_sdatac = true;
     a->port = ADS1256_OPCODE;
 }
 
-static void op_reg(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_reg(struct ads1256 *a, int64_t t_ns)
 {
-    (void)opcode;
     (void)t_ns;
     a->port = ADS1256_COUNT;
 }
 
-static void op_calibrate(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_calibrate(struct ads1256 *a, int64_t t_ns)
 {
     static const enum ads1256_cal kind[] = {ADS1256_SELFCAL, ADS1256_SELFOCAL, ADS1256_SELFGCAL, ADS1256_SYSOCAL,
                                             ADS1256_SYSGCAL};
-    ads1256_calibrate(a, kind[opcode & 7], t_ns);
+    ads1256_calibrate(a, kind[a->opcode & 7], t_ns);
 }
 
-static void op_sync(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_sync(struct ads1256 *a, int64_t t_ns)
 {
     if (a->fault.lost_sync) return;
     if (a->mode == ADS1256_RUNNING) ads1256_halt(a, ADS1256_SYNC_WAIT, t_ns);
-    else if (a->mode == ADS1256_CALIBRATING || a->mode == ADS1256_STANDBY) ads1256_refuse(a, opcode);
+    else if (a->mode == ADS1256_CALIBRATING || a->mode == ADS1256_STANDBY) ads1256_refuse(a, a->opcode);
 }
 
 /* The analog part is off from here on; a word that is ready stays so, and the clock runs (sources 2.6). */
-static void op_standby(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_standby(struct ads1256 *a, int64_t t_ns)
 {
     (void)t_ns;
     if (a->mode == ADS1256_RUNNING || a->mode == ADS1256_SYNC_WAIT) ads1256_freeze(a, ADS1256_STANDBY);
-    else ads1256_refuse(a, opcode);
+    else ads1256_refuse(a, a->opcode);
 }
 
-static void op_reset(struct ads1256 *a, uint8_t opcode, int64_t t_ns)
+static void op_reset(struct ads1256 *a, int64_t t_ns)
 {
-    (void)opcode;
     ads1256_reset_chip(a, ADS1256_SYNC_LOW, ADS1256_ADCON_CLK, t_ns);
     ads1256_go(a, t_ns);
 }
@@ -174,7 +169,7 @@ static void on_opcode(struct ads1256 *a, uint8_t mosi, int64_t t_ns)
         a->word_left = 0;
     }
     a->opcode = mosi;
-    op->run(a, mosi, t_ns);
+    op->run(a, t_ns);
     if (a->port == ADS1256_OPCODE) command_over(a, op->t11_tau, t_ns);
 }
 
@@ -218,7 +213,8 @@ static void on_word(struct ads1256 *a, uint8_t mosi, int64_t t_ns)
         const struct op *op = find_op(mosi);
         if (!op || (op->run != op_sdatac && op->run != op_reset)) return;
         a->n.gap_violations += op->run == op_sdatac && a->first_drdy; /* to be sent while DRDY is low */
-        op->run(a, mosi, t_ns);
+        a->opcode = mosi;
+        op->run(a, t_ns);
         command_over(a, op->t11_tau, t_ns);
     } else if (!a->word_left) {
         command_over(a, T11_TAU, t_ns);

@@ -16,14 +16,9 @@
 #define FS_LSB  (INT64_C(1) << ADS1282_BLOCK_LOG2)
 #define DRAW_SD 37837.227475000000 /* of the sum of four uniform 16-bit numbers: sqrt((2^32 - 1) / 3) */
 
-static unsigned rate_of(const struct ads1282 *a)
-{
-    return (a->config0 & ADS1282_CONFIG0_DR) >> 3;
-}
-
 unsigned ads1282_sinc_ratio(const struct ads1282 *a)
 {
-    return 128u >> (rate_of(a) <= 4 ? rate_of(a) : 2);
+    return 128u >> (ads1282_rate(a) <= 4 ? ads1282_rate(a) : 2);
 }
 
 bool ads1282_sinc_only(const struct ads1282 *a)
@@ -45,13 +40,6 @@ static bool bit_true(const struct ads1282 *a)
 static bool at_modulator_rate(const struct ads1282 *a)
 {
     return bit_true(a) || (ads1282_sinc_only(a) && a->cfg.chain == ADS1282_CHAIN_EXACT);
-}
-
-static unsigned log2_of(unsigned power_of_two)
-{
-    unsigned n = 0;
-    while (power_of_two >> (n + 1)) n++;
-    return n;
 }
 
 /* ---- Input ---- */
@@ -158,7 +146,7 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
 static void sample_sinc(struct ads1282 *a, int64_t until_ns)
 {
     enum { LOW = 14 };
-    const unsigned shift = 5 * log2_of(a->cic.ratio) + 4 - LOW; /* word of full scale 2^30 */
+    const unsigned shift = 5 * bits_log2(a->cic.ratio) + 4 - LOW; /* word of full scale 2^30 */
     while (a->next.t_ns <= until_ns) {
         int64_t high, low;
         const int64_t x = noisy_input(a);
@@ -176,7 +164,7 @@ static void sample_sinc(struct ads1282 *a, int64_t until_ns)
 /* Sinc output of gain N^5, in bits of which 2/3 are full scale, to full scale 2^34. */
 static int64_t sinc_lsb(int64_t y, unsigned ratio)
 {
-    const unsigned gain_log2 = 5 * log2_of(ratio);
+    const unsigned gain_log2 = 5 * bits_log2(ratio);
     return gain_log2 > 33 ? bits_round_shift(3 * y, gain_log2 - 33) : 3 * y * (INT64_C(1) << (33 - gain_log2));
 }
 

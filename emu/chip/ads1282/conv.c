@@ -11,11 +11,6 @@
 
 /* ---- Configuration ---- */
 
-static unsigned rate_of(const struct ads1282 *a)
-{
-    return (a->config0 & ADS1282_CONFIG0_DR) >> 3;
-}
-
 bool ads1282_models(uint8_t config0)
 {
     const unsigned rate = (config0 & ADS1282_CONFIG0_DR) >> 3;
@@ -36,7 +31,7 @@ static bool high_pass(const struct ads1282 *a)
 static int64_t sinc_settle_tclk(const struct ads1282 *a)
 {
     static const int16_t tclk[5] = {2824, 1672, 968, 616, 440};
-    return tclk[rate_of(a) <= 4 ? rate_of(a) : 2];
+    return tclk[ads1282_rate(a) <= 4 ? ads1282_rate(a) : 2];
 }
 
 static void time_periods(struct ads1282 *a)
@@ -60,7 +55,7 @@ static uint8_t config0_of_pins(const struct ads1282_mode_pins *m)
 
 static bool has_known_delay(const struct ads1282 *a)
 {
-    return rate_of(a) <= 4 || ads1282_bits_only(a);
+    return ads1282_rate(a) <= 4 || ads1282_bits_only(a);
 }
 
 static void choose_special(struct ads1282 *a)
@@ -97,7 +92,7 @@ void ads1282_configure_input(struct ads1282 *a)
     a->mux = (c1 & ADS1282_CONFIG1_MUX) >> 4;
     a->lsb_per_v = block_fs * 2.0 * (1 << pga_log2) / a->cfg.vref_v;
     if (!a->running) return;
-    const unsigned rate = rate_of(a) <= 4 ? rate_of(a) : 2;
+    const unsigned rate = ads1282_rate(a) <= 4 ? ads1282_rate(a) : 2;
     a->noise_lsb = ads1282_chain_noise_lsb(a, a->cfg.noise_scale * noise_v(rate, pga_log2) * a->lsb_per_v);
 }
 

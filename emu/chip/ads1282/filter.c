@@ -26,13 +26,6 @@ void ads1282_sinc_taps(unsigned sinc_ratio, int32_t tap[ADS1282_SINC_TAPS])
     }
 }
 
-static unsigned log2_of(unsigned power_of_two)
-{
-    unsigned n = 0;
-    while (power_of_two >> (n + 1)) n++;
-    return n;
-}
-
 /* Convolves g, of len entries, in place with taps spaced by step entries; returns the new length. */
 static unsigned convolve_taps(double *g, unsigned len, const int32_t *tap, unsigned taps, unsigned step, double scale)
 {
@@ -95,7 +88,7 @@ void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_B
 {
     const int64_t t0 = f->sinc_tap[0], t1 = f->sinc_tap[1], t2 = f->sinc_tap[2], t3 = f->sinc_tap[3],
                   t4 = f->sinc_tap[4];
-    const unsigned shift = 4 * log2_of(f->sinc_ratio);
+    const unsigned shift = 4 * bits_log2(f->sinc_ratio);
     const int64_t *x = f->sinc + ADS1282_SINC_TAPS - 1;
     memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
     for (unsigned n = 0; n < 32; n++, x++)

@@ -8,6 +8,12 @@
 
 #define ADS1282_PULSE_TCLK 4 /* DRDY high when no one read; E2 ADS1287, M80 */
 
+/* Rate code of CONFIG0; 5 to 7 are reserved. */
+static inline unsigned ads1282_rate(const struct ads1282 *a)
+{
+    return (a->config0 & ADS1282_CONFIG0_DR) >> 3;
+}
+
 /* ---- Serial column ---- */
 
 void ads1282_serial_init(struct ads1282 *a);
