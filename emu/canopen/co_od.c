@@ -33,29 +33,24 @@ const struct co_entry *co_find(const struct co_od *od, uint16_t index, uint8_t s
     return NULL;
 }
 
-static const struct {
-    uint8_t type, bytes;
+static const struct type {
+    uint8_t bytes;
     bool is_signed;
 } types[] = {
-    {CO_BOOLEAN, 1, false},   {CO_INTEGER8, 1, true},    {CO_INTEGER16, 2, true},   {CO_INTEGER32, 4, true},
-    {CO_UNSIGNED8, 1, false}, {CO_UNSIGNED16, 2, false}, {CO_UNSIGNED32, 4, false}, {CO_REAL32, 4, true},
-    {CO_INTEGER24, 3, true},  {CO_UNSIGNED24, 3, false},
+    [CO_BOOLEAN] = {1, false},   [CO_INTEGER8] = {1, true},    [CO_INTEGER16] = {2, true},   [CO_INTEGER32] = {4, true},
+    [CO_UNSIGNED8] = {1, false}, [CO_UNSIGNED16] = {2, false}, [CO_UNSIGNED32] = {4, false}, [CO_REAL32] = {4, true},
+    [CO_INTEGER24] = {3, true},  [CO_UNSIGNED24] = {3, false},
 };
 
-static bool type_is_signed(uint8_t type)
+/* No bytes: not a number, or a type that this table does not know. */
+static struct type type_of(uint8_t type)
 {
-    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
-        if (types[i].type == type) return types[i].is_signed;
-    }
-    return false;
+    return type < sizeof types / sizeof types[0] ? types[type] : (struct type){0, false};
 }
 
 size_t co_type_size(uint8_t type)
 {
-    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
-        if (types[i].type == type) return types[i].bytes;
-    }
-    return 0;
+    return type_of(type).bytes;
 }
 
 static void set_text(struct co_value *v, const char *text, size_t len)
@@ -74,7 +69,7 @@ void co_default(const struct co_entry *e, uint8_t node_id, struct co_value *v)
 static int64_t clip_number(const struct co_entry *e, double number)
 {
     const unsigned bits = 8u * (unsigned)co_type_size(e->type);
-    const bool is_signed = type_is_signed(e->type);
+    const bool is_signed = type_of(e->type).is_signed;
     const double low = is_signed ? -ldexp(1.0, (int)bits - 1) : 0.0;
     const double high = ldexp(1.0, (int)bits - (is_signed ? 1 : 0)) - 1.0;
     if (!(number > low)) return (int64_t)low;
@@ -109,7 +104,7 @@ static double number_of(const struct co_entry *e, uint32_t raw, size_t n)
         memcpy(&f, &raw, sizeof f);
         return (double)f;
     }
-    return type_is_signed(e->type) ? bits_sign_extend(raw, 8u * (unsigned)n) : (double)raw;
+    return type_of(e->type).is_signed ? bits_sign_extend(raw, 8u * (unsigned)n) : (double)raw;
 }
 
 uint32_t co_decode(const struct co_entry *e, const uint8_t *in, size_t n, struct co_value *v)
