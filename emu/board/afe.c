@@ -121,45 +121,20 @@ struct faulty {
     double reference; /* relative to what it should be */
 };
 
-static void load_open(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
+static void apply_fault(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
 {
-    const double limit = 2.0 * a->cfg.clip_v / a->scale.load;
-    (void)f;
-    (void)for_s;
-    out->signal = out->signal < 0.0 ? -limit : limit;
-}
-
-static void load_short(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
-{
-    (void)a;
-    (void)f;
-    (void)for_s;
-    out->signal = 0.0;
-}
-
-static void apply_reference(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
-{
-    (void)a;
-    out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
-}
-
-static void apply_ripple(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
-{
-    const double turns = f->frequency_hz * for_s;
-    (void)a;
-    out->ripple_v += f->value * det_sin(TWO_PI * (turns - floor(turns)));
+    const double limit = 2.0 * a->cfg.clip_v / a->scale.load, turns = f->frequency_hz * for_s;
+    if (f->kind == AFE_LOAD_OPEN) out->signal = out->signal < 0.0 ? -limit : limit;
+    else if (f->kind == AFE_LOAD_SHORT) out->signal = 0.0;
+    else if (f->kind == AFE_REFERENCE) out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
+    else out->ripple_v += f->value * det_sin(TWO_PI * (turns - floor(turns)));
 }
 
 static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_ns)
 {
-    static void (*const effect[AFE_FAULTS])(const struct afe *, const struct afe_fault *, double,
-                                            struct faulty *) = {[AFE_LOAD_OPEN] = load_open,
-                                                                [AFE_LOAD_SHORT] = load_short,
-                                                                [AFE_REFERENCE] = apply_reference,
-                                                                [AFE_RIPPLE] = apply_ripple};
     struct faulty out = {.signal = signal, .reference = 1.0};
     for (const struct afe_fault *f = a->faults; f; f = f->next) {
-        if (t_ns >= f->from_ns) effect[f->kind](a, f, (double)(t_ns - f->from_ns) / (double)NS_PER_S, &out);
+        if (t_ns >= f->from_ns) apply_fault(a, f, (double)(t_ns - f->from_ns) / (double)NS_PER_S, &out);
     }
     return out;
 }

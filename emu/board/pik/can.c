@@ -55,28 +55,14 @@ static const struct board_object objects[] = {
 
 /* ---- notifications of the board ---- */
 
-static void put_u16(uint8_t *at, unsigned v)
-{
-    at[0] = (uint8_t)v;
-    at[1] = (uint8_t)(v >> 8);
-}
-
-static void put_u32(uint8_t *at, uint32_t v)
-{
-    put_u16(at, v & 0xFFFF);
-    put_u16(at + 2, v >> 16);
-}
-
 static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
 {
     struct can_msg m[PIK_TPDOS] = {{.len = 8}, {.len = 8}, {.len = 8}};
-    for (unsigned i = 0; i < PIK_AXES; i++) put_u16(m[0].data + 2 * i, (uint16_t)r->increment[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) bits_put_le(m[0].data + 2 * i, (uint16_t)r->increment[i], 2);
     m[0].data[6] = (uint8_t)r->seq;
     m[0].data[7] = r->status & SATURATED;
-    put_u32(m[1].data, (uint32_t)r->total[0]);
-    put_u32(m[1].data + 4, (uint32_t)r->total[1]);
-    put_u32(m[2].data, (uint32_t)r->total[2]);
-    put_u32(m[2].data + 4, (uint32_t)(r->t_ns / NS_PER_US));
+    for (unsigned i = 0; i < PIK_AXES; i++) bits_put_le(m[1 + i / 2].data + i % 2 * 4, (uint32_t)r->total[i], 4);
+    bits_put_le(m[2].data + 4, (uint32_t)(r->t_ns / NS_PER_US), 4);
     board_node_stream(ctx, PIK_COUNTS_TPDO, m, PIK_TPDOS, t_ns);
 }
 

@@ -69,8 +69,9 @@ void pik_lines_stuck(struct pik *b, unsigned axis, int64_t t_ns)
 /* ---- CLK ---- */
 
 /* Rises from clk_shown_tick on that come up to t_ns, each with its fall half a period later; how far it got. */
-static int64_t report_clk(struct pik *b, int64_t t_ns)
+static int64_t report_clk(void *ctx, int64_t t_ns)
 {
+    struct pik *b = ctx;
     const int64_t period = b->profile.grid;
     if (!b->on || !trace_watched(&b->base.trace, BIT(PIK_LINE_CLK))) return t_ns;
     for (unsigned n = 0;; n++, b->clk_shown_tick += period) {
@@ -82,11 +83,6 @@ static int64_t report_clk(struct pik *b, int64_t t_ns)
                                             {fall_ns, BIT(PIK_LINE_CLK), 0}};
         trace_steps(&b->base.trace, steps, 2);
     }
-}
-
-static int64_t report_lines(void *ctx, int64_t t_ns)
-{
-    return report_clk(ctx, t_ns);
 }
 
 void pik_lines_clock(struct pik *b, int64_t t_ns)
@@ -124,5 +120,5 @@ static void wake_lines(void *ctx, uint64_t mask)
 
 void pik_lines_init(struct pik *b)
 {
-    b->base.trace.source = (struct trace_source){.wake = wake_lines, .report = report_lines, .ctx = b};
+    b->base.trace.source = (struct trace_source){.wake = wake_lines, .report = report_clk, .ctx = b};
 }

@@ -2,8 +2,6 @@
 #ifndef PSABENCH_BOARD_PSA2_EVENT_H
 #define PSABENCH_BOARD_PSA2_EVENT_H
 
-#include <stdbool.h>
-
 enum psa2_event {
     PSA2_EV_RES,        /* Res falls */
     PSA2_EV_SETUP_DONE, /* the set-up has been carried out */
@@ -19,12 +17,6 @@ enum psa2_event {
 };
 
 extern const char *const psa2_events[PSA2_EVENTS];
-
-/* As in the list above without its prefix: "DRD_A". NULL: no such event. */
-const char *psa2_event_name(enum psa2_event e);
-
-/* Of that name, or -1. */
-int psa2_event_find(const char *name);
 
 /* Faults of the controller: bits of board.faults. */
 enum psa2_controller_fault {

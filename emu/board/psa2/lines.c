@@ -1,9 +1,6 @@
 /* Names of a PSA-2's lines and events. */
 #include "board/psa2/psa2.h"
 
-#include <stddef.h>
-#include <string.h>
-
 const struct board_line psa2_lines[PSA2_LINES] = {
     [PSA2_LINE_SYNC_A] = {"SYNC_A", false}, [PSA2_LINE_SCLK] = {"SClk", false},    [PSA2_LINE_DRD_A] = {"DRD_A", true},
     [PSA2_LINE_DIN] = {"DIn", false},       [PSA2_LINE_DOUTX] = {"DOutX", false},  [PSA2_LINE_DOUTY] = {"DOutY", false},
@@ -13,26 +10,9 @@ const struct board_line psa2_lines[PSA2_LINES] = {
     [PSA2_LINE_INT] = {"Int", true},
 };
 
-const char *psa2_line_name(enum psa2_line line)
-{
-    return psa2_lines[line].name;
-}
-
 const char *const psa2_events[PSA2_EVENTS] = {
     [PSA2_EV_RES] = "RES",           [PSA2_EV_SETUP_DONE] = "SETUP_DONE", [PSA2_EV_SYNC_A] = "SYNC_A",
     [PSA2_EV_SYNC_T] = "SYNC_T",     [PSA2_EV_DRD_A] = "DRD_A",           [PSA2_EV_DRD_T] = "DRD_T",
     [PSA2_EV_INT_FALL] = "INT_FALL", [PSA2_EV_INT_RISE] = "INT_RISE",     [PSA2_EV_POWER_DOWN] = "POWER_DOWN",
     [PSA2_EV_POWER_UP] = "POWER_UP",
 };
-
-const char *psa2_event_name(enum psa2_event e)
-{
-    return (unsigned)e < PSA2_EVENTS ? psa2_events[e] : NULL;
-}
-
-int psa2_event_find(const char *name)
-{
-    for (unsigned i = 0; i < PSA2_EVENTS; i++)
-        if (strcmp(psa2_events[i], name) == 0) return (int)i;
-    return -1;
-}

@@ -42,7 +42,6 @@ enum psa2_line {
 };
 
 extern const struct board_line psa2_lines[PSA2_LINES];
-const char *psa2_line_name(enum psa2_line line); /* as in the trace: "Int" */
 
 /* Bits of psa2_frame.status, and of the T word above channel and code. */
 enum psa2_status {

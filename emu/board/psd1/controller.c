@@ -22,17 +22,11 @@ static int64_t reset_over(struct psd1 *b, int64_t t_ns)
     return psd1_job_next(b, t_ns);
 }
 
-static int64_t no_step(struct psd1 *b, int64_t t_ns)
-{
-    (void)b;
-    (void)t_ns;
-    return SCHED_NEVER;
-}
-
+/* NULL: nothing is ever due in this phase. */
 static psd1_step *const steps[PSD1_PHASES] = {
-    [PSD1_OFF] = no_step,
+    [PSD1_OFF] = NULL,
     [PSD1_IN_RESET] = reset_over,
-    [PSD1_IDLE] = no_step,
+    [PSD1_IDLE] = NULL,
     [PSD1_START] = psd1_cycle_start,
     [PSD1_RF_FALL] = psd1_rf_fall,
     [PSD1_RF_RISE] = psd1_rf_rise,
@@ -65,7 +59,7 @@ static void start_next(struct psd1 *b, int64_t t_ns)
 
 static int64_t run_step(struct psd1 *b, int64_t t_ns)
 {
-    b->due_ns = steps[b->phase](b, t_ns);
+    b->due_ns = steps[b->phase] ? steps[b->phase](b, t_ns) : SCHED_NEVER;
     start_next(b, t_ns);
     return b->due_ns;
 }

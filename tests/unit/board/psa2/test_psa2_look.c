@@ -46,8 +46,8 @@ static void same_levels(const char *profile, uint64_t lines)
     const uint64_t want = levels(&watched) & lines, got = levels(&fresh) & lines;
     for (unsigned i = 0; i < PSA2_LINES; i++) {
         if ((want ^ got) >> i & 1) {
-            fail_msg("%s: at %lld ns %s is %u, told %u", profile, (long long)watched.s.now_ns,
-                     psa2_line_name((enum psa2_line)i), (unsigned)(want >> i & 1), (unsigned)(got >> i & 1));
+            fail_msg("%s: at %lld ns %s is %u, told %u", profile, (long long)watched.s.now_ns, psa2_lines[i].name,
+                     (unsigned)(want >> i & 1), (unsigned)(got >> i & 1));
         }
     }
 }
