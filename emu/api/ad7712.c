@@ -8,14 +8,8 @@ struct part_ad7712 {
     struct psabench_part part;
     struct ad7712_cfg cfg; /* of the options; its channels are alike */
     unsigned looks;        /* place in the list of cells_max */
-    double source_ohm;
     struct ad7712 chip;
 };
-
-static struct ad7712 *chip_of(struct psabench_part *p)
-{
-    return &((struct part_ad7712 *)p)->chip;
-}
 
 static const struct ad7712 *const_chip_of(const struct psabench_part *p)
 {
@@ -31,7 +25,7 @@ static const struct ad7712 *const_chip_of(const struct psabench_part *p)
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
     X("gain_error", API_REAL, part_ad7712, cfg.gain_error[0], "0", -0.5, 0.5, NULL,                                    \
       "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
-    X("source_ohm", API_REAL, part_ad7712, source_ohm, "0", 0, 1e9, NULL,                                              \
+    X("source_ohm", API_REAL, part_ad7712, part.source_ohm, "0", 0, 1e9, NULL,                                         \
       "resistance behind each input, ohm: the input's capacitor and the burn-out current meet it")                     \
     X("looks", API_CHOICE, part_ad7712, looks, "auto", 0, 7, "auto|1|2|4|8|16|32|64",                                  \
       "looks at the input per output period; auto: as many as make 4 kHz, at least 4")                                 \
@@ -99,13 +93,6 @@ static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
     return p->kind->inputs >> (2 * channel + 1) & 1 ? v - api_input(p, 2 * channel + 1, t_ns) : v;
 }
 
-static double source_ohm(void *ctx, unsigned channel, int64_t t_ns)
-{
-    (void)channel;
-    (void)t_ns;
-    return ((const struct part_ad7712 *)ctx)->source_ohm;
-}
-
 static enum ad7712_part part_of(const struct api_kind *k)
 {
     if (k == &api_ad7710) return AD7712_PART_7710;
@@ -113,10 +100,8 @@ static enum ad7712_part part_of(const struct api_kind *k)
     return k == &api_ad7711a ? AD7712_PART_7711A : AD7712_PART_7712;
 }
 
-static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
+static void open_ad7712(struct psabench_part *p)
 {
-    (void)why;
-    (void)cap;
     struct part_ad7712 *s = (struct part_ad7712 *)p;
     s->cfg.part = part_of(p->kind);
     s->cfg.cells_max = (uint8_t)(s->looks ? 1u << (s->looks - 1) : 0);
@@ -124,18 +109,17 @@ static bool open_ad7712(struct psabench_part *p, char *why, size_t cap)
     s->cfg.gain_error[1] = s->cfg.gain_error[0];
     const struct ad7712_io io = {.ctx = p,
                                  .vin_v = vin_v,
-                                 .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL,
+                                 .source_ohm = api_source(p),
                                  .drdy = api_ignore_edge,
                                  .sdata = api_ignore_edge,
                                  .sclk = api_ignore_edge};
     ad7712_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ad7712_power_up(&s->chip, p->bench->sched.now_ns);
-    return true;
 }
 
 static void before_input(struct psabench_part *p, int64_t t_ns)
 {
-    ad7712_sample_until(chip_of(p), t_ns);
+    ad7712_sample_until(&((struct part_ad7712 *)p)->chip, t_ns);
 }
 
 static int peek_register(const struct psabench_part *p, unsigned address)

@@ -10,14 +10,8 @@ struct part_ads1256 {
     struct psabench_part part;
     struct ads1256_cfg cfg; /* of the options */
     uint32_t cells_max;
-    double source_ohm;
     struct ads1256 chip;
 };
-
-static struct ads1256 *chip_of(struct psabench_part *p)
-{
-    return &((struct part_ads1256 *)p)->chip;
-}
 
 static const struct ads1256 *const_chip_of(const struct psabench_part *p)
 {
@@ -37,7 +31,7 @@ static const struct ads1256 *const_chip_of(const struct psabench_part *p)
       "offset of the uncalibrated path, V, which self-calibration takes away")                                         \
     X("gain_error", API_REAL, part_ads1256, cfg.gain_error, "0", -0.5, 0.5, NULL,                                      \
       "relative gain error of the uncalibrated path, which self-calibration removes")                                  \
-    X("source_ohm", API_REAL, part_ads1256, source_ohm, "0", 0, 1e9, NULL,                                             \
+    X("source_ohm", API_REAL, part_ads1256, part.source_ohm, "0", 0, 1e9, NULL,                                        \
       "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
     X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \
       "looks at the input per conversion at 500 SPS and below; 0: one a millisecond")                                  \
@@ -59,7 +53,7 @@ API_SET_PIN(set_reset, part_ads1256, ads1256_reset_pin);
 
 static void set_gpio(struct psabench_part *p, unsigned d, bool level, int64_t t_ns)
 {
-    ads1256_gpio_pin(chip_of(p), d, level, t_ns);
+    ads1256_gpio_pin(&((struct part_ads1256 *)p)->chip, d, level, t_ns);
 }
 
 API_GET_PIN(get_drdy, part_ads1256, ads1256_drdy);
@@ -94,30 +88,14 @@ static double ain_v(void *ctx, unsigned ain, int64_t t_ns)
     return p->kind->inputs >> ain & 1 ? api_input(p, ain, t_ns) : 0.0;
 }
 
-static double source_ohm(void *ctx, unsigned ain, int64_t t_ns)
+static void open_ads1256(struct psabench_part *p)
 {
-    (void)ain;
-    (void)t_ns;
-    return ((const struct part_ads1256 *)ctx)->source_ohm;
-}
-
-static bool open_ads1256(struct psabench_part *p, char *why, size_t cap)
-{
-    (void)why;
-    (void)cap;
     struct part_ads1256 *s = (struct part_ads1256 *)p;
     s->cfg.part = p->kind == &api_ads1255 ? ADS1256_PART_1255 : ADS1256_PART_1256;
     s->cfg.cells_max = (uint16_t)s->cells_max;
-    const struct ads1256_io io = {
-        .ctx = p, .ain_v = ain_v, .drdy = api_ignore_edge, .source_ohm = s->source_ohm > 0.0 ? source_ohm : NULL};
+    const struct ads1256_io io = {.ctx = p, .ain_v = ain_v, .source_ohm = api_source(p)};
     ads1256_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ads1256_power_up(&s->chip, p->bench->sched.now_ns);
-    return true;
-}
-
-static int peek_register(const struct psabench_part *p, unsigned address)
-{
-    return api_peek_reg(&const_chip_of(p)->regs, address);
 }
 
 static uint64_t clkout_hz(const struct psabench_part *p)
@@ -142,7 +120,7 @@ static const struct api_counter counters[] = {
     .size = sizeof(struct part_ads1256), .options = options, .option_count = sizeof options / sizeof *options,         \
     .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .counters = counters,                                      \
     .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256,                   \
-    .peek = peek_register
+    .regs = offsetof(struct part_ads1256, chip.regs)
 
 const struct api_kind api_ads1255 = {COMMON, .name = "ads1255", .pin_count = PINS_1255, .inputs = 0x103,
                                      .fn_inputs = 0x103};

@@ -19,16 +19,6 @@ struct part_ads1282 {
     struct ads1282 chip;
 };
 
-static struct ads1282 *chip_of(struct psabench_part *p)
-{
-    return &((struct part_ads1282 *)p)->chip;
-}
-
-static const struct part_ads1282 *const_part_of(const struct psabench_part *p)
-{
-    return (const struct part_ads1282 *)p;
-}
-
 #define OPTIONS(X)                                                                                                     \
     X("clk_hz", API_UINT, part_ads1282, cfg.clk_hz, "4096000", 1000000, 4096000, NULL, "clock at CLK, Hz")             \
     X("power_up_tclk", API_UINT, part_ads1282, cfg.power_up_tclk, "65536", 0, 16777216, NULL,                          \
@@ -84,7 +74,7 @@ API_GET_PIN(get_mflag, part_ads1282, ads1282_mflag);
 
 static bool get_modulator(const struct psabench_part *p, unsigned arg)
 {
-    const struct part_ads1282 *s = const_part_of(p);
+    const struct part_ads1282 *s = (const struct part_ads1282 *)p;
     return arg == 0 ? s->m0 : arg == 1 ? s->m1 : s->mclk;
 }
 
@@ -137,27 +127,19 @@ static void on_mclk_fall(void *ctx, int64_t t_ns)
     ((struct part_ads1282 *)ctx)->mclk = false;
 }
 
-static bool open_ads1282(struct psabench_part *p, char *why, size_t cap)
+static void open_ads1282(struct psabench_part *p)
 {
-    (void)why;
-    (void)cap;
     struct part_ads1282 *s = (struct part_ads1282 *)p;
     s->cfg.part = p->kind == &api_ads1281 ? ADS1282_PART_1281 : ADS1282_PART_1282;
     const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = api_ignore_edge, .modulator = on_modulator};
     sched_ev(&s->mclk_fall, on_mclk_fall, s);
     ads1282_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
     ads1282_power_up(&s->chip, p->bench->sched.now_ns);
-    return true;
 }
 
 static void before_input(struct psabench_part *p, int64_t t_ns)
 {
-    ads1282_sample_until(chip_of(p), t_ns);
-}
-
-static int peek_register(const struct psabench_part *p, unsigned address)
-{
-    return api_peek_reg(&const_part_of(p)->chip.regs, address);
+    ads1282_sample_until(&((struct part_ads1282 *)p)->chip, t_ns);
 }
 
 #define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
@@ -176,7 +158,7 @@ static const struct api_counter counters[] = {
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1282), .pins = pins, .counters = counters,                                           \
     .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE0, .open = open_ads1282,                   \
-    .before_input = before_input, .peek = peek_register
+    .before_input = before_input, .regs = offsetof(struct part_ads1282, chip.regs)
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",

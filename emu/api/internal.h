@@ -52,7 +52,8 @@ struct psabench_part {
     void *input_ctx;
     uint16_t by_fn; /* inputs that input() gives; the others are volts[] */
     double volts[API_INPUTS_MAX];
-    uint32_t sclk_hz; /* option of every part with SPI */
+    uint32_t sclk_hz;  /* option of every part with SPI */
+    double source_ohm; /* option of parts whose inputs load their sources */
     int64_t gap_ns;
     unsigned sclk, din, dout; /* pin numbers, API_NO_PIN */
     psabench_frame_fn *frame;
@@ -94,6 +95,10 @@ void api_drive(struct psabench_part *p, unsigned pin, bool level);
 /* Volts (amperes) of an input at t_ns. */
 double api_input(struct psabench_part *p, unsigned input, int64_t t_ns);
 
+/* Resistance behind each input, for a chip that asks: ctx is the part. NULL where the option is 0. */
+typedef double api_source_fn(void *ctx, unsigned input, int64_t t_ns);
+api_source_fn *api_source(const struct psabench_part *p);
+
 /* Stream of one of the part's noise sources. */
 struct rng api_noise(const struct psabench_part *p, const char *source);
 uint64_t api_serial(const struct psabench_part *p); /* made from its name */
@@ -101,11 +106,11 @@ uint64_t api_serial(const struct psabench_part *p); /* made from its name */
 /* For a chip that calls at each change of a pin: the pin is read after the event that moved it. */
 void api_ignore_edge(void *ctx, bool level, int64_t t_ns);
 
-/* A named register, or -1. */
-int api_peek_reg(const struct reg_file *f, unsigned address);
-
 /* Sets the options of a new part: the defaults, then the text. False with a sentence in why. */
 bool api_options(struct psabench_part *p, const char *text, char *why, size_t cap);
+
+/* " A B C" into list: names of a table whose rows of the size begin with them. */
+void api_list(const void *rows, size_t size, unsigned count, char list[API_WHY]);
 
 /* Number of the pin of that name, or API_NO_PIN. */
 unsigned api_find_pin(const struct api_kind *k, const char *name);

@@ -87,12 +87,12 @@ struct api_kind {
     unsigned counter_count;
     uint16_t inputs, fn_inputs; /* bit i: has input i; asks psabench_input_fn for it */
     enum api_spi spi;
-    /* Its options are set. Makes the device and switches it on; false with a sentence in why. */
-    bool (*open)(struct psabench_part *p, char *why, size_t cap);
-    void (*before_input)(struct psabench_part *p, int64_t t_ns); /* an input is about to change; may be NULL */
-    void (*follow)(struct psabench_part *p, int64_t t_ns);       /* time has come here; may be NULL */
-    void (*finish)(struct psabench_part *p, int64_t t_ns);       /* like follow, and holds nothing back; may be NULL */
-    int (*peek)(const struct psabench_part *p, unsigned address);
+    void (*open)(struct psabench_part *p); /* its options are set: makes the device and switches it on */
+    void (*before_input)(struct psabench_part *p, int64_t t_ns);  /* an input is about to change; may be NULL */
+    void (*follow)(struct psabench_part *p, int64_t t_ns);        /* time has come here; may be NULL */
+    void (*finish)(struct psabench_part *p, int64_t t_ns);        /* like follow, and holds nothing back; may be NULL */
+    size_t regs;                                                  /* of its struct reg_file in the part's struct, or */
+    int (*peek)(const struct psabench_part *p, unsigned address); /* a register by other means; -1: there is none */
     int64_t (*next_ns)(const struct psabench_part *p); /* an output may change then without an event; may be NULL */
     int64_t lag_ns;                                    /* how late it may report an edge */
     bool board;                                        /* has frames and a controller */

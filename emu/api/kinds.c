@@ -81,11 +81,12 @@ psabench_part *psabench_part_new(psabench *b, const char *part, const char *name
     }
     struct psabench_part *p = allocate_part(b, k, name);
     if (!p) return NULL;
-    if (!api_options(p, options, why, sizeof why) || !k->open(p, why, sizeof why)) {
+    if (!api_options(p, options, why, sizeof why)) {
         (void)api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s", name, why);
         free(p);
         return NULL;
     }
+    k->open(p);
     struct psabench_part **end = &b->parts;
     while (*end) end = &(*end)->next;
     *end = p;

@@ -113,10 +113,8 @@ static const struct api_option *find_option(const struct api_kind *k, const char
 
 static bool fail_unknown(const struct api_kind *k, const char *key, char *why, size_t cap)
 {
-    char list[API_WHY] = "";
-    size_t len = 0;
-    for (unsigned i = 0; i < k->option_count && len < sizeof list; i++)
-        len += (size_t)snprintf(list + len, sizeof list - len, " %s", k->options[i].key);
+    char list[API_WHY];
+    api_list(k->options, sizeof *k->options, k->option_count, list);
     return fail_option(why, cap, "option of %s: expected one of%s, got %s", k->name, list, key);
 }
 

@@ -11,6 +11,16 @@ unsigned api_find_pin(const struct api_kind *k, const char *name)
     return API_NO_PIN;
 }
 
+void api_list(const void *rows, size_t size, unsigned count, char list[API_WHY])
+{
+    size_t len = 0;
+    list[0] = '\0';
+    for (unsigned i = 0; i < count && len < API_WHY; i++) {
+        const char *const *name = (const void *)((const char *)rows + i * size);
+        len += (size_t)snprintf(list + len, API_WHY - len, " %s", *name);
+    }
+}
+
 /* FNV-1a: a name's own number, the same on every machine. */
 uint64_t api_serial(const struct psabench_part *p)
 {
@@ -38,10 +48,8 @@ const char *psabench_part_name(const psabench_part *p)
 
 static int no_such_pin(const psabench_part *p, const char *name)
 {
-    char list[API_WHY] = "";
-    size_t len = 0;
-    for (unsigned i = 0; i < p->kind->pin_count && len < sizeof list; i++)
-        len += (size_t)snprintf(list + len, sizeof list - len, " %s", p->kind->pins[i].name);
+    char list[API_WHY];
+    api_list(p->kind->pins, sizeof *p->kind->pins, p->kind->pin_count, list);
     return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: pin of %s: expected one of%s, got %.40s", p->name,
                     p->kind->name, list, name ? name : "NULL");
 }
@@ -250,15 +258,28 @@ void api_ignore_edge(void *ctx, bool level, int64_t t_ns)
     (void)t_ns;
 }
 
-int api_peek_reg(const struct reg_file *f, unsigned address)
+static double source_ohm(void *ctx, unsigned input, int64_t t_ns)
 {
+    (void)input;
+    (void)t_ns;
+    return ((const struct psabench_part *)ctx)->source_ohm;
+}
+
+api_source_fn *api_source(const struct psabench_part *p)
+{
+    return p->source_ohm > 0.0 ? source_ohm : NULL;
+}
+
+static int peek_reg(const struct psabench_part *p, unsigned address)
+{
+    const struct reg_file *f = (const void *)((const char *)p + p->kind->regs);
     return address < f->count && f->map[address].name ? reg_peek(f, address) : -1;
 }
 
 int psabench_peek(const psabench_part *p, unsigned address)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
-    const int value = p->kind->peek(p, address);
+    const int value = p->kind->peek ? p->kind->peek(p, address) : peek_reg(p, address);
     if (value >= 0) return value;
     return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: expected a register of %s, got %03Xh", p->name, p->kind->name,
                     address);
