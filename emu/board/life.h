@@ -2,8 +2,9 @@
  * struct board as its first member, and whose functions are NAME_init() and so on.
  *
  * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset and sample_until, which
- * BOARD_LIFE_FUNCTIONS puts into the board_type. BOARD_BUS(NAME) defines strobe, by the profile's strobe_ns and strobe_min_ns,
- * and submit, of board_bus. */
+ * BOARD_LIFE_FUNCTIONS puts into the board_type. BOARD_COMMON(NAME, PREFIX) does so with all else that each board names alike:
+ * NAME_fields, PREFIX_LINES, the file's parts. BOARD_BUS(NAME) defines strobe, by the profile's strobe_ns and strobe_min_ns, and
+ * submit, of board_bus. */
 #ifndef PSABENCH_BOARD_LIFE_H
 #define PSABENCH_BOARD_LIFE_H
 
@@ -19,6 +20,14 @@
     static void sample_until(struct board *board, int64_t t_ns) { NAME##_sample_until((struct NAME *)board, t_ns); }   \
     struct NAME /* so that a semicolon has to follow */
 #define BOARD_LIFE_FUNCTIONS .init = init, .power_up = power_up, .power_down = power_down, .reset = reset, .sample_until = sample_until
+#define BOARD_COMMON(NAME, PREFIX)                                                                                     \
+    .name = #NAME, .size = sizeof(struct NAME),                                                                        \
+    .profile_size = sizeof(struct NAME##_profile), .fields = NAME##_fields, .field_count = PREFIX##_FIELDS,            \
+    .profile_check = NAME##_profile_check, .about = about,                                                             \
+    .lines = NAME##_lines, .line_count = PREFIX##_LINES, .port_lines = port_lines,                                     \
+    .events = NAME##_events, .event_count = PREFIX##_EVENTS,                                                           \
+    .parts = parts, .part_count = sizeof parts / sizeof *parts, .controller_faults = controller_faults,                \
+    .can = &NAME##_can, BOARD_LIFE_FUNCTIONS, .ready = ready, .digest = digest
 
 #define BOARD_BUS(NAME)                                                                                                \
     static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)                    \

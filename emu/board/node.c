@@ -322,6 +322,12 @@ void board_node_accept_stream(struct board_node *n, int64_t t_ns)
     co_node_error_end(&n->node, STREAM_REFUSED, t_ns);
 }
 
+void board_node_condition(struct board_node *n, uint16_t code, uint8_t source, bool active, int64_t t_ns)
+{
+    if (active) co_node_error(&n->node, code, REG_DEVICE, source, t_ns);
+    else co_node_error_end(&n->node, code, t_ns);
+}
+
 /* ---- events of the node, life ---- */
 
 static void restore_defaults(struct board_node *n)

@@ -99,6 +99,9 @@ void board_node_notify_reject(struct board_node *n, const char *why);
 void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns);
 void board_node_accept_stream(struct board_node *n, int64_t t_ns);
 
+/* A condition of the board begins or ends: its EMCY. */
+void board_node_condition(struct board_node *n, uint16_t code, uint8_t source, bool active, int64_t t_ns);
+
 /* SDO abort code of a rejected cycle: sources can 3.3. */
 uint32_t board_node_abort_of(enum board_cycle_result r);
 

@@ -108,8 +108,8 @@ static void chip(struct world *w, struct script *s)
     const uint8_t which = script_byte(s), what = script_byte(s);
     const int32_t ppm = (int32_t)(script_uint(s, 2) * 15) - 490000;
     if (which & 0x80) {
-        if (which % 4 < 3) (void)ads1282_flip(&w->b.adc[which % 4], which >> 2 & 15, what, w->s.now_ns);
-        else (void)ads1256_flip(&w->b.tadc, which >> 2 & 15, what, w->s.now_ns);
+        if (which % 4 < 3) (void)reg_flip(&w->b.adc[which % 4].regs, which >> 2 & 15, what, w->s.now_ns);
+        else (void)reg_flip(&w->b.tadc.regs, which >> 2 & 15, what, w->s.now_ns);
         return;
     }
     const int32_t clock_ppm = what & 0x20 ? ppm : 0;

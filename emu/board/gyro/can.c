@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stddef.h>
 
-enum { REG_DEVICE = 0x81, XY_COB = 0x180 };
+enum { XY_COB = 0x180 };
 #define PI             3.141592653589793238
 #define RATE_LSB_RADPS (GYRO_RAD_PER_DEG / 3600.0 * 1e-4)
 #define ANGLE_LSB_RAD  (PI / 2147483648.0)
@@ -72,11 +72,8 @@ static void on_condition(void *ctx, enum gyro_flag what, bool active, int64_t t_
                 {GYRO_ENCODER_FAULT, GYRO_EMCY_ENCODER_FAULT, 2},
                 {GYRO_NOT_SETTLED, GYRO_EMCY_NOT_SETTLED, 4},
                 {GYRO_SATURATED, GYRO_EMCY_SATURATED, 4}};
-    struct gyro_can *c = ctx;
     for (unsigned i = 0; i < sizeof rows / sizeof *rows; i++) {
-        if (rows[i].what != what) continue;
-        if (active) co_node_error(&c->node.node, rows[i].code, REG_DEVICE, rows[i].source, t_ns);
-        else co_node_error_end(&c->node.node, rows[i].code, t_ns);
+        if (rows[i].what == what) board_node_condition(ctx, rows[i].code, rows[i].source, active, t_ns);
     }
 }
 

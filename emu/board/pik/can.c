@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { SOURCE_CONVERTER = 1, REG_DEVICE = 0x81, NS_PER_US = 1000 };
+enum { SOURCE_CONVERTER = 1, NS_PER_US = 1000 };
 enum { SATURATED = PIK_ST_SATURATED_X | PIK_ST_SATURATED_Y | PIK_ST_SATURATED_Z };
 
 static const struct pik *pik_of(const struct board_node *n)
@@ -68,9 +68,7 @@ static void on_reading(void *ctx, const struct pik_reading *r, int64_t t_ns)
 
 static void on_saturated(void *ctx, bool on, int64_t t_ns)
 {
-    struct co_node *n = board_node_co(ctx);
-    if (on) co_node_error(n, PIK_EMCY_SATURATED, REG_DEVICE, SOURCE_CONVERTER, t_ns);
-    else co_node_error_end(n, PIK_EMCY_SATURATED, t_ns);
+    board_node_condition(ctx, PIK_EMCY_SATURATED, SOURCE_CONVERTER, on, t_ns);
 }
 
 static const struct board_node_type type = {

@@ -25,18 +25,13 @@ static void draw_axes(uint64_t seed, uint32_t serial, const char *const source[P
         "pik." name ".x", "pik." name ".y", "pik." name ".z"                                                           \
     }
 
-static double magnitude_of(double x)
-{
-    return x < 0.0 ? -x : x;
-}
-
 /* Error of the coefficient at worst, ppm. */
 static double worst_ppm(const struct pik_specimen *s)
 {
     double worst = 0.0;
     for (unsigned i = 0; i < PIK_AXES; i++) {
-        const double ppm = magnitude_of(s->ratio_ppm[i] - s->uref_ppm + s->clock_ppm) +
-                           magnitude_of(s->asymmetry_ppm[i]) + PIK_SPAN_K * magnitude_of(s->ratio_tc[i] - s->uref_tc);
+        const double ppm = fabs(s->ratio_ppm[i] - s->uref_ppm + s->clock_ppm) + fabs(s->asymmetry_ppm[i]) +
+                           PIK_SPAN_K * fabs(s->ratio_tc[i] - s->uref_tc);
         if (ppm > worst) worst = ppm;
     }
     return worst;

@@ -152,30 +152,12 @@ static int64_t stage_ns(const struct pmka *b, enum pmka_stage stage)
 
 static void do_stage(struct pmka *b, enum pmka_stage stage, int64_t t_ns)
 {
-    switch (stage) {
-    case PMKA_AT_X:
-        begin_set(b, t_ns);
-        pmka_sample(b, 0, t_ns);
-        return;
-    case PMKA_AT_Y:
-        pmka_sample(b, 1, t_ns);
-        return;
-    case PMKA_AT_Z:
-        pmka_sample(b, 2, t_ns);
-        return;
-    case PMKA_AT_RELEASE:
-        if (pmka_rotation_turns(b)) pmka_release_axis(b, t_ns);
-        return;
-    case PMKA_AT_K:
-        pmka_sample(b, PMKA_K, t_ns);
-        return;
-    case PMKA_AT_TAKE:
-        pmka_take_axis(b, t_ns);
-        return;
-    case PMKA_AT_READING:
-        end_set(b, t_ns);
-        return;
-    }
+    if (stage == PMKA_AT_X) begin_set(b, t_ns);
+    if (stage <= PMKA_AT_Z) pmka_sample(b, stage, t_ns);
+    else if (stage == PMKA_AT_K) pmka_sample(b, PMKA_K, t_ns);
+    else if (stage == PMKA_AT_TAKE) pmka_take_axis(b, t_ns);
+    else if (stage == PMKA_AT_READING) end_set(b, t_ns);
+    else if (pmka_rotation_turns(b)) pmka_release_axis(b, t_ns);
 }
 
 static void run_stage(void *ctx, int64_t t_ns)

@@ -62,14 +62,14 @@ static void tadc_fault(struct board *board, unsigned part, const struct chip_fau
 static bool adc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
     struct psa2 *b = (struct psa2 *)board;
-    return b->mode != PSA2_OFF && ads1282_flip(&b->adc[part - PART_ADC_X], reg, mask, t_ns);
+    return b->mode != PSA2_OFF && reg_flip(&b->adc[part - PART_ADC_X].regs, reg, mask, t_ns);
 }
 
 static bool tadc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
     struct psa2 *b = (struct psa2 *)board;
     (void)part;
-    return b->mode != PSA2_OFF && ads1256_flip(&b->tadc, reg, mask, t_ns);
+    return b->mode != PSA2_OFF && reg_flip(&b->tadc.regs, reg, mask, t_ns);
 }
 
 #define EVERY_FAULT (BOARD_FAULT_DRDY | BOARD_FAULT_DOUT | BOARD_FAULT_SYNC | BOARD_FAULT_CLOCK)
@@ -168,35 +168,17 @@ static const char *const capabilities[] = {"adc_chain", "temp_adc_offset_v", "te
                                            NULL};
 
 const struct board_type psa2_board = {
-    .name = "psa2",
+    BOARD_COMMON(psa2, PSA2),
     .title = "PSA-2",
-    .size = sizeof(struct psa2),
-    .profile_size = sizeof(struct psa2_profile),
-    .fields = psa2_fields,
-    .field_count = PSA2_FIELDS,
     .profile_name = "article",
     .profile_default = profile_default,
-    .profile_check = psa2_profile_check,
-    .about = about,
     .capabilities = capabilities,
     .node = 5,
     .frame_forms = 4,
     .period_ns = psa2_profile_period_ns,
-    .lines = psa2_lines,
-    .line_count = PSA2_LINES,
-    .port_lines = port_lines,
     .frame_line = PSA2_LINE_INT,
     .pulse_line = PSA2_LINE_CLK,
     .pulses = pulses,
-    .events = psa2_events,
-    .event_count = PSA2_EVENTS,
-    .parts = parts,
-    .part_count = PARTS,
-    .controller_faults = controller_faults,
-    .can = &psa2_can,
-    BOARD_LIFE_FUNCTIONS,
-    .ready = ready,
     .analog = true,
-    .digest = digest,
     .truth = truth,
 };

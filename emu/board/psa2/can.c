@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-enum { REG_DEVICE = 0x81, SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
+enum { SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
 enum { NS_PER_TICK = 4000, NS_PER_US = 1000, AXES = 3 };
 
 static const double volt_per_lsb = 10.0 / 8388608.0; /* nominal, at the load */
@@ -77,10 +77,7 @@ static const uint32_t aborts[] = {
 static void port_fault(struct psa2_can *c, enum psa2_group group, bool active, int64_t t_ns)
 {
     const uint16_t code = group == PSA2_ACCEL ? PSA2_EMCY_ACCEL_PORT : PSA2_EMCY_TEMP_PORT;
-    if (active)
-        co_node_error(&c->node.node, code, REG_DEVICE, group == PSA2_ACCEL ? SOURCE_ACCEL_PORT : SOURCE_TEMP_PORT,
-                      t_ns);
-    else co_node_error_end(&c->node.node, code, t_ns);
+    board_node_condition(&c->node, code, group == PSA2_ACCEL ? SOURCE_ACCEL_PORT : SOURCE_TEMP_PORT, active, t_ns);
 }
 
 static void request_done(void *ctx, struct psa2_request *r, enum psa2_result result, int64_t t_ns)
@@ -357,7 +354,7 @@ void psa2_can_fault(void *ctx, uint16_t code, int64_t t_ns)
     struct psa2_can *c = ctx;
     if (code == PSA2_FAULT_ACCEL_PORT) port_fault(c, PSA2_ACCEL, true, t_ns);
     else if (code == PSA2_FAULT_TEMP_PORT) port_fault(c, PSA2_TEMP, true, t_ns);
-    else if (code != 0) co_node_error(&c->node.node, code, REG_DEVICE, 0, t_ns);
+    else if (code != 0) board_node_condition(&c->node, code, 0, true, t_ns);
 }
 
 /* ---- life ---- */

@@ -3,7 +3,7 @@
 #include "gen/psabench_can.h"
 #include "gen/psd1_od.h"
 
-enum { REG_DEVICE = 0x81, SOURCE_CONVERTERS = 1 };
+enum { SOURCE_CONVERTERS = 1 };
 
 static struct psd1 *board_of(const struct board_node *n)
 {
@@ -82,9 +82,7 @@ static void on_cycle(void *ctx, const struct psd1_cycle *c, int64_t t_ns)
 
 static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
 {
-    struct psd1_can *can = ctx;
-    if (code) co_node_error(&can->node.node, code, REG_DEVICE, SOURCE_CONVERTERS, t_ns);
-    else co_node_error_end(&can->node.node, PSD1_EMCY_NO_DR, t_ns);
+    board_node_condition(ctx, PSD1_EMCY_NO_DR, SOURCE_CONVERTERS, code != 0, t_ns);
 }
 
 /* ---- objects ---- */

@@ -145,13 +145,6 @@ static void vin_row_v(void *ctx, unsigned channel, const int64_t *t_ns, unsigned
     }
 }
 
-static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
-{
-    double v = 0.0;
-    vin_row_v(ctx, channel, &t_ns, 1, &v);
-    return v;
-}
-
 /* ---- life ---- */
 
 // clang-format off
@@ -222,8 +215,7 @@ static void init_adc(struct psd1 *b)
         const struct ad7712_cfg cfg = adc_cfg(b, i);
         b->port[i] = (struct psd1_port){b, i};
         const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
-        const struct ad7712_io io = {
-            .ctx = &b->port[i], .vin_v = vin_v, .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
+        const struct ad7712_io io = {.ctx = &b->port[i], .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
         ad7712_init(&b->adc[i], &cfg, &io, b->base.sched,
                     rng_stream(b->base.cfg.seed, b->base.cfg.serial, adc_noise[i]));
         b->drdy[i] = true;

@@ -70,7 +70,7 @@ struct ad7712_io {
     void *ctx;
     /* Volts across the inputs of a channel (0: AIN1; 1: AIN2, which on the AD7712 is against VBIAS): of the open circuit if
      * source_ohm is there. Asked late, when an output period ends, each look for its own instant and never for an earlier
-     * one than before; who changes the input abruptly calls ad7712_sample_until() first. */
+     * one than before; who changes the input abruptly calls ad7712_sample_until() first. NULL where rows are asked. */
     double (*vin_v)(void *ctx, unsigned channel, int64_t t_ns);
     /* The same for n looks in a row, up to AD7712_CELLS_MAX; NULL: one by one. Not asked where source_ohm is there. */
     void (*vin_row_v)(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v);

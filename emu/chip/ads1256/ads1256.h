@@ -128,8 +128,6 @@ int64_t ads1256_settle_ns(const struct ads1256 *a); /* t18 of the present DRATE 
 /* From t_ns on, in place of the faults that were; outlives resets and power. Not from inside a callback of the chip. */
 void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns);
 
-/* Inverts bits of a register, as a particle or a bad supply does, read-only ones too; the chip acts on what it finds there
- * as if it had been written. False: no such register. */
-bool ads1256_flip(struct ads1256 *a, unsigned reg, uint8_t mask, int64_t t_ns);
+/* A register is flipped by reg_flip() on a->regs: the chip acts on what it finds there as if it had been written. */
 
 #endif

@@ -23,8 +23,3 @@ void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns)
     ads1256_pins_refresh(a, t_ns);
     if (ads1256_drdy(a) != drdy && a->notify_drdy) a->notify_drdy(a->io.ctx, !drdy, t_ns);
 }
-
-bool ads1256_flip(struct ads1256 *a, unsigned reg, uint8_t mask, int64_t t_ns)
-{
-    return reg_flip(&a->regs, reg, mask, t_ns);
-}

@@ -75,8 +75,6 @@ int64_t ads1282_period_ns(const struct ads1282 *a); /* DRDY to DRDY with the pre
 /* From t_ns on, in place of the faults that were; outlives resets and power. Not from inside a callback of the chip. */
 void ads1282_fault(struct ads1282 *a, const struct chip_fault *f, int64_t t_ns);
 
-/* Inverts bits of a register, as a particle or a bad supply does, read-only ones too; the chip acts on what it finds there
- * as if it had been written. False: no such register. */
-bool ads1282_flip(struct ads1282 *a, unsigned reg, uint8_t mask, int64_t t_ns);
+/* A register is flipped by reg_flip() on a->regs: the chip acts on what it finds there as if it had been written. */
 
 #endif

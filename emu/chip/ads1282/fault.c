@@ -23,8 +23,3 @@ void ads1282_fault(struct ads1282 *a, const struct chip_fault *f, int64_t t_ns)
     ads1282_serial_stuck(a);
     if (ads1282_drdy(a) != drdy && a->notify_drdy) a->notify_drdy(a->io.ctx, !drdy, t_ns);
 }
-
-bool ads1282_flip(struct ads1282 *a, unsigned reg, uint8_t mask, int64_t t_ns)
-{
-    return reg_flip(&a->regs, reg, mask, t_ns);
-}

@@ -154,16 +154,16 @@ static void a_flipped_bit_is_there_and_acts(void **state)
     struct rig *r = up();
     await_fall(r);
     const int fsc2 = rreg(r, ADS1256_FSC2);
-    assert_true(ads1256_flip(&r->a, ADS1256_FSC2, 0x20, r->s.now_ns));
+    assert_true(reg_flip(&r->a.regs, ADS1256_FSC2, 0x20, r->s.now_ns));
     await_fall(r);
     near(rdata(r) / 8388608.0, 0.2 * ((fsc2 ^ 0x20) + 0.5) / (fsc2 + 0.5), 2e-3);
-    assert_true(ads1256_flip(&r->a, ADS1256_STATUS, 0x10, r->s.now_ns)); /* ID, read-only */
+    assert_true(reg_flip(&r->a.regs, ADS1256_STATUS, 0x10, r->s.now_ns)); /* ID, read-only */
     assert_int_equal(rreg(r, ADS1256_STATUS) >> 4, 0x2);
-    assert_true(ads1256_flip(&r->a, ADS1256_DRATE, RATE_100 ^ 0xA1, r->s.now_ns)); /* 1000 SPS */
+    assert_true(reg_flip(&r->a.regs, ADS1256_DRATE, RATE_100 ^ 0xA1, r->s.now_ns)); /* 1000 SPS */
     await_fall(r);
     int64_t was_ns = await_fall(r);
     near((double)(await_fall(r) - was_ns), 1000000.0, 200.0);
-    assert_false(ads1256_flip(&r->a, ADS1256_REGS, 0x01, r->s.now_ns));
+    assert_false(reg_flip(&r->a.regs, ADS1256_REGS, 0x01, r->s.now_ns));
 }
 
 static void without_power_everything_is_forgotten_but_the_counters(void **state)

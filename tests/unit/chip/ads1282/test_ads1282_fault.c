@@ -187,18 +187,18 @@ static void a_flipped_bit_is_there_and_acts(void **state)
     powered(r, &quiet);
     r->v = 0.4;
     settled_word(r);
-    assert_true(ads1282_flip(&r->a, ADS1282_OFC2, 0x10, r->s.now_ns)); /* 2^20 of 2^23 */
+    assert_true(reg_flip(&r->a.regs, ADS1282_OFC2, 0x10, r->s.now_ns)); /* 2^20 of 2^23 */
     to_fall(r);
     near(fraction(read_bytes(r, 4)), 0.4 / 2.5 - 0.125, 2e-3);
-    assert_true(ads1282_flip(&r->a, ADS1282_ID, 0x01, r->s.now_ns)); /* read-only for the bus */
+    assert_true(reg_flip(&r->a.regs, ADS1282_ID, 0x01, r->s.now_ns)); /* read-only for the bus */
     to_fall(r);
     SEND(r, 0x11);
     hex_is(rreg(r, ADS1282_ID), 0x01);
     const uint32_t restarts = r->a.count.restarts;
-    assert_true(ads1282_flip(&r->a, ADS1282_CONFIG0, 0x08, r->s.now_ns));
+    assert_true(reg_flip(&r->a.regs, ADS1282_CONFIG0, 0x08, r->s.now_ns));
     assert_int_equal(r->a.count.restarts, restarts + 1);
     assert_int_equal(ads1282_period_ns(&r->a), PERIOD_NS / 2);
-    assert_false(ads1282_flip(&r->a, ADS1282_REGS, 0x01, r->s.now_ns));
+    assert_false(reg_flip(&r->a.regs, ADS1282_REGS, 0x01, r->s.now_ns));
 }
 
 static void without_power_everything_is_forgotten_but_the_counters(void **state)
