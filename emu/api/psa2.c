@@ -250,7 +250,7 @@ static void open_psa2(struct psabench_part *p)
     for (unsigned i = 0; i < TEMPS; i++) p->volts[TEMP_INPUT + i] = s->temp_degc;
     const struct board_io io = {.ctx = p, .accel = accel_input, .temp_degc = temp_degc};
     psa2_init(&s->board, &profile, &unit, &io, &p->bench->sched);
-    psa2_attach(&s->board, &(struct psa2_host){.ctx = p, .frame = on_frame});
+    s->board.host = (struct psa2_host){.ctx = p, .frame = on_frame};
     psa2_power_up(&s->board, now_ns(p));
 }
 

@@ -182,7 +182,7 @@ static void power_up(struct bench *n, enum ads1282_chain chain)
     memset(n, 0, sizeof *n);
     sched_init(&n->s);
     psa2_init(&n->b, &p, &u, &io, &n->s);
-    psa2_attach(&n->b, &(struct psa2_host){.ctx = n, .frame = frame});
+    n->b.host = (struct psa2_host){.ctx = n, .frame = frame};
     n->trace = &n->b.base.trace;
     psa2_power_up(&n->b, 0);
     run_frames(n, 1);
@@ -201,7 +201,7 @@ static void power_up_psd1(struct bench *n, enum ads1282_chain chain)
     memset(n, 0, sizeof *n);
     sched_init(&n->s);
     psd1_init(&n->d, &p, &u, &io, &n->s);
-    psd1_attach(&n->d, &(struct psd1_host){.ctx = n, .cycle = cycle});
+    n->d.host = (struct psd1_host){.ctx = n, .cycle = cycle};
     n->trace = &n->d.base.trace;
     psd1_power_up(&n->d, 0);
     run_frames(n, 1);

@@ -141,7 +141,7 @@ static void power_up(struct words *w)
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     sched_init(&w->s);
     psa2_init(&w->b, &p, &u, &io, &w->s);
-    psa2_attach(&w->b, &(struct psa2_host){.ctx = w, .frame = frame});
+    w->b.host = (struct psa2_host){.ctx = w, .frame = frame};
     psa2_power_up(&w->b, 0);
 }
 

@@ -254,7 +254,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&w, 0, sizeof w);
     sched_init(&w.s);
     psa2_init(&w.b, &profile, &unit, &io, &w.s);
-    psa2_attach(&w.b, &(struct psa2_host){.ctx = &w, .frame = on_frame, .fault = on_fault});
+    w.b.host = (struct psa2_host){.ctx = &w, .frame = on_frame, .fault = on_fault};
     can_bus_init(&w.bus, &(struct can_bus_cfg){.bitrate_hz = script_byte(&s) & 1 ? 1000000 : 500000}, &w.s);
     const struct psa2_can_port port = psa2_can_port(&w.b);
     psa2_can_init(&w.can, &(struct board_can_cfg){.name = "a", .type = &psa2_board, .node_id = NODE}, &port, &w.bus,

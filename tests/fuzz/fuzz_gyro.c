@@ -245,7 +245,7 @@ static void begin(struct world *w)
     sched_init(&w->s);
     gyro_profile_default(&p);
     gyro_board.init(&w->b.base, &p, &cfg, &io, &w->s);
-    gyro_attach(&w->b, &(struct gyro_host){.ctx = w, .reading = on_reading, .condition = on_condition});
+    w->b.host = (struct gyro_host){.ctx = w, .reading = on_reading, .condition = on_condition};
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};
     gyro_board.power_up(&w->b.base, 0);
 }

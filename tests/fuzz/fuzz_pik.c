@@ -198,7 +198,7 @@ static void begin(struct world *w, const struct pik_profile *p)
     }
     sched_init(&w->s);
     pik_init(&w->b, p, &cfg, &io, &w->s);
-    pik_attach(&w->b, &(struct pik_host){.ctx = w, .reading = on_reading, .saturated = on_saturated});
+    w->b.host = (struct pik_host){.ctx = w, .reading = on_reading, .saturated = on_saturated};
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};
 }
 

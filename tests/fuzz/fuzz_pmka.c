@@ -199,7 +199,7 @@ static void begin(struct world *w, const struct pmka_profile *p)
     pmka_board.cfg_default(&cfg);
     sched_init(&w->s);
     pmka_board.init(&w->b.base, p, &cfg, &io, &w->s);
-    pmka_attach(&w->b, &(struct pmka_host){.ctx = w, .reading = on_reading});
+    w->b.host = (struct pmka_host){.ctx = w, .reading = on_reading};
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};
 }
 

@@ -186,7 +186,7 @@ static void power_up(struct world *w, bool watched)
     w->clean = true;
     sched_init(&w->s);
     psa2_init(&w->b, &p, &u, &io, &w->s);
-    psa2_attach(&w->b, &(struct psa2_host){.ctx = w, .frame = on_frame, .fault = on_fault});
+    w->b.host = (struct psa2_host){.ctx = w, .frame = on_frame, .fault = on_fault};
     w->ear.sink = (struct trace_sink){.steps = watched ? listener_steps : NULL, .ctx = &w->ear};
     psa2_power_up(&w->b, 0);
 }

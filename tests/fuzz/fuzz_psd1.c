@@ -250,7 +250,7 @@ static void power_up(struct world *w, bool watched, bool host)
     memset(w, 0, sizeof *w);
     sched_init(&w->s);
     psd1_init(&w->b, &p, &u, &io, &w->s);
-    psd1_attach(&w->b, &(struct psd1_host){.ctx = w, .cycle = on_cycle, .fault = on_fault});
+    w->b.host = (struct psd1_host){.ctx = w, .cycle = on_cycle, .fault = on_fault};
     w->ear.sink = (struct trace_sink){.steps = watched ? listener_steps : NULL, .ctx = &w->ear};
     psd1_power_up(&w->b, 0);
 }

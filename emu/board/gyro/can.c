@@ -241,7 +241,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     struct gyro *b = (struct gyro *)board;
     board_node_init(can, &type, cfg, board, bus, s);
     c->level_id = b->base.cfg.level_node ? (uint32_t)XY_COB + b->base.cfg.level_node : 0;
-    gyro_attach(b, &(struct gyro_host){.ctx = can, .reading = on_reading, .condition = on_condition});
+    b->host = (struct gyro_host){.ctx = can, .reading = on_reading, .condition = on_condition};
 }
 
 const struct board_can gyro_can = {.size = sizeof(struct gyro_can), .init = init_can, BOARD_NODE_LIFE};

@@ -207,11 +207,6 @@ void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_
     sched_ev(&b->step, run_step, b);
 }
 
-void gyro_attach(struct gyro *b, const struct gyro_host *host)
-{
-    b->host = *host;
-}
-
 /* Nothing is left but the counters. */
 static void reset_state(struct gyro *b, int64_t t_ns)
 {

@@ -105,7 +105,6 @@ extern const struct board_line gyro_lines[GYRO_LINES];
 
 void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
-void gyro_attach(struct gyro *b, const struct gyro_host *host);
 void gyro_power_up(struct gyro *b, int64_t t_ns);
 void gyro_power_down(struct gyro *b, int64_t t_ns);
 void gyro_reset(struct gyro *b, int64_t t_ns); /* settings to their defaults, mode 0 */

@@ -59,7 +59,7 @@ struct gyro_past {
 struct gyro {
     struct board base;
     struct gyro_profile profile;
-    struct gyro_host host;
+    struct gyro_host host; /* set by the receiver */
     struct gyro_counters counters;
 
     bool on, ready;

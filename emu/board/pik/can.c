@@ -78,7 +78,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
                      struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    pik_attach((struct pik *)board, &(struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated});
+    ((struct pik *)board)->host = (struct pik_host){.ctx = can, .reading = on_reading, .saturated = on_saturated};
 }
 
 const struct board_can pik_can = {.size = sizeof(struct pik_can), .init = init_can, BOARD_NODE_LIFE};

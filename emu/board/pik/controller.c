@@ -85,11 +85,6 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
     pik_bus_init(b);
 }
 
-void pik_attach(struct pik *b, const struct pik_host *host)
-{
-    b->host = *host;
-}
-
 void pik_power_up(struct pik *b, int64_t t_ns)
 {
     if (b->on) return;

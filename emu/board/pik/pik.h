@@ -108,7 +108,6 @@ enum pik_controller_fault {
 
 void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg *cfg, const struct board_io *io,
               struct sched *s);
-void pik_attach(struct pik *b, const struct pik_host *host); /* copied */
 void pik_power_up(struct pik *b, int64_t t_ns);
 void pik_power_down(struct pik *b, int64_t t_ns);
 void pik_reset(struct pik *b, int64_t t_ns);              /* counters and registers; the integrators run on */

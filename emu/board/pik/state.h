@@ -29,7 +29,7 @@ struct pik_channel {
 struct pik {
     struct board base;
     struct pik_profile profile;
-    struct pik_host host;
+    struct pik_host host; /* set by the receiver */
     struct pik_specimen specimen;
     struct pik_channel channel[PIK_AXES];
     struct pik_counters counters;

@@ -83,7 +83,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
                      struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    pmka_attach((struct pmka *)board, &(struct pmka_host){.ctx = can, .reading = on_reading});
+    ((struct pmka *)board)->host = (struct pmka_host){.ctx = can, .reading = on_reading};
 }
 
 const struct board_can pmka_can = {.size = sizeof(struct pmka_can), .init = init_can, BOARD_NODE_LIFE};

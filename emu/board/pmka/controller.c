@@ -208,11 +208,6 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
     for (unsigned i = 0; i < PMKA_INTS; i++) b->channel[i].axis = b->channel[i].said_axis = i < PMKA_K ? (int)i : -1;
 }
 
-void pmka_attach(struct pmka *b, const struct pmka_host *host)
-{
-    b->host = *host;
-}
-
 /* The controller restarts. */
 static void start_controller(struct pmka *b, int64_t t_ns)
 {

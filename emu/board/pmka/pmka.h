@@ -106,7 +106,6 @@ extern const struct board_line pmka_lines[PMKA_LINES];
 
 void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
-void pmka_attach(struct pmka *b, const struct pmka_host *host);
 void pmka_power_up(struct pmka *b, int64_t t_ns); /* integrators empty, controller starts */
 void pmka_power_down(struct pmka *b, int64_t t_ns);
 void pmka_reset(struct pmka *b, int64_t t_ns); /* of the controller; the integrators go on */

@@ -64,7 +64,7 @@ struct pmka_bus {
 struct pmka {
     struct board base;
     struct pmka_profile profile;
-    struct pmka_host host;
+    struct pmka_host host; /* set by the receiver */
     struct pmka_specimen specimen;
     uint16_t rom[PMKA_ROM_WORDS];
     struct rng adc_noise, temp_noise;

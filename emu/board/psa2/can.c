@@ -411,7 +411,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     struct psa2 *b = (struct psa2 *)board;
     const struct psa2_can_port port = psa2_can_port(b);
     psa2_can_init(can, cfg, &port, bus, s);
-    psa2_attach(b, &(struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault});
+    b->host = (struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault};
 }
 
 const struct board_can psa2_can = {.size = sizeof(struct psa2_can),

@@ -402,11 +402,6 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     psa2_request_fail(b, PSA2_ACCEL, true, t_ns);
 }
 
-void psa2_attach(struct psa2 *b, const struct psa2_host *h)
-{
-    b->host = *h;
-}
-
 bool psa2_ready(const struct psa2 *b)
 {
     return b->mode == PSA2_RUN;

@@ -111,7 +111,6 @@ struct psa2_counters {
  * nothing of the board's may be called from inside. */
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
-void psa2_attach(struct psa2 *b, const struct psa2_host *h); /* from the next frame on; no one after psa2_init() */
 void psa2_power_up(struct psa2 *b, int64_t t_ns); /* supplies good: chips power up, Res released, set-up begins */
 void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
 

@@ -97,8 +97,8 @@ struct psa2_port { /* which converter a callback came from */
 struct psa2 {
     struct board base;
     struct psa2_profile profile;
-    struct psa2_host host;
-    uint64_t idle_lines; /* levels at rest */
+    struct psa2_host host; /* set by the receiver */
+    uint64_t idle_lines;   /* levels at rest */
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct psa2_port port[3];

@@ -177,7 +177,7 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
     struct psd1 *b = (struct psd1 *)board;
     board_node_init(&c->node, &type, cfg, board, bus, s);
     c->busy = false;
-    psd1_attach(b, &(struct psd1_host){.ctx = can, .cycle = on_cycle, .fault = on_fault});
+    b->host = (struct psd1_host){.ctx = can, .cycle = on_cycle, .fault = on_fault};
 }
 
 const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init_can, BOARD_NODE_LIFE};

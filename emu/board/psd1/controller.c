@@ -241,11 +241,6 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
     refresh_degc(b, s->now_ns);
 }
 
-void psd1_attach(struct psd1 *b, const struct psd1_host *host)
-{
-    b->host = *host;
-}
-
 /* Ends all activity; its lines go to rest; its state is cleared. */
 static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
 {

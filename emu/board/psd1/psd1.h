@@ -93,7 +93,6 @@ enum psd1_controller_fault {
 
 void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s);
-void psd1_attach(struct psd1 *b, const struct psd1_host *host);
 void psd1_power_up(struct psd1 *b, int64_t t_ns);
 void psd1_power_down(struct psd1 *b, int64_t t_ns);
 void psd1_reset(struct psd1 *b, int64_t t_ns);

@@ -76,7 +76,7 @@ struct psd1_port { /* which converter a callback came from */
 struct psd1 {
     struct board base;
     struct psd1_profile profile;
-    struct psd1_host host;
+    struct psd1_host host; /* set by the receiver */
     struct ad7712 adc[3];
     struct psd1_port port[3];
     /* specimen */

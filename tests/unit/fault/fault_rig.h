@@ -124,7 +124,7 @@ static inline int fresh(void **state)
     fault_init(&r.engine, &r.view, &r.s);
     r.engine.changed = on_change;
     control_init(&r.control, control_tables, &r.view);
-    psa2_attach(&r.unit[0].store.psa2, &(struct psa2_host){.frame = on_frame});
+    r.unit[0].store.psa2.host = (struct psa2_host){.frame = on_frame};
     r.listener.fn = on_event;
     unit_subscribe(&r.unit[0], &r.listener);
     for (unsigned i = 0; i < UNITS; i++) psa2_power_up(&r.unit[i].store.psa2, 0);

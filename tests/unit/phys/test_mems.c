@@ -109,7 +109,7 @@ static void reading_noise_is_what_the_wire_shows(void **state)
     cfg.axis[0] = (struct unit_axis_cfg){.sensor = UNIT_MEMS, .mems = {.reading_noise_v = 1e-3}};
     unit_init(&u, &cfg, &h, &s);
     struct readings r = {0};
-    psa2_attach(&u.store.psa2, &(struct psa2_host){.ctx = &r, .frame = on_frame});
+    u.store.psa2.host = (struct psa2_host){.ctx = &r, .frame = on_frame};
     psa2_power_up(&u.store.psa2, 0);
     sched_run_until(&s, 20 * NS_PER_S);
     assert_true(r.n > 19000);

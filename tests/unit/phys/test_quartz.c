@@ -150,7 +150,7 @@ static void a_board_reads_its_current(void **state)
     cfg.axis[0].quartz =
         (struct quartz_g){.scale_a_per_g = 1.28e-3, .slope_ug_per_k = 1000.0, .scale_tc_ppm_per_k = 500};
     unit_init(&u, &cfg, &lab, &s);
-    psa2_attach(&u.store.psa2, &(struct psa2_host){.ctx = &code, .frame = keep_code});
+    u.store.psa2.host = (struct psa2_host){.ctx = &code, .frame = keep_code};
     psa2_power_up(&u.store.psa2, 0);
     sched_run_until(&s, NS_PER_S / 2);
     near(unit_sensor_out(&u, 0, NS_PER_S / 2), 1.28e-3 * 1.009 * 1.018, 1e-15);

@@ -130,7 +130,7 @@ static inline void rig_up(struct rig *r, const struct platform_cfg *platform, do
     gyro_profile_default(&profile);
     gyro_init(&r->b, &profile, &cfg, &io, &r->s);
     r->b.base.observed = true;
-    gyro_attach(&r->b, &(struct gyro_host){.ctx = r, .reading = rig_reading, .condition = rig_condition});
+    r->b.host = (struct gyro_host){.ctx = r, .reading = rig_reading, .condition = rig_condition};
     sched_ev(&r->feed, rig_feed, r);
     sched_at(&r->s, &r->feed, 1000000);
     gyro_power_up(&r->b, 0);

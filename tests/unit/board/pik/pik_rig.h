@@ -163,7 +163,7 @@ static inline void rig_init(struct rig *r, const struct pik_profile *p, uint32_t
     r->degc = 25.0;
     sched_init(&r->s);
     pik_init(&r->b, p, &cfg, &io, &r->s);
-    pik_attach(&r->b, &(struct pik_host){.ctx = r, .reading = rig_reading, .saturated = rig_saturated});
+    r->b.host = (struct pik_host){.ctx = r, .reading = rig_reading, .saturated = rig_saturated};
     r->sink = (struct trace_sink){.mask = UINT64_MAX >> (64 - PIK_LINES), .steps = rig_steps, .ctx = r};
 }
 

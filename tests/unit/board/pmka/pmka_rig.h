@@ -120,7 +120,7 @@ static inline void rig_init(struct rig *r, const struct pmka_profile *p)
     sched_init(&r->s);
     pmka_board.init(&r->b.base, p, &cfg, &io, &r->s);
     r->b.base.observed = true;
-    pmka_attach(&r->b, &(struct pmka_host){.ctx = r, .reading = rig_reading});
+    r->b.host = (struct pmka_host){.ctx = r, .reading = rig_reading};
 }
 
 static inline void rig_run(struct rig *r, int64_t ns)

@@ -47,7 +47,7 @@ static void start(int64_t bitrate_hz)
     pmka_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &pmka_board, .node_id = NODE},
                          &rig.b.base, &wire.bus, &rig.s);
     wire.stream = rig.b.host;
-    pmka_attach(&rig.b, &(struct pmka_host){.ctx = &rig, .reading = tee});
+    rig.b.host = (struct pmka_host){.ctx = &rig, .reading = tee};
     pmka_board.power_up(&rig.b.base, 0);
     pmka_board.can->power_up(&wire.can, 0);
 }

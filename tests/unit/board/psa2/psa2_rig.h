@@ -95,7 +95,7 @@ static inline void rig_init(struct rig *r, const struct psa2_profile *p, double 
     for (int i = 0; i < 4; i++) r->degc[i] = 25.0;
     sched_init(&r->s);
     psa2_init(&r->b, p, &u, &io, &r->s);
-    psa2_attach(&r->b, &(struct psa2_host){.ctx = r, .frame = rig_frame, .fault = rig_fault});
+    r->b.host = (struct psa2_host){.ctx = r, .frame = rig_frame, .fault = rig_fault};
     r->sink = (struct trace_sink){.mask = 0xFFFF, .steps = rig_steps, .ctx = r};
 }
 

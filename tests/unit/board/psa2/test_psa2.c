@@ -161,7 +161,7 @@ static void a_board_may_be_initialised_again(void **state)
     const struct psa2_host host = rig.b.host;
     sched_init(&rig.s);
     psa2_init(&rig.b, &p, &u, &io, &rig.s);
-    psa2_attach(&rig.b, &host);
+    rig.b.host = host;
     psa2_power_up(&rig.b, 0);
     rig.frames = 0;
     rig_run(&rig, 192000000);

@@ -153,7 +153,7 @@ static inline void rig_init(struct rig *r, const struct psd1_profile *p, double 
     psd1_init(&r->b, p, &u, &io, &r->s);
     r->b.base.observed = true;
     sched_ev(&r->stopper, rig_stop_int0, r);
-    psd1_attach(&r->b, &(struct psd1_host){.ctx = r, .cycle = rig_cycle, .fault = rig_fault});
+    r->b.host = (struct psd1_host){.ctx = r, .cycle = rig_cycle, .fault = rig_fault};
     r->sink = (struct trace_sink){.mask = TRACE_FIRST(PSD1_LINES), .steps = rig_steps, .ctx = r};
 }
 

@@ -44,7 +44,7 @@ static void start(const struct psd1_profile *p, uint32_t bitrate_hz)
     psd1_board.can->init(&wire.can, &(struct board_can_cfg){.name = "a", .type = &psd1_board, .node_id = NODE},
                          &rig.b.base, &wire.bus, &rig.s);
     wire.stream = rig.b.host;
-    psd1_attach(&rig.b, &(struct psd1_host){.ctx = &rig, .cycle = tee, .fault = NULL});
+    rig.b.host = (struct psd1_host){.ctx = &rig, .cycle = tee, .fault = NULL};
     rig.b.host.fault = NULL;
     psd1_board.power_up(&rig.b.base, 0);
     psd1_board.can->power_up(&wire.can, 0);
