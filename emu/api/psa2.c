@@ -84,12 +84,13 @@ bool api_psa2_profile(unsigned number, struct psa2_profile *p, char *why, size_t
     const char *name = PROFILES;
     while (number-- > 0) name = strchr(name, '|') + 1;
     const size_t len = strcspn(name, "|");
-    *p = psa2_profile_default();
+    fields_default(&psa2_fields, p);
     memcpy(p->name, name, len);
     p->name[len] = '\0';
     for (size_t i = 0; i < sizeof differences / sizeof *differences; i++) {
         if (strcmp(differences[i].profile, p->name) != 0) continue;
-        if (!psa2_profile_set(p, differences[i].key, differences[i].index, differences[i].text, why, cap)) return false;
+        if (!fields_set(&psa2_fields, p, differences[i].key, differences[i].index, differences[i].text, why, cap))
+            return false;
     }
     return psa2_profile_check(p, why, cap);
 }

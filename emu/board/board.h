@@ -46,11 +46,8 @@ struct board_type {
     const char *name, *title; /* "psa2", "PSA-2" */
     size_t size;              /* of its struct */
     /* profile */
-    size_t profile_size;
-    const struct board_field *fields;
-    unsigned field_count;
-    const char *profile_name; /* default file in proto/profiles */
-    void (*profile_default)(void *profile);
+    const struct fields *fields; /* of its struct, each with its default */
+    const char *profile_name;    /* default file in proto/profiles */
     bool (*profile_check)(const void *profile, char *why,
                           size_t cap);                                /* false: a sentence that begins with the field */
     void (*about)(const void *profile, char *out, size_t cap);        /* a line for lists of profiles */

@@ -2,183 +2,198 @@
 
 #include "base/why.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <math.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Text of one element -> *value, its bytes; false if the text is not such a value. */
-typedef bool parse_fn(const struct board_field *f, const char *text, void *value);
+/* ---- a value from its text */
 
-static bool parse_string(const struct board_field *f, const char *text, void *value)
-{
-    const size_t len = strlen(text);
-    if (len < (size_t)f->min || len > (size_t)f->max) return false;
-    memcpy(value, text, len + 1);
-    return true;
-}
-
-static bool parse_uint(const struct board_field *f, const char *text, void *value)
-{
-    char *end;
-    errno = 0;
-    const unsigned long v = strtoul(text, &end, 0);
-    if (!isdigit((unsigned char)text[0]) || *end || errno || (double)v < f->min || (double)v > f->max) return false;
-    const unsigned u = (unsigned)v;
-    memcpy(value, &u, sizeof u);
-    return true;
-}
-
-static bool parse_real(const struct board_field *f, const char *text, void *value)
+static enum field_result parse_real(const struct field *d, const char *text, void *at)
 {
     char *end;
     const double v = strtod(text, &end);
-    if (end == text || *end || !isfinite(v) || v < f->min || v > f->max) return false;
-    memcpy(value, &v, sizeof v);
-    return true;
+    if (end == text || *end || !isfinite(v)) return FIELD_UNLIKE;
+    if (v < d->min || v > d->max) return FIELD_OUT_OF_RANGE;
+    memcpy(at, &v, sizeof v);
+    return FIELD_OK;
 }
 
-static bool parse_bool(const struct board_field *f, const char *text, void *value)
+static enum field_result parse_integer(const struct field *d, const char *text, void *at)
 {
-    (void)f;
+    char *end;
+    errno = 0;
+    const uint64_t v = strtoull(text, &end, 0);
+    if (text[0] < '0' || text[0] > '9' || *end || errno) return FIELD_UNLIKE;
+    if ((double)v < d->min || (double)v > d->max) return FIELD_OUT_OF_RANGE;
+    if (d->type == FIELD_U8) *(uint8_t *)at = (uint8_t)v;
+    if (d->type == FIELD_U32) *(uint32_t *)at = (uint32_t)v;
+    if (d->type == FIELD_U64) *(uint64_t *)at = v;
+    return FIELD_OK;
+}
+
+static enum field_result parse_bool(const struct field *d, const char *text, void *at)
+{
+    (void)d;
     const bool yes = strcmp(text, "true") == 0;
-    if (!yes && strcmp(text, "false") != 0) return false;
-    memcpy(value, &yes, sizeof yes);
-    return true;
+    if (!yes && strcmp(text, "false") != 0) return FIELD_UNLIKE;
+    memcpy(at, &yes, sizeof yes);
+    return FIELD_OK;
 }
 
-static bool parse_choice(const struct board_field *f, const char *text, void *value)
+static enum field_result parse_text(const struct field *d, const char *text, void *at)
 {
-    for (int i = 0; f->choices[i]; i++) {
-        if (strcmp(f->choices[i], text) != 0) continue;
-        memcpy(value, &i, sizeof i);
-        return true;
+    const size_t len = strlen(text);
+    if (len < 1 || len + 1 > (size_t)d->max) return FIELD_UNLIKE;
+    memcpy(at, text, len + 1);
+    return FIELD_OK;
+}
+
+static enum field_result parse_choice(const struct field *d, const char *text, void *at)
+{
+    for (int i = 0; d->choices[i]; i++) {
+        if (strcmp(d->choices[i], text) != 0) continue;
+        memcpy(at, &i, sizeof i);
+        return FIELD_OK;
     }
-    return false;
+    return FIELD_UNLIKE;
 }
 
 static const struct {
-    parse_fn *parse; /* NULL: the board's own */
-    size_t element;  /* bytes of one element of a sequence */
-    const char *like;
+    enum field_result (*parse)(const struct field *d, const char *text, void *at);
+    size_t element;   /* bytes of one element of a list */
+    const char *like; /* numbers, BOOL */
 } types[] = {
-    [BOARD_FIELD_STRING] = {parse_string, 0, "1 to 31 characters"},
-    [BOARD_FIELD_UINT] = {parse_uint, 0, "an integer"},
-    [BOARD_FIELD_REAL] = {parse_real, 0, "a number"},
-    [BOARD_FIELD_REALS] = {parse_real, sizeof(double), "a number"},
-    [BOARD_FIELD_BOOL] = {parse_bool, 0, "true or false"},
-    [BOARD_FIELD_CHOICE] = {parse_choice, 0, NULL},
-    [BOARD_FIELD_LIST] = {NULL, 0, NULL},
+    [FIELD_REAL] = {parse_real, 0, "a number"},      [FIELD_REALS] = {parse_real, sizeof(double), "a number"},
+    [FIELD_U8] = {parse_integer, 0, "an integer"},   [FIELD_EACH] = {parse_real, sizeof(double), "a number"},
+    [FIELD_U32] = {parse_integer, 0, "an integer"},  [FIELD_U64] = {parse_integer, 0, "an integer"},
+    [FIELD_BOOL] = {parse_bool, 0, "true or false"}, [FIELD_TEXT] = {parse_text, 0, NULL},
+    [FIELD_CHOICE] = {parse_choice, 0, NULL},        [FIELD_LIST] = {NULL, 0, NULL},
 };
 
-static void set_default(const struct board_field *f, void *value)
+enum field_result field_parse(const struct field *d, const char *text, void *at)
 {
-    if (f->type == BOARD_FIELD_STRING) memcpy(value, f->standard_name, strlen(f->standard_name) + 1);
-    else if (f->type == BOARD_FIELD_UINT) *(unsigned *)value = (unsigned)f->standard;
-    else if (f->type == BOARD_FIELD_REAL) *(double *)value = f->standard;
-    else if (f->type == BOARD_FIELD_CHOICE) *(int *)value = (int)f->standard;
-    else if (f->type == BOARD_FIELD_BOOL) *(bool *)value = f->standard != 0.0;
+    return types[d->type].parse(d, text, at);
 }
 
-void board_field_defaults(const struct board_field *fields, unsigned n, void *profile)
+static void append_choices(const struct field *d, char *out, size_t cap)
 {
-    for (unsigned i = 0; i < n; i++) set_default(&fields[i], (char *)profile + fields[i].offset);
+    size_t at = 0;
+    for (unsigned i = 0; d->choices[i] && at < cap; i++) {
+        const char *between = i == 0 ? "" : d->choices[i + 1] ? ", " : " or ";
+        at += (size_t)snprintf(out + at, cap - at, "%s%s", between, d->choices[i]);
+    }
 }
 
-const struct board_field *board_field_find(const struct board_field *fields, unsigned n, const char *key)
+void field_words(const struct field *d, char *out, size_t cap)
 {
-    for (unsigned i = 0; i < n; i++)
-        if (strcmp(fields[i].key, key) == 0) return &fields[i];
+    if (d->type == FIELD_CHOICE) append_choices(d, out, cap);
+    else if (d->type == FIELD_TEXT) (void)snprintf(out, cap, "1 to %d characters", (int)d->max - 1);
+    else (void)snprintf(out, cap, "%s", d->type == FIELD_LIST ? d->like : types[d->type].like);
+}
+
+bool field_is_integer(const struct field *d)
+{
+    return d->type == FIELD_U8 || d->type == FIELD_U32 || d->type == FIELD_U64;
+}
+
+static bool has_reals(const struct field *d)
+{
+    return d->type == FIELD_REAL || d->type == FIELD_REALS || d->type == FIELD_EACH;
+}
+
+bool field_is_number(const struct field *d)
+{
+    return field_is_integer(d) || has_reals(d);
+}
+
+bool field_is_list(const struct field *d)
+{
+    return d->type == FIELD_REALS || d->type == FIELD_EACH || d->type == FIELD_LIST;
+}
+
+unsigned field_elements(const struct field *d)
+{
+    if (!field_is_list(d)) return 1;
+    return d->count ? d->count : (unsigned)d->max;
+}
+
+uint64_t field_integer(const struct field *d, const void *at)
+{
+    return d->type == FIELD_U8    ? *(const uint8_t *)at
+           : d->type == FIELD_U32 ? *(const uint32_t *)at
+                                  : *(const uint64_t *)at;
+}
+
+/* ---- all rows of a table */
+
+static void set_default(const struct field *d, void *section)
+{
+    void *at = (char *)section + d->offset;
+    if (d->type == FIELD_REAL) *(double *)at = d->standard;
+    if (d->type == FIELD_U32) *(uint32_t *)at = (uint32_t)d->standard;
+    if (d->type == FIELD_CHOICE) *(int *)at = (int)d->standard;
+    if (d->type == FIELD_BOOL) *(bool *)at = d->standard != 0.0;
+    if (d->type == FIELD_TEXT) memcpy(at, d->standard_of[0], strlen(d->standard_of[0]) + 1);
+    for (unsigned i = 0; d->type == FIELD_LIST && d->standard_of[i]; i++) (void)d->parse(section, i, d->standard_of[i]);
+}
+
+void fields_default(const struct fields *t, void *section)
+{
+    memset(section, 0, t->size);
+    for (size_t i = 0; i < t->count; i++) set_default(&t->row[i], section);
+}
+
+const struct field *fields_find(const struct fields *t, const char *key)
+{
+    for (size_t i = 0; i < t->count; i++)
+        if (strcmp(t->row[i].key, key) == 0) return &t->row[i];
     return NULL;
 }
 
-bool board_field_is_list(const struct board_field *f)
+bool field_set(const struct field *d, void *section, unsigned index, const char *text, char *why, size_t cap)
 {
-    return f->type == BOARD_FIELD_REALS || f->type == BOARD_FIELD_LIST;
+    char words[256];
+    if (index >= field_elements(d))
+        return why_expected(why, cap, d->key, "more", "up to %u elements", field_elements(d));
+    if (d->type == FIELD_LIST
+            ? d->parse(section, index, text)
+            : field_parse(d, text, (char *)section + d->offset + index * types[d->type].element) == FIELD_OK)
+        return true;
+    field_words(d, words, sizeof words);
+    if (!field_is_number(d)) return why_expected(why, cap, d->key, WHY_TEXT(text), "%s", words);
+    return why_expected(why, cap, d->key, WHY_TEXT(text), "%s from %.10g to %.10g", words, d->min, d->max);
 }
 
-unsigned board_field_elements(const struct board_field *f)
-{
-    if (!board_field_is_list(f)) return 1;
-    return f->count ? f->count : (unsigned)f->max;
-}
-
-static bool is_number(const struct board_field *f)
-{
-    return f->type == BOARD_FIELD_UINT || f->type == BOARD_FIELD_REAL || f->type == BOARD_FIELD_REALS;
-}
-
-static void append_word(char *out, size_t cap, const char *separator, const char *word)
-{
-    const size_t at = strlen(out);
-    (void)snprintf(out + at, cap - at, "%s%s", at ? separator : "", word);
-}
-
-static bool reject_value(const struct board_field *f, const char *text, char *why, size_t cap)
-{
-    char words[200] = "";
-    for (unsigned i = 0; f->type == BOARD_FIELD_CHOICE && f->choices[i]; i++)
-        append_word(words, sizeof words, f->choices[i + 1] ? ", " : " or ", f->choices[i]);
-    const char *like = f->type == BOARD_FIELD_CHOICE ? words
-                       : f->type == BOARD_FIELD_LIST ? f->like
-                                                     : types[f->type].like;
-    if (!is_number(f)) return why_expected(why, cap, f->key, WHY_TEXT(text), "%s", like);
-    return why_expected(why, cap, f->key, WHY_TEXT(text), "%s from %.10g to %.10g", like, f->min, f->max);
-}
-
-static bool reject_key(const struct board_field *fields, unsigned n, const char *key, char *why, size_t cap)
+bool fields_set(const struct fields *t, void *section, const char *key, unsigned index, const char *text, char *why,
+                size_t cap)
 {
     char known[400] = "";
-    for (unsigned i = 0; i < n; i++) why_list_add(known, sizeof known, fields[i].key);
+    const struct field *d = fields_find(t, key);
+    if (d) return field_set(d, section, index, text, why, cap);
+    for (size_t i = 0; i < t->count; i++) why_list_add(known, sizeof known, t->row[i].key);
     return why_fail(why, cap, "%.40s: unknown key; expected one of %s", key, known);
 }
 
-bool board_field_set(const struct board_field *fields, unsigned n, void *profile, const char *key, unsigned index,
-                     const char *text, char *why, size_t cap)
+static bool check_numbers(const struct field *d, const void *at, char *why, size_t cap)
 {
-    const struct board_field *f = board_field_find(fields, n, key);
-    if (!f) return reject_key(fields, n, key, why, cap);
-    if (index >= board_field_elements(f))
-        return why_expected(why, cap, key, "more", "up to %u elements", board_field_elements(f));
-    void *value = (char *)profile + f->offset + index * types[f->type].element;
-    const bool done =
-        f->type == BOARD_FIELD_LIST ? f->parse(profile, index, text) : types[f->type].parse(f, text, value);
-    return done || reject_value(f, text, why, cap);
-}
-
-static double number_of(const struct board_field *f, const void *profile, unsigned index)
-{
-    const char *at = (const char *)profile + f->offset + index * types[f->type].element;
-    unsigned u;
-    double d;
-    if (f->type != BOARD_FIELD_UINT) {
-        memcpy(&d, at, sizeof d);
-        return d;
-    }
-    memcpy(&u, at, sizeof u);
-    return u;
-}
-
-static bool check_numbers(const struct board_field *f, const void *profile, char *why, size_t cap)
-{
-    for (unsigned i = 0; is_number(f) && i < board_field_elements(f); i++) {
-        const double v = number_of(f, profile, i);
-        if (v >= f->min && v <= f->max) continue;
-        return why_expected(why, cap, f->key, WHY_REAL(v), "%.10g to %.10g", f->min, f->max);
+    for (unsigned i = 0; field_is_number(d) && i < field_elements(d); i++) {
+        const double v = has_reals(d) ? ((const double *)at)[i] : (double)field_integer(d, at);
+        if (v >= d->min && v <= d->max) continue;
+        return why_expected(why, cap, d->key, WHY_REAL(v), "%.10g to %.10g", d->min, d->max);
     }
     return true;
 }
 
-bool board_field_check(const struct board_field *fields, unsigned n, const void *profile, char *why, size_t cap)
+bool fields_check(const struct fields *t, const void *section, char *why, size_t cap)
 {
-    for (unsigned i = 0; i < n; i++) {
-        const struct board_field *f = &fields[i];
-        if (f->type == BOARD_FIELD_STRING && f->min > 0 && !*((const char *)profile + f->offset))
-            return why_expected(why, cap, f->key, "none", "a name of 1 to 31 characters");
-        if (!check_numbers(f, profile, why, cap)) return false;
+    for (size_t i = 0; i < t->count; i++) {
+        const struct field *d = &t->row[i];
+        const char *at = (const char *)section + d->offset;
+        if (d->type == FIELD_TEXT && d->min > 0 && !*at)
+            return why_expected(why, cap, d->key, "none", "a name of 1 to 31 characters");
+        if (!check_numbers(d, at, why, cap)) return false;
     }
     return true;
 }

@@ -22,8 +22,7 @@
 #define BOARD_LIFE_FUNCTIONS .init = init, .power_up = power_up, .power_down = power_down, .reset = reset, .sample_until = sample_until
 #define BOARD_COMMON(NAME, PREFIX)                                                                                     \
     .name = #NAME, .size = sizeof(struct NAME),                                                                        \
-    .profile_size = sizeof(struct NAME##_profile), .fields = NAME##_fields, .field_count = PREFIX##_FIELDS,            \
-    .profile_check = NAME##_profile_check, .about = about,                                                             \
+    .fields = &NAME##_fields, .profile_check = NAME##_profile_check, .about = about,                                   \
     .lines = NAME##_lines, .line_count = PREFIX##_LINES, .port_lines = port_lines,                                     \
     .events = NAME##_events, .event_count = PREFIX##_EVENTS,                                                           \
     .parts = parts, .part_count = sizeof parts / sizeof *parts, .controller_faults = controller_faults,                \

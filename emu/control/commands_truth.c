@@ -5,7 +5,7 @@
 
 /* ---- parameters: by the tables of the scenario's keys */
 
-static void add_section(const struct yaml_fields *rows, const void *section, const char *name, cJSON *to)
+static void add_section(const struct fields *rows, const void *section, const char *name, cJSON *to)
 {
     yaml_dump(rows, section, cJSON_AddObjectToObject(to, name));
 }

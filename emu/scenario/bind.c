@@ -9,11 +9,11 @@ static double clamp_value(double v, double lo, double hi)
 }
 
 /* Each parameter has its own stream: one more in the table does not shift the others. */
-static void draw_parameters(const struct yaml_fields *t, const void *deviation, void *value, const struct scenario *s,
+static void draw_parameters(const struct fields *t, const void *deviation, void *value, const struct scenario *s,
                             uint32_t serial, const char *channel)
 {
     size_t offset;
-    const struct yaml_field *d;
+    const struct field *d;
     for (size_t i = 0; (d = yaml_row(t, i, &offset)); i++) {
         char stream[80];
         double sd, v;

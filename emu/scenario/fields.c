@@ -3,7 +3,6 @@
 #include "base/why.h"
 #include "command/exact.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -12,25 +11,25 @@
 
 /* ---- rows */
 
-static size_t rows_of(const struct yaml_fields *t)
+static size_t rows_of(const struct fields *t)
 {
     size_t n = 0;
-    for (size_t i = 0; i < t->count; i++) n += t->row[i].type == YAML_INLINE ? rows_of(t->row[i].sub) : 1;
+    for (size_t i = 0; i < t->count; i++) n += t->row[i].type == FIELD_INLINE ? rows_of(t->row[i].sub) : 1;
     return n;
 }
 
-const struct yaml_field *yaml_row(const struct yaml_fields *t, size_t i, size_t *offset)
+const struct field *yaml_row(const struct fields *t, size_t i, size_t *offset)
 {
     *offset = 0;
     for (size_t k = 0; k < t->count; k++) {
-        const struct yaml_field *d = &t->row[k];
-        const size_t n = d->type == YAML_INLINE ? rows_of(d->sub) : 1;
+        const struct field *d = &t->row[k];
+        const size_t n = d->type == FIELD_INLINE ? rows_of(d->sub) : 1;
         if (i >= n) {
             i -= n;
             continue;
         }
-        if (d->type != YAML_INLINE) return d;
-        const struct yaml_field *in = yaml_row(d->sub, i, offset);
+        if (d->type != FIELD_INLINE) return d;
+        const struct field *in = yaml_row(d->sub, i, offset);
         *offset += d->offset;
         return in;
     }
@@ -40,7 +39,7 @@ const struct yaml_field *yaml_row(const struct yaml_fields *t, size_t i, size_t 
 static const char *key_at(const void *ctx, size_t i)
 {
     size_t offset;
-    const struct yaml_field *d = yaml_row(ctx, i, &offset);
+    const struct field *d = yaml_row(ctx, i, &offset);
     return d ? d->key : NULL;
 }
 
@@ -51,116 +50,52 @@ static const char *choice_at(const void *ctx, size_t i)
 
 /* ---- values */
 
-static bool load_real(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, double *v)
+static bool load_scalar(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *at)
 {
+    char words[256];
     const char *text = yaml_scalar(node);
-    char *end = NULL;
-    if (text) *v = strtod(text, &end);
-    if (!text || end == text || *end || !isfinite(*v)) return yaml_file_expected(f, node, d->key, "a number");
-    if (*v >= d->min && *v <= d->max) return true;
-    return yaml_file_expected(f, node, d->key, "%.10g to %.10g", d->min, d->max);
+    const enum field_result r = text ? field_parse(d, text, at) : FIELD_UNLIKE;
+    if (r == FIELD_OK) return true;
+    if (r == FIELD_OUT_OF_RANGE) return yaml_file_expected(f, node, d->key, "%.10g to %.10g", d->min, d->max);
+    const char *near = text && d->type == FIELD_CHOICE ? yaml_nearest(text, choice_at, d->choices) : NULL;
+    field_words(d, words, sizeof words);
+    return yaml_file_expected(f, node, d->key, "%s%s%s%s%s", words, field_is_integer(d) ? " of 0 or more" : "",
+                              near ? " (nearest: " : "", near ? near : "", near ? ")" : "");
 }
 
-static bool load_integer(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, uint64_t *v)
-{
-    const char *text = yaml_scalar(node);
-    char *end;
-    errno = 0;
-    *v = strtoull(text, &end, 0);
-    if (text[0] < '0' || text[0] > '9' || *end || errno)
-        return yaml_file_expected(f, node, d->key, "an integer of 0 or more");
-    if (d->type == YAML_U64 || ((double)*v >= d->min && (double)*v <= d->max)) return true;
-    return yaml_file_expected(f, node, d->key, "%.10g to %.10g", d->min, d->max);
-}
-
-static bool load_bool(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, bool *v)
-{
-    const char *text = yaml_scalar(node);
-    *v = strcmp(text, "true") == 0;
-    return *v || strcmp(text, "false") == 0 || yaml_file_expected(f, node, d->key, "true or false");
-}
-
-static bool load_text(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, char *v)
-{
-    const char *text = yaml_scalar(node);
-    const size_t len = strlen(text);
-    if (len < 1 || len + 1 > (size_t)d->max)
-        return yaml_file_expected(f, node, d->key, "1 to %d characters", (int)d->max - 1);
-    memcpy(v, text, len + 1);
-    return true;
-}
-
-/* "exact, modulator or direct" */
-static void list_choices(const struct yaml_field *d, char *out, size_t cap)
-{
-    int at = 0;
-    for (unsigned i = 0; d->choices[i] && at >= 0 && (size_t)at < cap; i++) {
-        const char *between = i == 0 ? "" : d->choices[i + 1] ? ", " : " or ";
-        at += snprintf(out + at, cap - (size_t)at, "%s%s", between, d->choices[i]);
-    }
-}
-
-static bool load_choice(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, int *v)
-{
-    const char *text = yaml_scalar(node);
-    char all[256] = "";
-    for (int i = 0; text && d->choices[i]; i++) {
-        *v = i;
-        if (strcmp(d->choices[i], text) == 0) return true;
-    }
-    list_choices(d, all, sizeof all);
-    const char *near = text ? yaml_nearest(text, choice_at, d->choices) : NULL;
-    return yaml_file_expected(f, node, d->key, "%s%s%s%s", all, near ? " (nearest: " : "", near ? near : "",
-                              near ? ")" : "");
-}
-
-static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, double *v)
+static bool load_reals(struct yaml_file *f, const struct yaml_node *node, const struct field *d, double *v)
 {
     unsigned n = 0;
-    if (d->type == YAML_EACH && node->kind == YAML_SCALAR) {
+    if (d->type == FIELD_EACH && node->kind == YAML_SCALAR) {
         for (; n < d->count; n++)
-            if (!load_real(f, node, d, &v[n])) return false;
+            if (!load_scalar(f, node, d, &v[n])) return false;
         return true;
     }
     if (node->kind != YAML_SEQUENCE || yaml_count(node) != d->count) {
         return yaml_file_expected(f, node, d->key, "%s%u numbers (%s)",
-                                  d->type == YAML_EACH ? "one value or a list of " : "a list of ", d->count, d->what);
+                                  d->type == FIELD_EACH ? "one value or a list of " : "a list of ", d->count, d->what);
     }
     for (const struct yaml_item *i = node->first; i; i = i->next)
-        if (!load_real(f, i->value, d, &v[n++])) return false;
+        if (!load_scalar(f, i->value, d, &v[n++])) return false;
     return true;
 }
 
-static bool load_section(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, char *section)
+static bool load_section(struct yaml_file *f, const struct yaml_node *node, const struct field *d, char *section)
 {
     const bool there = true;
     if (d->present) memcpy(section + d->present, &there, sizeof there);
     return yaml_load(f, node, d->key, d->sub, section + d->offset);
 }
 
-static bool load_number(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, void *at)
-{
-    uint64_t integer = 0;
-    if (!load_integer(f, node, d, &integer)) return false;
-    if (d->type == YAML_U8) *(uint8_t *)at = (uint8_t)integer;
-    if (d->type == YAML_U32) *(uint32_t *)at = (uint32_t)integer;
-    if (d->type == YAML_U64) *(uint64_t *)at = integer;
-    return true;
-}
-
-bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const struct yaml_field *d, void *section)
+bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *section)
 {
     void *at = (char *)section + d->offset;
-    if (d->type == YAML_CUSTOM) return d->load(f, node, section);
-    if (d->type == YAML_SECTION) return load_section(f, node, d, section);
-    if (d->type == YAML_REALS || d->type == YAML_EACH) return load_reals(f, node, d, at);
-    if (d->type == YAML_CHOICE) return load_choice(f, node, d, at);
-    if (!yaml_scalar(node))
+    if (d->type == FIELD_CUSTOM) return d->load(f, node, section);
+    if (d->type == FIELD_SECTION) return load_section(f, node, d, section);
+    if (d->type == FIELD_REALS || d->type == FIELD_EACH) return load_reals(f, node, d, at);
+    if (d->type != FIELD_CHOICE && !yaml_scalar(node))
         return yaml_file_expected(f, node, d->key, "one value of up to %u characters", YAML_FILE_TEXT);
-    if (d->type == YAML_REAL) return load_real(f, node, d, at);
-    if (d->type == YAML_BOOL) return load_bool(f, node, d, at);
-    if (d->type == YAML_TEXT) return load_text(f, node, d, at);
-    return load_number(f, node, d, at);
+    return load_scalar(f, node, d, at);
 }
 
 /* ---- sections */
@@ -184,30 +119,39 @@ static bool comes_again(const struct yaml_node *node, const struct yaml_item *of
 }
 
 static bool load_pair(struct yaml_file *f, const struct yaml_node *node, const struct yaml_item *pair,
-                      const struct yaml_fields *t, char *section)
+                      const struct fields *t, char *section, yaml_value_fn *load_value)
 {
     const char *name = yaml_scalar(pair->key);
-    const struct yaml_field *d;
+    const struct field *d;
     size_t offset;
     for (size_t i = 0; name && (d = yaml_row(t, i, &offset)); i++) {
         if (strcmp(d->key, name) != 0) continue;
         if (comes_again(node, pair, name))
             return yaml_file_fail(f, pair->key, name, "expected the key once, got it twice");
-        return yaml_load_value(f, pair->value, d, section + offset);
+        return load_value(f, pair->value, d, section + offset);
     }
     return yaml_fail_unknown(f, pair->key, key_at, t);
 }
 
-bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct yaml_fields *t,
-               void *section)
+bool yaml_load_by(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct fields *t,
+                  void *section, yaml_value_fn *load_value, const char *except)
 {
     const size_t outer = strlen(f->where);
     if (node->kind != YAML_MAPPING) return yaml_file_expected(f, node, *name ? name : NULL, "a mapping `key: value`");
     if (*name) snprintf(f->where + outer, sizeof f->where - outer, "%s.", name);
-    for (const struct yaml_item *i = node->first; i; i = i->next)
-        if (!load_pair(f, node, i, t, section)) return false;
+    for (const struct yaml_item *i = node->first; i; i = i->next) {
+        const char *key = except ? yaml_scalar(i->key) : NULL;
+        if (key && strcmp(key, except) == 0) continue;
+        if (!load_pair(f, node, i, t, section, load_value)) return false;
+    }
     f->where[outer] = '\0';
     return true;
+}
+
+bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct fields *t,
+               void *section)
+{
+    return yaml_load_by(f, node, name, t, section, yaml_load_value, NULL);
 }
 
 /* ---- dump */
@@ -235,67 +179,66 @@ static cJSON *reals_json(const double *v, unsigned count)
     return list;
 }
 
-static cJSON *section_of(const struct yaml_fields *t, const void *section)
+static cJSON *section_of(const struct fields *t, const void *section)
 {
     cJSON *j = cJSON_CreateObject();
     yaml_dump(t, section, j);
     return j;
 }
 
-// Long: one row per type.
-cJSON *yaml_dump_value(const struct yaml_field *d, const void *section)
+static cJSON *texts_json(const struct field *d, const void *section)
+{
+    char text[128];
+    cJSON *list = cJSON_CreateArray();
+    for (unsigned i = 0; d->text(section, i, text, sizeof text); i++)
+        cJSON_AddItemToArray(list, cJSON_CreateString(text));
+    return list;
+}
+
+cJSON *yaml_dump_value(const struct field *d, const void *section)
 {
     const void *at = (const char *)section + d->offset;
-    uint32_t u32;
-    uint64_t u64;
-    double real;
-    int choice;
     switch (d->type) {
-    case YAML_REAL:
-        memcpy(&real, at, sizeof real);
-        return real_of(real);
-    case YAML_U8:
-        return integer_json(*(const uint8_t *)at);
-    case YAML_U32:
-        memcpy(&u32, at, sizeof u32);
-        return integer_json(u32);
-    case YAML_U64:
-        memcpy(&u64, at, sizeof u64);
-        return integer_json(u64);
-    case YAML_BOOL:
+    case FIELD_U8:
+    case FIELD_U32:
+    case FIELD_U64:
+        return integer_json(field_integer(d, at));
+    case FIELD_REAL:
+        return real_of(*(const double *)at);
+    case FIELD_BOOL:
         return cJSON_CreateBool(*(const bool *)at);
-    case YAML_TEXT:
+    case FIELD_TEXT:
         return cJSON_CreateString(at);
-    case YAML_CHOICE:
-        memcpy(&choice, at, sizeof choice);
-        return cJSON_CreateString(d->choices[choice]);
-    case YAML_REALS:
-    case YAML_EACH:
+    case FIELD_CHOICE:
+        return cJSON_CreateString(d->choices[*(const int *)at]);
+    case FIELD_REALS:
+    case FIELD_EACH:
         return reals_json(at, d->count);
-    case YAML_SECTION:
+    case FIELD_LIST:
+        return texts_json(d, section);
+    case FIELD_SECTION:
         return section_of(d->sub, at);
-    case YAML_INLINE:
-    case YAML_CUSTOM:
+    case FIELD_INLINE:
+    case FIELD_CUSTOM:
         break;
     }
     return NULL;
 }
 
-void yaml_dump(const struct yaml_fields *t, const void *section, cJSON *to)
+void yaml_dump(const struct fields *t, const void *section, cJSON *to)
 {
-    const struct yaml_field *d;
+    const struct field *d;
     size_t offset;
     for (size_t i = 0; (d = yaml_row(t, i, &offset)); i++) {
         const char *base = (const char *)section + offset;
-        if (d->type == YAML_CUSTOM && d->dump) d->dump(d, base, to);
-        if (d->type == YAML_CUSTOM) continue;
-        if (d->type == YAML_SECTION && d->present && !*(const bool *)(base + d->present)) continue;
+        if (d->type == FIELD_CUSTOM && d->dump) d->dump(d, base, to);
+        if (d->type == FIELD_CUSTOM) continue;
+        if (d->type == FIELD_SECTION && d->present && !*(const bool *)(base + d->present)) continue;
         cJSON_AddItemToObject(to, d->key, yaml_dump_value(d, base));
     }
 }
 
-void yaml_dump_list(const struct yaml_fields *t, const void *first, size_t size, size_t count, const char *key,
-                    cJSON *to)
+void yaml_dump_list(const struct fields *t, const void *first, size_t size, size_t count, const char *key, cJSON *to)
 {
     cJSON *list = cJSON_AddArrayToObject(to, key);
     for (size_t i = 0; i < count; i++) cJSON_AddItemToArray(list, section_of(t, (const char *)first + i * size));

@@ -6,20 +6,20 @@
 #define MEMS(m) offsetof(struct mems_g, m)
 
 // clang-format off
-static const struct yaml_field bus_rows[] = {
-    {.key = "bitrate_hz",      .type = YAML_U32, .offset = BUS(bitrate_hz),      .max = 1e6, .what = "bit rate, 10000 or more; 0: frames take no time"},
-    {.key = "data_bitrate_hz", .type = YAML_U32, .offset = BUS(data_bitrate_hz), .max = 8e6, .what = "data bit rate of FD frames with bit rate switch; 0: classic bus"},
+static const struct field bus_rows[] = {
+    {.key = "bitrate_hz",      .type = FIELD_U32, .offset = BUS(bitrate_hz),      .max = 1e6, .what = "bit rate, 10000 or more; 0: frames take no time"},
+    {.key = "data_bitrate_hz", .type = FIELD_U32, .offset = BUS(data_bitrate_hz), .max = 8e6, .what = "data bit rate of FD frames with bit rate switch; 0: classic bus"},
 };
-const struct yaml_fields scenario_bus_fields = YAML_FIELDS(bus_rows);
+const struct fields scenario_bus_fields = FIELDS(bus_rows);
 
-static const struct yaml_field buses_rows[] = {
-    {.key = "name", .type = YAML_TEXT, .offset = offsetof(struct scenario_bus, name), .max = 16, .what = "letters, digits and _; the name for `bus` of a unit and `open` of socketcand"},
-    {.type = YAML_INLINE, .offset = offsetof(struct scenario_bus, cfg), .sub = &scenario_bus_fields},
+static const struct field buses_rows[] = {
+    {.key = "name", .type = FIELD_TEXT, .offset = offsetof(struct scenario_bus, name), .max = 16, .what = "letters, digits and _; the name for `bus` of a unit and `open` of socketcand"},
+    {.type = FIELD_INLINE, .offset = offsetof(struct scenario_bus, cfg), .sub = &scenario_bus_fields},
 };
-const struct yaml_fields scenario_buses_fields = YAML_FIELDS(buses_rows);
+const struct fields scenario_buses_fields = FIELDS(buses_rows);
 
-static const struct yaml_field mems_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = MEMS(name), .min = (lo), .max = (hi), .what = (words)}
+static const struct field mems_rows[] = {
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = MEMS(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(u0_v,            -10, 10, "output without acceleration"),
     ROW(kx_v_per_g,      -10, 10, "sensitivity along the axis"),
     ROW(ky_v_per_g,      -10, 10, "sensitivity across, second axis"),
@@ -40,11 +40,11 @@ static const struct yaml_field mems_rows[] = {
     ROW(high_v,          -15, 15, "highest output"),
 #undef ROW
 };
-const struct yaml_fields scenario_mems_fields = YAML_FIELDS(mems_rows);
+const struct fields scenario_mems_fields = FIELDS(mems_rows);
 
 #define QUARTZ(m) offsetof(struct quartz_g, m)
-static const struct yaml_field quartz_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
+static const struct field quartz_rows[] = {
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(scale_a_per_g,      -1, 1,      "current for one g at 30 °C"),
     ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "temperature coefficient"),
     ROW(zero_ug,            -1e6, 1e6,  "bias at 30 °C without the temperature curve"),
@@ -64,10 +64,10 @@ static const struct yaml_field quartz_rows[] = {
     ROW(limit_a,            0, 10,      "largest current of either sign; 0: none"),
 #undef ROW
 };
-const struct yaml_fields scenario_quartz_fields = YAML_FIELDS(quartz_rows);
+const struct fields scenario_quartz_fields = FIELDS(quartz_rows);
 
-static const struct yaml_field afe_numbers[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = YAML_REAL, .offset = AFE(name), .min = (lo), .max = (hi), .what = (words)}
+static const struct field afe_numbers[] = {
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = AFE(name), .min = (lo), .max = (hi), .what = (words)}
     ROW(load_ohm,                 1, 1e6,      "load resistor of a current output"),
     ROW(load_tol_ppm,             -1e5, 1e5,   "deviation from the nominal value"),
     ROW(load_tc_ppm_per_k,        -1e4, 1e4,   "temperature coefficient, from 25 °C"),
@@ -81,12 +81,12 @@ static const struct yaml_field afe_numbers[] = {
     ROW(noise_v_rthz,             0, 1e-2,     "white noise at the load, one-sided density"),
 #undef ROW
 };
-const struct yaml_fields scenario_afe_numbers = YAML_FIELDS(afe_numbers);
+const struct fields scenario_afe_numbers = FIELDS(afe_numbers);
 
 static const char *const inputs[] = {[AFE_CURRENT] = "current", [AFE_VOLTAGE] = "voltage", NULL};
-static const struct yaml_field afe_rows[] = {
-    {.key = "input", .type = YAML_CHOICE, .offset = AFE(input), .choices = inputs, .what = "output of the sensor"},
-    {.type = YAML_INLINE, .sub = &scenario_afe_numbers},
+static const struct field afe_rows[] = {
+    {.key = "input", .type = FIELD_CHOICE, .offset = AFE(input), .choices = inputs, .what = "output of the sensor"},
+    {.type = FIELD_INLINE, .sub = &scenario_afe_numbers},
 };
-const struct yaml_fields scenario_afe_fields = YAML_FIELDS(afe_rows);
+const struct fields scenario_afe_fields = FIELDS(afe_rows);
 // clang-format on

@@ -5,26 +5,26 @@
 #include "scenario/fields.h"
 #include "scenario/scenario.h"
 
-extern const struct yaml_fields scenario_bus_fields;           /* of struct can_bus_cfg: the key `bus` */
-extern const struct yaml_fields scenario_buses_fields;         /* of struct scenario_bus: an element of `buses` */
-extern const struct yaml_fields scenario_site_fields;          /* of struct scenario_site */
-extern const struct yaml_fields scenario_head_fields;          /* of struct head_cfg */
-extern const struct yaml_fields scenario_table_fields;         /* of struct table_cfg */
-extern const struct yaml_fields scenario_axis_of_table_fields; /* of struct table_axis_cfg */
-extern const struct yaml_fields scenario_chamber_fields;       /* of struct chamber_cfg */
-extern const struct yaml_fields scenario_supply_fields;        /* of struct supply_cfg */
-extern const struct yaml_fields scenario_platform_fields;      /* of struct platform_cfg */
-extern const struct yaml_fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
-extern const struct yaml_fields scenario_sway_fields;          /* of struct vehicle_sway */
-extern const struct yaml_fields scenario_spread_fields;        /* of struct scenario_spread */
-extern const struct yaml_fields scenario_afe_fields;           /* of struct afe_cfg */
-extern const struct yaml_fields scenario_afe_numbers;          /* its numbers alone */
-extern const struct yaml_fields scenario_mems_fields;          /* of struct mems_g */
-extern const struct yaml_fields scenario_quartz_fields;        /* of struct quartz_g */
-extern const struct yaml_fields scenario_unit_fields;          /* of struct scenario_unit */
-extern const struct yaml_fields scenario_axis_fields;          /* of struct scenario_unit: its channel X */
-extern const struct yaml_fields scenario_event_fields;         /* of struct scenario_event */
-extern const struct yaml_fields scenario_fields;               /* of struct scenario */
+extern const struct fields scenario_bus_fields;           /* of struct can_bus_cfg: the key `bus` */
+extern const struct fields scenario_buses_fields;         /* of struct scenario_bus: an element of `buses` */
+extern const struct fields scenario_site_fields;          /* of struct scenario_site */
+extern const struct fields scenario_head_fields;          /* of struct head_cfg */
+extern const struct fields scenario_table_fields;         /* of struct table_cfg */
+extern const struct fields scenario_axis_of_table_fields; /* of struct table_axis_cfg */
+extern const struct fields scenario_chamber_fields;       /* of struct chamber_cfg */
+extern const struct fields scenario_supply_fields;        /* of struct supply_cfg */
+extern const struct fields scenario_platform_fields;      /* of struct platform_cfg */
+extern const struct fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
+extern const struct fields scenario_sway_fields;          /* of struct vehicle_sway */
+extern const struct fields scenario_spread_fields;        /* of struct scenario_spread */
+extern const struct fields scenario_afe_fields;           /* of struct afe_cfg */
+extern const struct fields scenario_afe_numbers;          /* its numbers alone */
+extern const struct fields scenario_mems_fields;          /* of struct mems_g */
+extern const struct fields scenario_quartz_fields;        /* of struct quartz_g */
+extern const struct fields scenario_unit_fields;          /* of struct scenario_unit */
+extern const struct fields scenario_axis_fields;          /* of struct scenario_unit: its channel X */
+extern const struct fields scenario_event_fields;         /* of struct scenario_event */
+extern const struct fields scenario_fields;               /* of struct scenario */
 
 void scenario_default(struct scenario *s, const char *path);
 struct scenario_unit scenario_unit_default(unsigned i); /* of the i-th unit, with the first of the boards */
@@ -34,11 +34,11 @@ void scenario_dump_unit(const struct scenario_unit *u, cJSON *to); /* the keys t
 
 /* For the rows of struct scenario. */
 bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void *section);
-void scenario_dump_site(const struct yaml_field *d, const void *section, cJSON *to);
+void scenario_dump_site(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section);
-void scenario_dump_table(const struct yaml_field *d, const void *section, cJSON *to);
+void scenario_dump_table(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section);
-void scenario_dump_vehicle(const struct yaml_field *d, const void *section, cJSON *to);
+void scenario_dump_vehicle(const struct field *d, const void *section, cJSON *to);
 
 struct site scenario_site(const struct scenario_site *s);
 

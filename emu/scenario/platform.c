@@ -8,47 +8,47 @@
 #define SWAY(m)     offsetof(struct vehicle_sway, m)
 
 // clang-format off
-static const struct yaml_field platform_rows[] = {
-    {.key = "step_ns",         .type = YAML_U32, .offset = PLATFORM(step_ns), .min = 1e6, .max = 2e7, .what = "integration step (E1: 10 ms); torques act from the next step"},
-    {.key = "alpha0_deg",      .type = YAML_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "platform azimuth angle alpha at power-on, counter-clockwise from above; the azimuth of its y axis is -alpha"},
-    {.key = "beta0_deg",       .type = YAML_REAL, .offset = PLATFORM(beta0_deg), .min = -10, .max = 10, .what = "beta at power-on, before it is levelled"},
-    {.key = "drift_degph",     .type = YAML_REALS, .offset = PLATFORM(drift_degph), .count = PLATFORM_AXES, .min = -1000, .max = 1000, .what = "systematic drift about x and about z (25: E1 about x, E0 about z)"},
-    {.key = "gm_sigma_degph",  .type = YAML_REAL, .offset = PLATFORM(gm_sigma_degph), .max = 100, .what = "random drift of each axis, Gauss-Markov, standard deviation (E1); 0: none"},
-    {.key = "gm_tau_s",        .type = YAML_REAL, .offset = PLATFORM(gm_tau_s), .min = 0.1, .max = 1e7, .what = "correlation time of the random drift (E1: mu = 0.001 1/s)"},
-    {.key = "gm_from_zero",    .type = YAML_BOOL, .offset = PLATFORM(gm_from_zero), .what = "random drift starts at 0 instead of a draw from its distribution"},
-    {.key = "torquer_scale",   .type = YAML_REALS, .offset = PLATFORM(torquer_scale), .count = PLATFORM_AXES, .min = -0.5, .max = 0.5, .what = "relative error of the torquers about x and z (E0; 0.001 is typical of a good one)"},
-    {.key = "torquer_limit_dps", .type = YAML_REAL, .offset = PLATFORM(torquer_limit_dps), .min = 0.01, .max = 100, .what = "largest rate of a torquer (E0)"},
-    {.key = "level_tilt_arcmin", .type = YAML_REALS, .offset = PLATFORM(level_tilt_arcmin), .count = 2, .min = -600, .max = 600, .what = "offset of the level sensors in beta and gamma (E1)"},
-    {.key = "level_repeat_arcmin", .type = YAML_REAL, .offset = PLATFORM(level_repeat_arcmin), .max = 60, .what = "random offset of the level sensors at each setting, standard deviation (E1: 1')"},
-    {.key = "angle_zero_arcmin", .type = YAML_REAL, .offset = PLATFORM(angle_zero_arcmin), .min = -600, .max = 600, .what = "offset of the angle sensor (E1)"},
-    {.key = "angle_set_arcmin", .type = YAML_REAL, .offset = PLATFORM(angle_set_arcmin), .max = 60, .what = "random setting error at each setting, standard deviation (E1)"},
-    {.key = "angle_read_arcmin", .type = YAML_REAL, .offset = PLATFORM(angle_read_arcmin), .max = 60, .what = "random encoder error at each setting, standard deviation (E0)"},
-    {.key = "angle_step_arcsec", .type = YAML_REAL, .offset = PLATFORM(angle_step_arcsec), .max = 3600, .what = "resolution of the encoder (E0); 0: none"},
+static const struct field platform_rows[] = {
+    {.key = "step_ns",         .type = FIELD_U32, .offset = PLATFORM(step_ns), .min = 1e6, .max = 2e7, .what = "integration step (E1: 10 ms); torques act from the next step"},
+    {.key = "alpha0_deg",      .type = FIELD_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "platform azimuth angle alpha at power-on, counter-clockwise from above; the azimuth of its y axis is -alpha"},
+    {.key = "beta0_deg",       .type = FIELD_REAL, .offset = PLATFORM(beta0_deg), .min = -10, .max = 10, .what = "beta at power-on, before it is levelled"},
+    {.key = "drift_degph",     .type = FIELD_REALS, .offset = PLATFORM(drift_degph), .count = PLATFORM_AXES, .min = -1000, .max = 1000, .what = "systematic drift about x and about z (25: E1 about x, E0 about z)"},
+    {.key = "gm_sigma_degph",  .type = FIELD_REAL, .offset = PLATFORM(gm_sigma_degph), .max = 100, .what = "random drift of each axis, Gauss-Markov, standard deviation (E1); 0: none"},
+    {.key = "gm_tau_s",        .type = FIELD_REAL, .offset = PLATFORM(gm_tau_s), .min = 0.1, .max = 1e7, .what = "correlation time of the random drift (E1: mu = 0.001 1/s)"},
+    {.key = "gm_from_zero",    .type = FIELD_BOOL, .offset = PLATFORM(gm_from_zero), .what = "random drift starts at 0 instead of a draw from its distribution"},
+    {.key = "torquer_scale",   .type = FIELD_REALS, .offset = PLATFORM(torquer_scale), .count = PLATFORM_AXES, .min = -0.5, .max = 0.5, .what = "relative error of the torquers about x and z (E0; 0.001 is typical of a good one)"},
+    {.key = "torquer_limit_dps", .type = FIELD_REAL, .offset = PLATFORM(torquer_limit_dps), .min = 0.01, .max = 100, .what = "largest rate of a torquer (E0)"},
+    {.key = "level_tilt_arcmin", .type = FIELD_REALS, .offset = PLATFORM(level_tilt_arcmin), .count = 2, .min = -600, .max = 600, .what = "offset of the level sensors in beta and gamma (E1)"},
+    {.key = "level_repeat_arcmin", .type = FIELD_REAL, .offset = PLATFORM(level_repeat_arcmin), .max = 60, .what = "random offset of the level sensors at each setting, standard deviation (E1: 1')"},
+    {.key = "angle_zero_arcmin", .type = FIELD_REAL, .offset = PLATFORM(angle_zero_arcmin), .min = -600, .max = 600, .what = "offset of the angle sensor (E1)"},
+    {.key = "angle_set_arcmin", .type = FIELD_REAL, .offset = PLATFORM(angle_set_arcmin), .max = 60, .what = "random setting error at each setting, standard deviation (E1)"},
+    {.key = "angle_read_arcmin", .type = FIELD_REAL, .offset = PLATFORM(angle_read_arcmin), .max = 60, .what = "random encoder error at each setting, standard deviation (E0)"},
+    {.key = "angle_step_arcsec", .type = FIELD_REAL, .offset = PLATFORM(angle_step_arcsec), .max = 3600, .what = "resolution of the encoder (E0); 0: none"},
 };
-const struct yaml_fields scenario_platform_fields = YAML_FIELDS(platform_rows);
+const struct fields scenario_platform_fields = FIELDS(platform_rows);
 
-static const struct yaml_field sway_rows[] = {
-    {.key = "pitch_arcmin", .type = YAML_REAL, .offset = SWAY(pitch_arcmin), .max = 600, .what = "amplitude of the pitch about its mean"},
-    {.key = "pitch_s",      .type = YAML_REAL, .offset = SWAY(pitch_s), .max = 1000, .what = "period; 0: none"},
-    {.key = "roll_arcmin",  .type = YAML_REAL, .offset = SWAY(roll_arcmin), .max = 600, .what = "amplitude of the roll about its mean"},
-    {.key = "roll_s",       .type = YAML_REAL, .offset = SWAY(roll_s), .max = 1000, .what = "period; 0: none"},
-    {.key = "east_mg",      .type = YAML_REAL, .offset = SWAY(east_mg), .max = 100, .what = "amplitude of the acceleration to the east at the level sensors (1 mg = 0.00980665 m/s²); 0.3 makes gyrocompassing impossible"},
-    {.key = "east_s",       .type = YAML_REAL, .offset = SWAY(east_s), .max = 1000, .what = "period; 0: none"},
-    {.key = "north_mg",     .type = YAML_REAL, .offset = SWAY(north_mg), .max = 100, .what = "amplitude of the acceleration to the north"},
-    {.key = "north_s",      .type = YAML_REAL, .offset = SWAY(north_s), .max = 1000, .what = "period; 0: none"},
+static const struct field sway_rows[] = {
+    {.key = "pitch_arcmin", .type = FIELD_REAL, .offset = SWAY(pitch_arcmin), .max = 600, .what = "amplitude of the pitch about its mean"},
+    {.key = "pitch_s",      .type = FIELD_REAL, .offset = SWAY(pitch_s), .max = 1000, .what = "period; 0: none"},
+    {.key = "roll_arcmin",  .type = FIELD_REAL, .offset = SWAY(roll_arcmin), .max = 600, .what = "amplitude of the roll about its mean"},
+    {.key = "roll_s",       .type = FIELD_REAL, .offset = SWAY(roll_s), .max = 1000, .what = "period; 0: none"},
+    {.key = "east_mg",      .type = FIELD_REAL, .offset = SWAY(east_mg), .max = 100, .what = "amplitude of the acceleration to the east at the level sensors (1 mg = 0.00980665 m/s²); 0.3 makes gyrocompassing impossible"},
+    {.key = "east_s",       .type = FIELD_REAL, .offset = SWAY(east_s), .max = 1000, .what = "period; 0: none"},
+    {.key = "north_mg",     .type = FIELD_REAL, .offset = SWAY(north_mg), .max = 100, .what = "amplitude of the acceleration to the north"},
+    {.key = "north_s",      .type = FIELD_REAL, .offset = SWAY(north_s), .max = 1000, .what = "period; 0: none"},
 };
-const struct yaml_fields scenario_sway_fields = YAML_FIELDS(sway_rows);
+const struct fields scenario_sway_fields = FIELDS(sway_rows);
 
-static const struct yaml_field vehicle_rows[] = {
-    {.key = "heading_deg", .type = YAML_REAL, .offset = VEHICLE(heading_deg), .min = -360, .max = 360, .what = "heading at power-on, from north, clockwise"},
-    {.key = "pitch_deg",   .type = YAML_REAL, .offset = VEHICLE(pitch_deg), .min = -30, .max = 30, .what = "pitch, nose up"},
-    {.key = "roll_deg",    .type = YAML_REAL, .offset = VEHICLE(roll_deg), .min = -30, .max = 30, .what = "roll, right side down"},
-    {.key = "sway",        .type = YAML_SECTION, .offset = VEHICLE(sway), .sub = &scenario_sway_fields, .what = "sway of a parked vehicle in wind, from power-on"},
-    {.key = "turn_dps",    .type = YAML_REAL, .offset = VEHICLE(turn_dps), .min = 0.01, .max = 30, .what = "rate of a change of heading (E0)"},
-    {.key = "tilt_dps",    .type = YAML_REAL, .offset = VEHICLE(tilt_dps), .min = 0.01, .max = 30, .what = "rate of a change of pitch and roll (E0)"},
-    {.key = "accel_mps2",  .type = YAML_REAL, .offset = VEHICLE(accel_mps2), .min = 0.01, .max = 30, .what = "acceleration of a change of speed (E0)"},
+static const struct field vehicle_rows[] = {
+    {.key = "heading_deg", .type = FIELD_REAL, .offset = VEHICLE(heading_deg), .min = -360, .max = 360, .what = "heading at power-on, from north, clockwise"},
+    {.key = "pitch_deg",   .type = FIELD_REAL, .offset = VEHICLE(pitch_deg), .min = -30, .max = 30, .what = "pitch, nose up"},
+    {.key = "roll_deg",    .type = FIELD_REAL, .offset = VEHICLE(roll_deg), .min = -30, .max = 30, .what = "roll, right side down"},
+    {.key = "sway",        .type = FIELD_SECTION, .offset = VEHICLE(sway), .sub = &scenario_sway_fields, .what = "sway of a parked vehicle in wind, from power-on"},
+    {.key = "turn_dps",    .type = FIELD_REAL, .offset = VEHICLE(turn_dps), .min = 0.01, .max = 30, .what = "rate of a change of heading (E0)"},
+    {.key = "tilt_dps",    .type = FIELD_REAL, .offset = VEHICLE(tilt_dps), .min = 0.01, .max = 30, .what = "rate of a change of pitch and roll (E0)"},
+    {.key = "accel_mps2",  .type = FIELD_REAL, .offset = VEHICLE(accel_mps2), .min = 0.01, .max = 30, .what = "acceleration of a change of speed (E0)"},
 };
-const struct yaml_fields scenario_vehicle_fields = YAML_FIELDS(vehicle_rows);
+const struct fields scenario_vehicle_fields = FIELDS(vehicle_rows);
 // clang-format on
 
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section)
@@ -58,7 +58,7 @@ bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, vo
     return yaml_load(f, node, "vehicle", &scenario_vehicle_fields, &((struct scenario *)section)->lab.vehicle);
 }
 
-void scenario_dump_vehicle(const struct yaml_field *d, const void *section, cJSON *to)
+void scenario_dump_vehicle(const struct field *d, const void *section, cJSON *to)
 {
     const struct lab_cfg *lab = &((const struct scenario *)section)->lab;
     if (lab->platform.present) yaml_dump(&scenario_vehicle_fields, &lab->vehicle, cJSON_AddObjectToObject(to, d->key));

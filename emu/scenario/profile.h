@@ -1,4 +1,4 @@
-/* Board profiles from YAML: proto/profiles/NAME.yaml, field by field through board_field_set(), then checked.
+/* Board profiles from YAML: proto/profiles/NAME.yaml, field by field through field_set(), then checked.
  *
  * A file says of which board it is: `board: psd1`, `board: pik5`; without that key it is a PSA-2. */
 #ifndef PSABENCH_SCENARIO_PROFILE_H
@@ -6,8 +6,6 @@
 
 #include "scenario/fields.h"
 #include "unit/boards.h"
-
-#include <cjson/cJSON.h>
 
 /* The default of the board's type, then what the file says. *board: the file's, of which type *p is; whether it is the one that
  * is expected is the caller's decision, board_name_takes(). False with one line in why: path:line:column: what is wrong, what is
@@ -23,14 +21,5 @@ bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, c
                          void *profile);
 bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
                         const void *profile);
-
-/* Every field by its key, as YAML takes it again. */
-cJSON *profile_dump(const struct board_type *type, const void *profile);
-
-/* A field as a row of a table of keys; a LIST is CUSTOM without functions. */
-struct yaml_field profile_yaml_field(const struct board_field *d);
-
-/* One of them. */
-cJSON *profile_dump_field(const struct board_field *d, const void *profile);
 
 #endif

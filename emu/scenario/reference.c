@@ -9,7 +9,7 @@
 /* A mapping of the scenario: where it is, what it is, its rows, and a struct with the defaults. */
 struct chapter {
     const char *path, *words;
-    const struct yaml_fields *rows;
+    const struct fields *rows;
     size_t offset; /* of its struct in struct scenario; none: no defaults */
 };
 
@@ -39,25 +39,24 @@ static const struct chapter chapters[] = {
 // clang-format on
 
 /* "number, V/g" */
-static void print_kind(FILE *out, const struct yaml_field *d)
+static void print_kind(FILE *out, const struct field *d)
 {
     static const char *const kinds[] = {
-        [YAML_REAL] = "number",         [YAML_U8] = "integer",      [YAML_U32] = "integer",     [YAML_U64] = "integer",
-        [YAML_BOOL] = "boolean",        [YAML_TEXT] = "text",       [YAML_CHOICE] = "one word", [YAML_REALS] = "list",
-        [YAML_EACH] = "number or list", [YAML_SECTION] = "mapping", [YAML_CUSTOM] = "see there"};
+        [FIELD_REAL] = "number",     [FIELD_U8] = "integer",      [FIELD_U32] = "integer",
+        [FIELD_U64] = "integer",     [FIELD_BOOL] = "boolean",    [FIELD_TEXT] = "text",
+        [FIELD_CHOICE] = "one word", [FIELD_REALS] = "list",      [FIELD_EACH] = "number or list",
+        [FIELD_LIST] = "list",       [FIELD_SECTION] = "mapping", [FIELD_CUSTOM] = "see there"};
     const char *unit = yaml_unit(d->key);
     fprintf(out, "%s%s%s", kinds[d->type], *unit ? ", " : "", unit);
     if (d->count) fprintf(out, " (%u)", d->count);
 }
 
-static void print_range(FILE *out, const struct yaml_field *d)
+static void print_range(FILE *out, const struct field *d)
 {
-    const bool number = d->type == YAML_REAL || d->type == YAML_U8 || d->type == YAML_U32 || d->type == YAML_U64 ||
-                        d->type == YAML_REALS || d->type == YAML_EACH;
-    if (d->type == YAML_U64) fprintf(out, "0 to 2^64 - 1");
-    else if (number && d->min < d->max) fprintf(out, "%.10g to %.10g", d->min, d->max);
-    if (d->type == YAML_TEXT && d->max > 0) fprintf(out, "1 to %d characters", (int)d->max - 1);
-    for (unsigned i = 0; d->type == YAML_CHOICE && d->choices[i]; i++)
+    if (d->type == FIELD_U64) fprintf(out, "0 to 2^64 - 1");
+    else if (field_is_number(d) && d->min < d->max) fprintf(out, "%.10g to %.10g", d->min, d->max);
+    if (d->type == FIELD_TEXT && d->max > 0) fprintf(out, "1 to %d characters", (int)d->max - 1);
+    for (unsigned i = 0; d->type == FIELD_CHOICE && d->choices[i]; i++)
         fprintf(out, "%s`%s`", i ? ", " : "", d->choices[i]);
 }
 
@@ -68,7 +67,7 @@ static void print_heading(FILE *out, const char *title, const char *words)
 }
 
 /* value: the default, deleted here; NULL: none. */
-static void print_row(FILE *out, const struct yaml_field *d, cJSON *value)
+static void print_row(FILE *out, const struct field *d, cJSON *value)
 {
     char *text = value ? cJSON_PrintUnformatted(value) : NULL;
     fprintf(out, "| `%s` | ", d->key);
@@ -83,13 +82,13 @@ static void print_row(FILE *out, const struct yaml_field *d, cJSON *value)
 static void print_chapter(FILE *out, const struct chapter *c, const struct scenario *s)
 {
     const char *section = c->offset == NO_DEFAULTS ? NULL : (const char *)s + c->offset;
-    const struct yaml_field *d;
+    const struct field *d;
     char title[64] = "Scenario";
     size_t offset;
     if (*c->path) snprintf(title, sizeof title, "`%s`", c->path);
     print_heading(out, title, c->words);
     for (size_t i = 0; (d = yaml_row(c->rows, i, &offset)); i++)
-        print_row(out, d, section && d->type != YAML_SECTION ? yaml_dump_value(d, section + offset) : NULL);
+        print_row(out, d, section && d->type != FIELD_SECTION ? yaml_dump_value(d, section + offset) : NULL);
     fprintf(out, "\n");
 }
 
@@ -97,17 +96,15 @@ static void print_profile(FILE *out, const struct board_type *t)
 {
     char title[96], words[96];
     union board_profile_store p;
-    memset(&p, 0, sizeof p);
-    t->profile_default(&p);
+    fields_default(t->fields, &p);
     snprintf(title, sizeof title, "%s: `units[].profile_set`, and a file of proto/profiles", t->title);
     snprintf(words, sizeof words, "The board. The defaults are those of `%s`.", t->profile_name);
     print_heading(out, title, words);
-    for (unsigned i = 0; i < t->field_count; i++) {
-        struct yaml_field d = profile_yaml_field(&t->fields[i]);
-        if (d.type == YAML_CUSTOM || d.type == YAML_TEXT) d.max = d.min = 0; /* of elements and characters */
-        if (d.type == YAML_CUSTOM) d.type = YAML_REALS;
+    for (size_t i = 0; i < t->fields->count; i++) {
+        struct field d = t->fields->row[i];
+        d.max = d.type == FIELD_TEXT ? 0 : d.max; /* of characters */
         d.count = 0;
-        print_row(out, &d, profile_dump_field(&t->fields[i], &p));
+        print_row(out, &d, yaml_dump_value(&t->fields->row[i], &p));
     }
     fprintf(out, "\n");
 }

@@ -74,7 +74,7 @@ static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, 
     return yaml_file_fail(f, node, "buses", "expected bus or buses, got both");
 }
 
-static void dump_buses(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_buses(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario *s = section;
     yaml_dump_list(&scenario_buses_fields, s->bus, sizeof *s->bus, s->bus_count, d->key, to);
@@ -87,7 +87,7 @@ static bool load_units(struct yaml_file *f, const struct yaml_node *node, void *
     return scenario_load_units(f, node, section);
 }
 
-static void dump_units(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_units(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario *s = section;
     cJSON *list = cJSON_AddArrayToObject(to, d->key);
@@ -101,10 +101,10 @@ static void dump_units(const struct yaml_field *d, const void *section, cJSON *t
 enum { SPREAD_ROWS = 64 };
 
 /* The rows of numbers, each from 0 to the width of its range: deviations. */
-static size_t make_deviation_rows(const struct yaml_fields *t, struct yaml_field *out)
+static size_t make_deviation_rows(const struct fields *t, struct field *out)
 {
     size_t n = 0, offset;
-    for (const struct yaml_field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
+    for (const struct field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
         out[n] = *d;
         out[n].offset += offset;
         out[n].min = 0;
@@ -116,31 +116,31 @@ static size_t make_deviation_rows(const struct yaml_fields *t, struct yaml_field
 static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario *s = section;
-    struct yaml_field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
-    const struct yaml_fields afe_fields = {afe, make_deviation_rows(&scenario_afe_numbers, afe)};
+    struct field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
+    const struct fields afe_fields = {.row = afe, .count = make_deviation_rows(&scenario_afe_numbers, afe)};
     const size_t n = make_deviation_rows(&scenario_mems_fields, rows);
-    rows[n] = (struct yaml_field){
-        .key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
-    const struct yaml_fields all = {rows, n + 1};
+    rows[n] = (struct field){
+        .key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
+    const struct fields all = {.row = rows, .count = n + 1};
     return yaml_load(f, node, "spread", &all, &s->spread);
 }
 
-static void dump_spread(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_spread(const struct field *d, const void *section, cJSON *to)
 {
     yaml_dump(&scenario_spread_fields, &((const struct scenario *)section)->spread,
               cJSON_AddObjectToObject(to, d->key));
 }
 
 // clang-format off
-static const struct yaml_field spread_afe_rows[] = {
-    {.type = YAML_INLINE, .sub = &scenario_afe_numbers},
+static const struct field spread_afe_rows[] = {
+    {.type = FIELD_INLINE, .sub = &scenario_afe_numbers},
 };
-static const struct yaml_fields spread_afe_fields = YAML_FIELDS(spread_afe_rows);
-static const struct yaml_field spread_rows[] = {
-    {.type = YAML_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
-    {.key = "afe", .type = YAML_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "parameters of the analog chain"},
+static const struct fields spread_afe_fields = FIELDS(spread_afe_rows);
+static const struct field spread_rows[] = {
+    {.type = FIELD_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
+    {.key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "parameters of the analog chain"},
 };
-const struct yaml_fields scenario_spread_fields = YAML_FIELDS(spread_rows);
+const struct fields scenario_spread_fields = FIELDS(spread_rows);
 // clang-format on
 
 /* ---- timeline and faults */
@@ -163,18 +163,18 @@ static bool load_args(struct yaml_file *f, const struct yaml_node *node, void *s
     return args && print_args(f, node, args, section);
 }
 
-static void dump_args(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_args(const struct field *d, const void *section, cJSON *to)
 {
     cJSON_AddRawToObject(to, d->key, ((const struct scenario_event *)section)->args);
 }
 
 // clang-format off
-static const struct yaml_field event_rows[] = {
-    {.key = "at_s", .type = YAML_REAL, .offset = offsetof(struct scenario_event, at_s), .max = 1e6, .what = "simulated time since power-on"},
-    {.key = "cmd",  .type = YAML_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
-    {.key = "args", .type = YAML_CUSTOM, .load = load_args, .dump = dump_args, .what = "arguments of the command, a mapping"},
+static const struct field event_rows[] = {
+    {.key = "at_s", .type = FIELD_REAL, .offset = offsetof(struct scenario_event, at_s), .max = 1e6, .what = "simulated time since power-on"},
+    {.key = "cmd",  .type = FIELD_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
+    {.key = "args", .type = FIELD_CUSTOM, .load = load_args, .dump = dump_args, .what = "arguments of the command, a mapping"},
 };
-const struct yaml_fields scenario_event_fields = YAML_FIELDS(event_rows);
+const struct fields scenario_event_fields = FIELDS(event_rows);
 // clang-format on
 
 static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_node *node, const char *list,
@@ -221,13 +221,13 @@ static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void 
     return true;
 }
 
-static void dump_timeline(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_timeline(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario_events *t = &((const struct scenario *)section)->timeline;
     yaml_dump_list(&scenario_event_fields, t->event, sizeof *t->event, t->count, d->key, to);
 }
 
-static void dump_faults(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_faults(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario_events *t = &((const struct scenario *)section)->faults;
     cJSON *list = cJSON_AddArrayToObject(to, d->key);
@@ -242,32 +242,32 @@ static bool load_version(struct yaml_file *f, const struct yaml_node *node, void
     return yaml_scalar(node) || yaml_file_expected(f, node, "version", "a word");
 }
 
-static void dump_version(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_version(const struct field *d, const void *section, cJSON *to)
 {
     (void)section;
     cJSON_AddStringToObject(to, d->key, VERSION);
 }
 
 // clang-format off
-static const struct yaml_field scenario_rows[] = {
-    {.key = "version", .type = YAML_CUSTOM, .load = load_version, .dump = dump_version, .what = "version of the program that wrote the file; ignored"},
-    {.key = "seed",  .type = YAML_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "random seed; each unit and noise source has its own stream"},
-    {.key = "start", .type = YAML_BOOL, .offset = SCENARIO(start), .what = "write the frame forms and start the units from the bench's own node, 1 ms after power-on"},
-    {.key = "bus",   .type = YAML_CUSTOM, .load = load_bus, .what = "the only bus, `can0`"},
-    {.key = "buses", .type = YAML_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
-    {.key = "site",  .type = YAML_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "location of the bench"},
-    {.key = "head",  .type = YAML_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
-    {.key = "table", .type = YAML_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
-    {.key = "chamber", .type = YAML_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
-    {.key = "supply", .type = YAML_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
-    {.key = "platform", .type = YAML_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
-    {.key = "vehicle", .type = YAML_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "the vehicle that carries the platform"},
-    {.key = "spread", .type = YAML_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations from unit to unit"},
-    {.key = "units", .type = YAML_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
-    {.key = "timeline", .type = YAML_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands, each at its time"},
-    {.key = "faults", .type = YAML_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
+static const struct field scenario_rows[] = {
+    {.key = "version", .type = FIELD_CUSTOM, .load = load_version, .dump = dump_version, .what = "version of the program that wrote the file; ignored"},
+    {.key = "seed",  .type = FIELD_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "random seed; each unit and noise source has its own stream"},
+    {.key = "start", .type = FIELD_BOOL, .offset = SCENARIO(start), .what = "write the frame forms and start the units from the bench's own node, 1 ms after power-on"},
+    {.key = "bus",   .type = FIELD_CUSTOM, .load = load_bus, .what = "the only bus, `can0`"},
+    {.key = "buses", .type = FIELD_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
+    {.key = "site",  .type = FIELD_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "location of the bench"},
+    {.key = "head",  .type = FIELD_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
+    {.key = "table", .type = FIELD_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
+    {.key = "chamber", .type = FIELD_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
+    {.key = "supply", .type = FIELD_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
+    {.key = "platform", .type = FIELD_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
+    {.key = "vehicle", .type = FIELD_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "the vehicle that carries the platform"},
+    {.key = "spread", .type = FIELD_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations from unit to unit"},
+    {.key = "units", .type = FIELD_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
+    {.key = "timeline", .type = FIELD_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands, each at its time"},
+    {.key = "faults", .type = FIELD_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
 };
-const struct yaml_fields scenario_fields = YAML_FIELDS(scenario_rows);
+const struct fields scenario_fields = FIELDS(scenario_rows);
 // clang-format on
 
 void scenario_default(struct scenario *s, const char *path)

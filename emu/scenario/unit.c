@@ -64,7 +64,7 @@ static bool already_loaded(struct yaml_file *f, const struct yaml_node *node, vo
     return true;
 }
 
-static void dump_board(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_board(const struct field *d, const void *section, cJSON *to)
 {
     cJSON_AddStringToObject(to, d->key, ((const struct scenario_unit *)section)->board->name);
 }
@@ -85,10 +85,10 @@ static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, 
 }
 
 /* Every field: the dump needs no other file. */
-static void dump_profile_set(const struct yaml_field *d, const void *section, cJSON *to)
+static void dump_profile_set(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario_unit *u = section;
-    cJSON_AddItemToObject(to, d->key, profile_dump(u->board->type, &u->profile));
+    yaml_dump(u->board->type->fields, &u->profile, cJSON_AddObjectToObject(to, d->key));
 }
 
 /* ---- the tables */
@@ -102,33 +102,36 @@ struct entry {
 static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct entry *e = section;
-    const struct yaml_field row = {
-        .key = "count", .type = YAML_U32, .offset = offsetof(struct entry, count), .min = 1, .max = SCENARIO_UNITS_MAX};
+    const struct field row = {.key = "count",
+                              .type = FIELD_U32,
+                              .offset = offsetof(struct entry, count),
+                              .min = 1,
+                              .max = SCENARIO_UNITS_MAX};
     return yaml_load_value(f, node, &row, e);
 }
 
 // clang-format off
 static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", NULL};
 #define AXIS(i)                                                                                                        \
-    {.key = "sensor", .type = YAML_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
+    {.key = "sensor", .type = FIELD_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
      .what = "type of the sensor; `none`: the channel is shorted"},                                                                        \
-    {.type = YAML_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
-    {.key = "quartz", .type = YAML_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
+    {.type = FIELD_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
+    {.key = "quartz", .type = FIELD_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
      .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
-    {.key = "at_m", .type = YAML_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
+    {.key = "at_m", .type = FIELD_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
      .what = "position of the sensor in the unit's case, x, y, z"},                                                   \
-    {.key = "afe", .type = YAML_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
+    {.key = "afe", .type = FIELD_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
      .what = "the analog chain"}
-static const struct yaml_field axis_x_rows[] = {AXIS(0)}, axis_y_rows[] = {AXIS(1)}, axis_z_rows[] = {AXIS(2)};
-const struct yaml_fields scenario_axis_fields = YAML_FIELDS(axis_x_rows);
-static const struct yaml_fields axis_y_fields = YAML_FIELDS(axis_y_rows), axis_z_fields = YAML_FIELDS(axis_z_rows);
+static const struct field axis_x_rows[] = {AXIS(0)}, axis_y_rows[] = {AXIS(1)}, axis_z_rows[] = {AXIS(2)};
+const struct fields scenario_axis_fields = FIELDS(axis_x_rows);
+static const struct fields axis_y_fields = FIELDS(axis_y_rows), axis_z_fields = FIELDS(axis_z_rows);
 
-static const struct yaml_field axes_rows[] = {
-    {.key = "x", .type = YAML_SECTION, .sub = &scenario_axis_fields, .what = "channel X; its sensor has the unit's axes x, y, z"},
-    {.key = "y", .type = YAML_SECTION, .sub = &axis_y_fields, .what = "channel Y; its sensor has the unit's axes y, z, x"},
-    {.key = "z", .type = YAML_SECTION, .sub = &axis_z_fields, .what = "channel Z; its sensor has the unit's axes z, x, y"},
+static const struct field axes_rows[] = {
+    {.key = "x", .type = FIELD_SECTION, .sub = &scenario_axis_fields, .what = "channel X; its sensor has the unit's axes x, y, z"},
+    {.key = "y", .type = FIELD_SECTION, .sub = &axis_y_fields, .what = "channel Y; its sensor has the unit's axes y, z, x"},
+    {.key = "z", .type = FIELD_SECTION, .sub = &axis_z_fields, .what = "channel Z; its sensor has the unit's axes z, x, y"},
 };
-static const struct yaml_fields axes_fields = YAML_FIELDS(axes_rows);
+static const struct fields axes_fields = FIELDS(axes_rows);
 
 static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
                                      [LAB_PLATFORM] = "platform", NULL};
@@ -136,32 +139,32 @@ static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table",
 static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
 
-static const struct yaml_field unit_rows[] = {
-    {.key = "name",   .type = YAML_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` it includes a number format, `%02u`"},
-    {.key = "count",  .type = YAML_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "number of equal units; name, node and serial count up"},
-    {.key = "board",  .type = YAML_CUSTOM, .load = already_loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
-    {.key = "profile", .type = YAML_CUSTOM, .load = already_loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
-    {.key = "profile_set", .type = YAML_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
-    {.key = "bus",    .type = YAML_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of the unit's bus (the first)"},
-    {.key = "node",   .type = YAML_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id, unique on a bus (the board's default, or the next free one)"},
-    {.key = "serial", .type = YAML_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number, unique; noise and spread are drawn from it"},
-    {.key = "frame_form", .type = YAML_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
-    {.key = "spread", .type = YAML_BOOL, .offset = UNIT(spread), .what = "draw parameters from the scenario's `spread`"},
-    {.key = "axes",   .type = YAML_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
-    {.key = "level",  .type = YAML_TEXT, .offset = UNIT(level), .max = 32, .what = "gyro unit: name of the PSA-2 that reads its level sensors"},
-    {.key = "on",     .type = YAML_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "mounting place"},
-    {.key = "lever_arm_m", .type = YAML_REALS, .offset = UNIT(cfg.mounting.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
-    {.key = "misalignment_arcsec", .type = YAML_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "misalignment of the case in the mount, about x, y, z"},
-    {.key = "tau_case_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
-    {.key = "tau_element_s", .type = YAML_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
-    {.key = "temp_degc", .type = YAML_EACH, .offset = UNIT(cfg.temp_degc), .count = UNIT_TEMPS, .min = -60, .max = 125, .what = "temperature of X, Y, Z and the board without a chamber"},
-    {.key = "adc_chain", .type = YAML_CHOICE, .offset = UNIT(cfg.board.adc_chain), .choices = chains, .what = "model of the accelerometer converters: [ADS1282](chips/ads1282.md)"},
-    {.key = "adc_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.adc_noise_scale), .max = 1000, .what = "scale of the converters' noise; 1: published noise, 0: none"},
-    {.key = "temp_noise_scale", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_noise_scale), .max = 1000, .what = "scale of the temperature converter's noise"},
-    {.key = "temp_adc_offset_v", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_offset_v), .min = -0.1, .max = 0.1, .what = "offset of the temperature converter before calibration"},
-    {.key = "temp_adc_gain_error", .type = YAML_REAL, .offset = UNIT(cfg.board.temp_adc_gain_error), .min = -0.1, .max = 0.1, .what = "relative gain error of the temperature converter before calibration"},
+static const struct field unit_rows[] = {
+    {.key = "name",   .type = FIELD_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` it includes a number format, `%02u`"},
+    {.key = "count",  .type = FIELD_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "number of equal units; name, node and serial count up"},
+    {.key = "board",  .type = FIELD_CUSTOM, .load = already_loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
+    {.key = "profile", .type = FIELD_CUSTOM, .load = already_loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
+    {.key = "profile_set", .type = FIELD_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
+    {.key = "bus",    .type = FIELD_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of the unit's bus (the first)"},
+    {.key = "node",   .type = FIELD_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id, unique on a bus (the board's default, or the next free one)"},
+    {.key = "serial", .type = FIELD_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number, unique; noise and spread are drawn from it"},
+    {.key = "frame_form", .type = FIELD_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
+    {.key = "spread", .type = FIELD_BOOL, .offset = UNIT(spread), .what = "draw parameters from the scenario's `spread`"},
+    {.key = "axes",   .type = FIELD_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
+    {.key = "level",  .type = FIELD_TEXT, .offset = UNIT(level), .max = 32, .what = "gyro unit: name of the PSA-2 that reads its level sensors"},
+    {.key = "on",     .type = FIELD_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "mounting place"},
+    {.key = "lever_arm_m", .type = FIELD_REALS, .offset = UNIT(cfg.mounting.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
+    {.key = "misalignment_arcsec", .type = FIELD_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "misalignment of the case in the mount, about x, y, z"},
+    {.key = "tau_case_s", .type = FIELD_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
+    {.key = "tau_element_s", .type = FIELD_REAL, .offset = UNIT(cfg.tau_element_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},
+    {.key = "temp_degc", .type = FIELD_EACH, .offset = UNIT(cfg.temp_degc), .count = UNIT_TEMPS, .min = -60, .max = 125, .what = "temperature of X, Y, Z and the board without a chamber"},
+    {.key = "adc_chain", .type = FIELD_CHOICE, .offset = UNIT(cfg.board.adc_chain), .choices = chains, .what = "model of the accelerometer converters: [ADS1282](chips/ads1282.md)"},
+    {.key = "adc_noise_scale", .type = FIELD_REAL, .offset = UNIT(cfg.board.adc_noise_scale), .max = 1000, .what = "scale of the converters' noise; 1: published noise, 0: none"},
+    {.key = "temp_noise_scale", .type = FIELD_REAL, .offset = UNIT(cfg.board.temp_noise_scale), .max = 1000, .what = "scale of the temperature converter's noise"},
+    {.key = "temp_adc_offset_v", .type = FIELD_REAL, .offset = UNIT(cfg.board.temp_adc_offset_v), .min = -0.1, .max = 0.1, .what = "offset of the temperature converter before calibration"},
+    {.key = "temp_adc_gain_error", .type = FIELD_REAL, .offset = UNIT(cfg.board.temp_adc_gain_error), .min = -0.1, .max = 0.1, .what = "relative gain error of the temperature converter before calibration"},
 };
-const struct yaml_fields scenario_unit_fields = YAML_FIELDS(unit_rows);
+const struct fields scenario_unit_fields = FIELDS(unit_rows);
 // clang-format on
 
 /* ---- what no table can say */
@@ -317,7 +320,7 @@ void scenario_unit_board(struct scenario_unit *u, const struct board_name *name)
 {
     u->board = name;
     unit_cfg_type(&u->cfg, name->type);
-    name->type->profile_default(&u->profile);
+    fields_default(name->type->fields, &u->profile);
 }
 
 /* The k-th of the units that an entry represents. */

@@ -35,6 +35,6 @@ bool board_name_takes(const struct board_name *board, const struct board_name *p
 
 const char *board_profile_name(const struct board_type *type, const void *profile)
 {
-    const struct board_field *f = board_field_find(type->fields, type->field_count, "name");
+    const struct field *f = fields_find(type->fields, "name");
     return f ? (const char *)profile + f->offset : type->profile_name;
 }

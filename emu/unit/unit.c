@@ -155,8 +155,7 @@ static void init_board(struct unit *u, struct sched *s)
     union board_profile_store defaults;
     const void *profile = u->cfg.profile;
     if (!profile) {
-        memset(&defaults, 0, sizeof defaults);
-        u->type->profile_default(&defaults);
+        fields_default(u->type->fields, &defaults);
         profile = &defaults;
     }
     snprintf(u->profile, sizeof u->profile, "%s", board_profile_name(u->type, profile));

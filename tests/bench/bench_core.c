@@ -176,7 +176,8 @@ static const struct bench_case {
 static void power_up(struct bench *n, enum ads1282_chain chain)
 {
     const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc};
-    const struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(n, 0, sizeof *n);
@@ -193,7 +194,7 @@ static void power_up_psd1(struct bench *n, enum ads1282_chain chain)
     const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     for (unsigned i = 0; i < 3; i++) {
         u.afe[i] = afe_nominal(AFE_VOLTAGE);
         u.afe[i].divider_ratio = 1.0;

@@ -104,7 +104,7 @@ static void power_up(struct words *w)
     const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     for (unsigned i = 0; i < AXES; i++) {
         u.afe[i] = afe_nominal(AFE_VOLTAGE);
         u.afe[i].divider_ratio = 1.0;

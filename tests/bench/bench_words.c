@@ -136,7 +136,8 @@ static void frame_over(struct words *w)
 static void power_up(struct words *w)
 {
     const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc};
-    const struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     sched_init(&w->s);

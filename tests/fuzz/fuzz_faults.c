@@ -246,7 +246,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct world w;
     struct script s = script_of(data, size);
-    const struct psa2_profile profile = psa2_profile_default();
+    struct psa2_profile profile;
+    fields_default(&psa2_fields, &profile);
     const struct board_io io = {.ctx = &w, .accel = accel, .temp_degc = degc};
     struct board_cfg unit = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     unit.adc_chain = (enum ads1282_chain)(script_byte(&s) % 3);

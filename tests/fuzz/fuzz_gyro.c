@@ -243,7 +243,7 @@ static void begin(struct world *w)
     struct gyro_profile p;
     memset(w, 0, sizeof *w);
     sched_init(&w->s);
-    gyro_profile_default(&p);
+    fields_default(&gyro_fields, &p);
     gyro_board.init(&w->b.base, &p, &cfg, &io, &w->s);
     w->b.host = (struct gyro_host){.ctx = w, .reading = on_reading, .condition = on_condition};
     w->ear.sink = (struct trace_sink){.steps = listener_steps, .ctx = &w->ear};

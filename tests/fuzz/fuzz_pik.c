@@ -204,7 +204,8 @@ static void begin(struct world *w, const struct pik_profile *p)
 
 static struct pik_profile profile_of(struct script *s)
 {
-    struct pik_profile p = pik_profile_default();
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
     const uint8_t b = script_byte(s);
     char why[300];
     if (b & 1) {

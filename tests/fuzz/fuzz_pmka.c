@@ -208,7 +208,7 @@ static struct pmka_profile profile_of(struct script *s)
     struct pmka_profile p;
     const uint8_t b = script_byte(s);
     char why[300];
-    pmka_profile_default(&p);
+    fields_default(&pmka_fields, &p);
     p.beat_periods = 8 + (b & 15);
     p.zero_periods = 1 + (b & 1);
     if (b & 16) p.rotation = PMKA_PROGRAM;

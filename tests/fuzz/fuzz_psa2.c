@@ -178,7 +178,8 @@ static void step(struct world *w, struct script *s)
 
 static void power_up(struct world *w, bool watched)
 {
-    const struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);

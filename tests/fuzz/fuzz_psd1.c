@@ -244,7 +244,7 @@ static void power_up(struct world *w, bool watched, bool host)
     const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     if (!host) p.host_strobe_ns = 0;
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(w, 0, sizeof *w);

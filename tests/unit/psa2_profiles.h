@@ -19,7 +19,7 @@ static inline char *psa2_trim(char *s)
 static inline void psa2_set(struct psa2_profile *p, const char *key, unsigned index, char *text)
 {
     char why[200];
-    if (!psa2_profile_set(p, key, index, psa2_trim(text), why, sizeof why)) fail_msg("%s", why);
+    if (!fields_set(&psa2_fields, p, key, index, psa2_trim(text), why, sizeof why)) fail_msg("%s", why);
 }
 
 static inline struct psa2_profile psa2_profile_file(const char *name)

@@ -117,9 +117,13 @@ static const struct board_controller_fault controller_faults[] = {
 static const char *const capabilities[] = {"level", NULL};
 
 const struct board_type gyro_board = {
-    BOARD_COMMON(gyro, GYRO),     .title = "Gyro unit",
-    .profile_name = "gyro",       .profile_default = gyro_profile_default,
-    .capabilities = capabilities, .node = 9,
-    .period_ns = period_ns,       .frame_line = GYRO_LINE_STEP,
-    .pulse_line = GYRO_LINE_STEP, .platform = &platform,
+    BOARD_COMMON(gyro, GYRO),
+    .title = "Gyro unit",
+    .profile_name = "gyro",
+    .capabilities = capabilities,
+    .node = 9,
+    .period_ns = period_ns,
+    .frame_line = GYRO_LINE_STEP,
+    .pulse_line = GYRO_LINE_STEP,
+    .platform = &platform,
 };

@@ -13,10 +13,8 @@ struct gyro_profile {
     double stuck_turn_deg, stuck_moved_deg;
 };
 
-#define GYRO_FIELDS 7u
-extern const struct board_field gyro_fields[GYRO_FIELDS];
+extern const struct fields gyro_fields;
 
-void gyro_profile_default(void *profile);
 bool gyro_profile_check(const void *profile, char *why, size_t cap);
 
 #endif

@@ -8,11 +8,6 @@
 
 /* ---- profile ---- */
 
-static void profile_default(void *profile)
-{
-    *(struct pik_profile *)profile = pik_profile_default();
-}
-
 static void about(const void *profile, char *out, size_t cap)
 {
     const struct pik_profile *p = profile;
@@ -33,7 +28,9 @@ static void set_load(struct board_cfg *cfg, double ohm)
 
 static void cfg_default(struct board_cfg *cfg)
 {
-    set_load(cfg, pik_profile_default().ra_ohm);
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
+    set_load(cfg, p.ra_ohm);
 }
 
 static void cfg_profiled(struct board_cfg *cfg, const void *profile)
@@ -188,7 +185,6 @@ const struct board_type pik_board = {
     BOARD_COMMON(pik, PIK),
     .title = "PIK",
     .profile_name = "pik",
-    .profile_default = profile_default,
     .cfg_default = cfg_default,
     .cfg_profiled = cfg_profiled,
     .node = 8,

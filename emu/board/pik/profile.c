@@ -2,19 +2,18 @@
 
 #include "base/why.h"
 
-#define NAME(standard, words) BOARD_FIELD_NAME(struct pik_profile, standard, words)
-#define ROW(name, kind, standard, lo, hi, words)                                                                       \
-    BOARD_FIELD_ROW(struct pik_profile, name, kind, standard, lo, hi, words)
+#define NAME(...) FIELD_NAME(struct pik_profile, __VA_ARGS__)
+#define ROW(...)  FIELD_ROW(struct pik_profile, __VA_ARGS__)
 
 // clang-format off
-const struct board_field pik_fields[PIK_FIELDS] = {
+static const struct field rows[] = {
     NAME("pik", "Name of the profile."),
     ROW(uref_v, REAL, 10.0, 0.1, 100, "UREF, either sign: what the reset applies. E0 (10 V is PMKA's)."),
     ROW(rr_ohm, REAL, 10e3, 10, 1e8, "Rr, from UREF to the integrator. E0."),
     ROW(rin_ohm, REAL, 20e3, 10, 1e8, "RIN, from the input to the integrator. E0."),
-    ROW(clock_hz, UINT, 3480, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
-    ROW(grid, UINT, 16, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
-    ROW(recovery_ticks, UINT, 15, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
+    ROW(clock_hz, U32, 3480, 100, 1000000, "1/TCLK: a reset lasts one period. E0, K = Rr/(RIN UREF TCLK) is the article's."),
+    ROW(grid, U32, 16, 1, 64, "Instants in TCLK at which a reset may begin: the control unit's faster clock. E0."),
+    ROW(recovery_ticks, U32, 15, 0, 1024, "Rest of a reference after its reset, in TCLK/grid: 15 of 16 allow 3 % more than F at 10 V. E0."),
     ROW(switch_on_ns, REAL, 0, 0, 1e6, "Delay of switching the reference on. E0."),
     ROW(switch_off_ns, REAL, 0, 0, 1e6, "Delay of switching it off; only the difference enters the charge. E0."),
     ROW(input_off_ns, REAL, 0, 0, 1e6, "Time for which a reset disconnects the input; the article's does not. E0."),
@@ -22,11 +21,11 @@ const struct board_field pik_fields[PIK_FIELDS] = {
     ROW(uc_v, REAL, 3.75, 0.01, 100, "Uc, either sign: where a reset begins. E0."),
     ROW(rail_v, REAL, 12.0, 0.1, 200, "Limit of the integrator's output, either sign. E0."),
     ROW(ra_ohm, REAL, 735.0, 1, 1e6, "Ra, load of a sensor with current output, if the scenario gives none: 0.94 and 0.98 V/g of 1.28 mA/g. E0."),
-    ROW(look_ticks, UINT, 10, 1, 100000, "TCLK/grid between two samples of the model's input. E0."),
-    ROW(latch_us, UINT, 10000, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
-    ROW(strobe_ns, UINT, 1000, 20, 1000000, "Default strobe length of a bus cycle. E0."),
-    ROW(strobe_min_ns, UINT, 200, 0, 1000000, "Shortest strobe that reads or writes. E0."),
-    ROW(latch_ns, UINT, 10000, 1, 1000000, "Length of the pulse on LATCH. E0."),
+    ROW(look_ticks, U32, 10, 1, 100000, "TCLK/grid between two samples of the model's input. E0."),
+    ROW(latch_us, U32, 10000, 0, 1000000, "Period at which the counters are latched and sent; 0: only by strobe. E0."),
+    ROW(strobe_ns, U32, 1000, 20, 1000000, "Default strobe length of a bus cycle. E0."),
+    ROW(strobe_min_ns, U32, 200, 0, 1000000, "Shortest strobe that reads or writes. E0."),
+    ROW(latch_ns, U32, 10000, 1, 1000000, "Length of the pulse on LATCH. E0."),
     ROW(k_error_pct, REAL, 0.15, 0, 10, "Error of the coefficient that a specimen keeps from -10 to 60 degC; 0: no limit. E1, range E0."),
     ROW(uref_tol_ppm, REAL, 300.0, 0, 1e5, "Standard deviation of UREF. E0."),
     ROW(uref_tc_ppm_per_k, REAL, 6.0, 0, 1e4, "Standard deviation of its temperature coefficient. E0."),
@@ -41,14 +40,8 @@ const struct board_field pik_fields[PIK_FIELDS] = {
     ROW(noise_v_rthz, REAL, 5e-6, 0, 1, "White noise of the integrator, at the input, one-sided. E0."),
     ROW(saturated_ms, REAL, 100.0, 0, 1e5, "Time without saturation after which its flag and EMCY end. E0."),
 };
+const struct fields pik_fields = FIELDS_OF(struct pik_profile, rows);
 // clang-format on
-
-struct pik_profile pik_profile_default(void)
-{
-    struct pik_profile p = {.name = ""};
-    board_field_defaults(pik_fields, PIK_FIELDS, &p);
-    return p;
-}
 
 double pik_profile_k_hz_per_v(const struct pik_profile *p)
 {
@@ -145,7 +138,7 @@ bool pik_profile_check(const void *profile, char *why, size_t cap)
 {
     const struct pik_profile *p = profile;
     const double k = pik_profile_k_hz_per_v(p);
-    if (!board_field_check(pik_fields, PIK_FIELDS, p, why, cap)) return false;
+    if (!fields_check(&pik_fields, p, why, cap)) return false;
     if (k > 20e3 || k < 1.0)
         return why_fail(why, cap, "rr_ohm: expected K = Rr/(RIN UREF TCLK) of 1 to 20000 Hz/V, got %g Hz/V with %g", k,
                         p->rr_ohm);

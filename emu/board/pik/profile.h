@@ -9,7 +9,6 @@
 
 #include <stdint.h>
 
-#define PIK_FIELDS       32u
 #define PIK_SPAN_K       35.0 /* either side of 25 degC: where a specimen keeps k_error_pct, E0 */
 #define PIK_LOOKS_HZ_MAX 50000
 #define PIK_LATE_NS_MAX  190000.0 /* by which a pulse may be known late: within the lag of the trace */
@@ -41,10 +40,7 @@ struct pik_profile {
     double saturated_ms; /* the flag and EMCY stay at least so long */
 };
 
-extern const struct board_field pik_fields[PIK_FIELDS];
-
-/* The profile "pik". */
-struct pik_profile pik_profile_default(void);
+extern const struct fields pik_fields;
 
 /* Of the nominal parts: Hz/V; V s of a pulse at the input, 1/K; pulses/s at most, either sign; V by which a reset moves the
  * integrator; pulses at which a reset begins. */

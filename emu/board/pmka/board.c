@@ -216,7 +216,6 @@ const struct board_type pmka_board = {
     BOARD_COMMON(pmka, PMKA),
     .title = "PMKA",
     .profile_name = "pmka",
-    .profile_default = pmka_profile_default,
     .cfg_default = cfg_default,
     .capabilities = capabilities,
     .node = 7,

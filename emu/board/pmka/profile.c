@@ -2,24 +2,23 @@
 
 #include "base/why.h"
 
-#define NAME(standard, words) BOARD_FIELD_NAME(struct pmka_profile, standard, words)
-#define ROW(name, kind, standard, lo, hi, words)                                                                       \
-    BOARD_FIELD_ROW(struct pmka_profile, name, kind, standard, lo, hi, words)
-#define PICK(name, standard, list, words) BOARD_FIELD_PICK(struct pmka_profile, name, standard, list, words)
+#define NAME(...) FIELD_NAME(struct pmka_profile, __VA_ARGS__)
+#define ROW(...)  FIELD_ROW(struct pmka_profile, __VA_ARGS__)
+#define PICK(...) FIELD_PICK(struct pmka_profile, __VA_ARGS__)
 
 static const char *const rotations[] = {"program", "autonomous", NULL};
 
 // clang-format off
-const struct board_field pmka_fields[PMKA_FIELDS] = {
+static const struct field rows[] = {
     NAME("pmka", "name of the profile"),
-    ROW(ts_ns, UINT, 4800000, 1000000, 20000000, "sample period Ts, even; a reset lasts half of it (article 3: 4.8 ms, E1)"),
-    ROW(mux_step_ns, UINT, 100000, 10000, 500000, "between the sampling instants of X, Y, Z and K, one converter serves all (E0)"),
-    ROW(hold_ns, UINT, 2000, 100, 100000, "time from the sampling instant to the start of conversion (E0)"),
-    ROW(convert_ns, UINT, 50000, 1000, 100000, "time from the sampling instant to the code (E0)"),
-    ROW(key_gap_ns, UINT, 20000, 1000, 100000, "keys move this long before and after K is sampled (E0)"),
-    ROW(start_ns, UINT, 10000000, 1000, 1000000000, "from Res or power-up to the first sampling instant (E0)"),
-    ROW(strobe_ns, UINT, 800, 10, 1000000, "default strobe of the parallel bus (E0)"),
-    ROW(strobe_min_ns, UINT, 200, 10, 1000000, "shortest strobe that is answered (E0)"),
+    ROW(ts_ns, U32, 4800000, 1000000, 20000000, "sample period Ts, even; a reset lasts half of it (article 3: 4.8 ms, E1)"),
+    ROW(mux_step_ns, U32, 100000, 10000, 500000, "between the sampling instants of X, Y, Z and K, one converter serves all (E0)"),
+    ROW(hold_ns, U32, 2000, 100, 100000, "time from the sampling instant to the start of conversion (E0)"),
+    ROW(convert_ns, U32, 50000, 1000, 100000, "time from the sampling instant to the code (E0)"),
+    ROW(key_gap_ns, U32, 20000, 1000, 100000, "keys move this long before and after K is sampled (E0)"),
+    ROW(start_ns, U32, 10000000, 1000, 1000000000, "from Res or power-up to the first sampling instant (E0)"),
+    ROW(strobe_ns, U32, 800, 10, 1000000, "default strobe of the parallel bus (E0)"),
+    ROW(strobe_min_ns, U32, 200, 10, 1000000, "shortest strobe that is answered (E0)"),
     ROW(uref_v, REAL, 10.0, 1, 20, "UREF (article 3: 10 V, E1)"),
     ROW(r_in_ohm, REAL, 20e3, 1e3, 1e6, "RIN (E3: twice Rr, so that (3) and (6) hold)"),
     ROW(rr_ohm, REAL, 10e3, 1e3, 1e6, "Rr (article 3: 10 kohm, E1)"),
@@ -46,16 +45,11 @@ const struct board_field pmka_fields[PMKA_FIELDS] = {
     ROW(rom_ct_sd_ppm, REAL, 0.2, 0, 100, "error of CT as the factory measured it (E0), beside the ROM's resolution of 0.24 ppm"),
     PICK(rotation, PMKA_AUTONOMOUS, rotations,
          "control of the calibration after Res: the computer's program (E1) or the board itself (E0)"),
-    ROW(beat_periods, UINT, 200, 8, 60000, "length of a beat tau, in Ts (E0)"),
-    ROW(zero_periods, UINT, 120, 1, 60000, "Ts of a beat with the input at ground, for the zero (E0)"),
+    ROW(beat_periods, U32, 200, 8, 60000, "length of a beat tau, in Ts (E0)"),
+    ROW(zero_periods, U32, 120, 1, 60000, "Ts of a beat with the input at ground, for the zero (E0)"),
 };
+const struct fields pmka_fields = FIELDS_OF(struct pmka_profile, rows);
 // clang-format on
-
-void pmka_profile_default(void *profile)
-{
-    *(struct pmka_profile *)profile = (struct pmka_profile){.name = ""};
-    board_field_defaults(pmka_fields, PMKA_FIELDS, profile);
-}
 
 static bool check_time(const struct pmka_profile *p, char *why, size_t cap)
 {
@@ -104,6 +98,6 @@ static bool check_beat(const struct pmka_profile *p, char *why, size_t cap)
 bool pmka_profile_check(const void *profile, char *why, size_t cap)
 {
     const struct pmka_profile *p = profile;
-    return board_field_check(pmka_fields, PMKA_FIELDS, p, why, cap) && check_time(p, why, cap) &&
-           check_reset(p, why, cap) && check_beat(p, why, cap);
+    return fields_check(&pmka_fields, p, why, cap) && check_time(p, why, cap) && check_reset(p, why, cap) &&
+           check_beat(p, why, cap);
 }

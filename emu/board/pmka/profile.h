@@ -40,10 +40,7 @@ struct pmka_profile {
 
 #define PMKA_BEAT_SPARE 6u /* periods of a beat beside those for the zero, at least */
 
-#define PMKA_FIELDS 36u
-extern const struct board_field pmka_fields[PMKA_FIELDS];
-
-void pmka_profile_default(void *profile); /* struct pmka_profile, as proto/profiles/pmka.yaml */
+extern const struct fields pmka_fields;
 
 /* True if a board can run it; else a sentence that begins with the field. */
 bool pmka_profile_check(const void *profile, char *why, size_t cap);

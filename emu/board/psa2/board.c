@@ -8,11 +8,6 @@
 
 /* ---- profile ---- */
 
-static void profile_default(void *profile)
-{
-    *(struct psa2_profile *)profile = psa2_profile_default();
-}
-
 static void about(const void *profile, char *out, size_t cap)
 {
     const struct psa2_profile *p = profile;
@@ -171,7 +166,6 @@ const struct board_type psa2_board = {
     BOARD_COMMON(psa2, PSA2),
     .title = "PSA-2",
     .profile_name = "article",
-    .profile_default = profile_default,
     .capabilities = capabilities,
     .node = 5,
     .frame_forms = 4,

@@ -87,52 +87,39 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
     return true;
 }
 
-#define NAME(standard, words) BOARD_FIELD_NAME(struct psa2_profile, standard, words)
-#define ROW(name, kind, standard, lo, hi, words)                                                                       \
-    BOARD_FIELD_ROW(struct psa2_profile, name, kind, standard, lo, hi, words)
+#define NAME(...) FIELD_NAME(struct psa2_profile, __VA_ARGS__)
+#define ROW(...)  FIELD_ROW(struct psa2_profile, __VA_ARGS__)
 
 // clang-format off
-const struct board_field psa2_fields[PSA2_FIELDS] = {
+static const struct field rows[] = {
     NAME("article", "Name of the profile."),
-    ROW(fclk_hz, UINT, 4096000, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
-    ROW(temp_clkin_hz, UINT, 7680000, 1e5, 1e7, "Clock of the temperature converter."),
-    ROW(sclk_hz, UINT, 1024000, 64e3, 2.048e6, "SClk of both serial ports."),
-    ROW(line_hz, UINT, 2000000, 1e5, 1e9, "The output CLK is line_hz / line_div."),
-    ROW(line_div, UINT, 1, 1, 65536, "Divider of the output CLK."),
-    ROW(word_bits, UINT, 32, 16, 32, "Bits of an output word: 16, 24 or 32."),
-    ROW(lead_in_clk, UINT, 8, 0, 255, "CLK periods from the fall of INT to the first bit."),
-    {.key = "word", .type = BOARD_FIELD_LIST, .offset = offsetof(struct psa2_profile, word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
-     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text},
-    ROW(code_bits, UINT, 24, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
-    ROW(read_bits, UINT, 24, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
+    ROW(fclk_hz, U32, 4096000, 1e6, 4.1e6, "Crystal GOCh, clock of the accelerometer converters: 4.096 MHz at most by their data sheet, and the tolerance of a crystal above it."),
+    ROW(temp_clkin_hz, U32, 7680000, 1e5, 1e7, "Clock of the temperature converter."),
+    ROW(sclk_hz, U32, 1024000, 64e3, 2.048e6, "SClk of both serial ports."),
+    ROW(line_hz, U32, 2000000, 1e5, 1e9, "The output CLK is line_hz / line_div."),
+    ROW(line_div, U32, 1, 1, 65536, "Divider of the output CLK."),
+    ROW(word_bits, U32, 32, 16, 32, "Bits of an output word: 16, 24 or 32."),
+    ROW(lead_in_clk, U32, 8, 0, 255, "CLK periods from the fall of INT to the first bit."),
+    {.key = "word", .type = FIELD_LIST, .offset = offsetof(struct psa2_profile, word), .min = 0, .max = 3, .what = "Order of the words X, Y, Z, T, lowest address first.",
+     .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text,
+     .standard_of = (const char *const[]){"X", "Y", "Z", "T", NULL}},
+    ROW(code_bits, U32, 24, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
+    ROW(read_bits, U32, 24, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
     ROW(gate_sclk, BOOL, true, 0, 1, "SClk reaches only the group addressed."),
-    ROW(temp_channels, UINT, 4, 0, 8, "Temperature inputs scanned in turn; 0: none."),
+    ROW(temp_channels, U32, 4, 0, 8, "Temperature inputs scanned in turn; 0: none."),
     ROW(adc_is_1281, BOOL, false, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
     ROW(adc_vref_v, REAL, 5.0, 0.5, 5.5, "Reference of the accelerometer converters."),
-    ROW(adc_pga, UINT, 2, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
+    ROW(adc_pga, U32, 2, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
     ROW(temp_vref_v, REAL, 2.5, 0.5, 5.5, "Reference of the temperature converter."),
     ROW(temp_sensor_a_per_k, REAL, 1e-6, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
     ROW(temp_load_ohm, REAL, 10e3, 0, 1e6, "Load resistor RTD of a temperature sensor."),
-    {.key = "setup", .type = BOARD_FIELD_LIST, .offset = offsetof(struct psa2_profile, setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
-     .like = "a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text},
+    {.key = "setup", .type = FIELD_LIST, .offset = offsetof(struct psa2_profile, setup), .min = 1, .max = PSA2_SETUP_MAX, .what = "Transfers after Res, each on its data-ready event.",
+     .like = "a step such as \"DRD_A write_A 41 00 56\" or \"DRD_T sync_T\"", .parse = parse_step, .text = step_text,
+     .standard_of = (const char *const[]){"DRD_A write_A 41 00 56", "DRD_T write_T 50 00 02", "DRD_T write_T 50 00 04",
+                                          "DRD_T write_T 53 00 82", "DRD_T sync_T", "DRD_A sync_A", NULL}},
 };
+const struct fields psa2_fields = FIELDS_OF(struct psa2_profile, rows);
 // clang-format on
-
-struct psa2_profile psa2_profile_default(void)
-{
-    struct psa2_profile p = {
-        .word = {PSA2_WORD_X, PSA2_WORD_Y, PSA2_WORD_Z, PSA2_WORD_T},
-        .setup = {{PSA2_ON_DRD_A, PSA2_WRITE_A, {0x41, 0x00, 0x56}, 3},
-                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x02}, 3},
-                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x50, 0x00, 0x04}, 3},
-                  {PSA2_ON_DRD_T, PSA2_WRITE_T, {0x53, 0x00, 0x82}, 3},
-                  {PSA2_ON_DRD_T, PSA2_SYNC_T, {0}, 0},
-                  {PSA2_ON_DRD_A, PSA2_SYNC_A, {0}, 0}},
-        .setup_count = 6,
-    };
-    board_field_defaults(psa2_fields, PSA2_FIELDS, &p);
-    return p;
-}
 
 unsigned psa2_frame_clks(const struct psa2_profile *p)
 {
@@ -283,12 +270,7 @@ static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
 bool psa2_profile_check(const void *profile, char *why, size_t cap)
 {
     const struct psa2_profile *p = profile;
-    return board_field_check(psa2_fields, PSA2_FIELDS, p, why, cap) && check_words(p, why, cap) &&
-           check_setup(p, why, cap) && check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
+    return fields_check(&psa2_fields, p, why, cap) && check_words(p, why, cap) && check_setup(p, why, cap) &&
+           check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
            check_int_low(p, why, cap) && check_times(p, why, cap);
-}
-
-bool psa2_profile_set(struct psa2_profile *p, const char *key, unsigned index, const char *text, char *why, size_t cap)
-{
-    return board_field_set(psa2_fields, PSA2_FIELDS, p, key, index, text, why, cap);
 }

@@ -57,14 +57,8 @@ struct psa2_profile {
     unsigned setup_count;
 };
 
-#define PSA2_FIELDS 20u
-extern const struct board_field psa2_fields[PSA2_FIELDS];
-
-/* The profile "article" of the design document. */
-struct psa2_profile psa2_profile_default(void);
-
-/* board_field_set() of this table. Elements: of word "X" ... "T", of setup "DRD_A write_A 41 00 56", "DRD_T sync_T". */
-bool psa2_profile_set(struct psa2_profile *p, const char *key, unsigned index, const char *text, char *why, size_t cap);
+/* Elements: of word "X" ... "T", of setup "DRD_A write_A 41 00 56", "DRD_T sync_T". The default is "article". */
+extern const struct fields psa2_fields;
 
 /* CLK periods of INT low: lead-in + words + gaps. */
 unsigned psa2_frame_clks(const struct psa2_profile *p);

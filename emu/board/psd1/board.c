@@ -189,7 +189,6 @@ const struct board_type psd1_board = {
     BOARD_COMMON(psd1, PSD1),
     .title = "PSD-1",
     .profile_name = "psd1",
-    .profile_default = psd1_profile_default,
     .cfg_default = cfg_default,
     .node = 6,
     .period_ns = psd1_profile_period_ns,

@@ -9,7 +9,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define PSD1_FIELDS    36u
 #define PSD1_PERIOD_NS 800 /* of 1M25: E1 */
 
 enum psd1_part { PSD1_AD7712, PSD1_AD7710, PSD1_AD7711 };
@@ -44,9 +43,7 @@ struct psd1_profile {
     double adc_offset_sd_v, adc_gain_sd_ppm; /* before calibration */
 };
 
-extern const struct board_field psd1_fields[PSD1_FIELDS];
-
-void psd1_profile_default(void *profile);
+extern const struct fields psd1_fields;
 
 /* Control words: UC1 calibrates, UC2 works (sources 3.2). */
 uint32_t psd1_profile_uc1(const struct psd1_profile *p);

@@ -15,8 +15,8 @@ static void every_pointer_is_there(const struct board_type *t)
 {
     assert_true(t->name && *t->name && t->title && *t->title);
     assert_true(t->size > 0 && t->size <= sizeof(union board_store));
-    assert_true(t->profile_size > 0 && t->profile_size <= sizeof(union board_profile_store));
-    assert_true(t->fields && t->field_count && t->profile_name && t->profile_default && t->profile_check && t->about);
+    assert_true(t->fields && t->fields->size > 0 && t->fields->size <= sizeof(union board_profile_store));
+    assert_true(t->fields->count && t->profile_name && t->profile_check && t->about);
     assert_true(t->period_ns && t->lines && t->line_count && t->port_lines && t->frame_line < t->line_count);
     assert_true(t->events && t->event_count && t->parts && t->part_count && t->node);
     assert_true(t->init && t->power_up && t->power_down && t->reset && t->ready && t->sample_until);
@@ -45,14 +45,14 @@ static void every_part_says_what_it_can(const struct board_type *t)
 
 static void every_key_is_told(const struct board_type *t)
 {
-    assert_string_equal(t->fields[0].key, "name");
-    for (unsigned i = 0; i < t->field_count; i++) {
-        const struct board_field *f = &t->fields[i];
-        assert_true(f->what && *f->what && f->offset < t->profile_size);
+    assert_string_equal(t->fields->row[0].key, "name");
+    for (unsigned i = 0; i < t->fields->count; i++) {
+        const struct field *f = &t->fields->row[i];
+        assert_true(f->what && *f->what && f->offset < t->fields->size);
         assert_string_not_equal(f->key, "board"); /* a profile's file says its type by it */
-        if (f->type == BOARD_FIELD_CHOICE) assert_non_null(f->choices);
-        if (f->type == BOARD_FIELD_LIST) assert_true(f->parse && f->text && f->like);
-        for (unsigned k = 0; k < i; k++) assert_string_not_equal(f->key, t->fields[k].key);
+        if (f->type == FIELD_CHOICE) assert_non_null(f->choices);
+        if (f->type == FIELD_LIST) assert_true(f->parse && f->text && f->like && f->standard_of);
+        for (unsigned k = 0; k < i; k++) assert_string_not_equal(f->key, t->fields->row[k].key);
     }
 }
 
@@ -91,7 +91,8 @@ static void names_lead_to_types_and_their_profiles(void **state)
 
 static char *dump_of(const struct board_type *t, const void *profile)
 {
-    cJSON *j = profile_dump(t, profile);
+    cJSON *j = cJSON_CreateObject();
+    yaml_dump(t->fields, profile, j);
     char *text = cJSON_Print(j);
     cJSON_Delete(j);
     assert_non_null(text);
@@ -107,7 +108,7 @@ static void the_default_profile_is_sound_and_the_file_that_it_names(void **state
         const struct board_type *type = *t;
         const struct board_name *board;
         memset(&def, 0, sizeof def);
-        type->profile_default(&def);
+        fields_default(type->fields, &def);
         if (!type->profile_check(&def, why, sizeof why)) fail_msg("%s: %s", type->name, why);
         assert_true(type->period_ns(&def) > 0);
         type->about(&def, about, sizeof about);
@@ -132,8 +133,8 @@ static void a_dump_of_a_profile_is_a_profile_with_the_same_dump(void **state)
         char why[512];
         memset(&def, 0, sizeof def);
         memset(&again, 0, sizeof again);
-        (*t)->profile_default(&def);
-        (*t)->profile_default(&again);
+        fields_default((*t)->fields, &def);
+        fields_default((*t)->fields, &again);
         char *one = dump_of(*t, &def);
         if (!yaml_file_parse(&f, "dump", one, strlen(one), why, sizeof why)) fail_msg("%s", why);
         if (!profile_yaml_fields(&f, f.root, *t, &again)) fail_msg("%s", why);

@@ -127,7 +127,7 @@ static inline void rig_up(struct rig *r, const struct platform_cfg *platform, do
     r->g_mps2 = site.g_mps2;
     sched_init(&r->s);
     platform_init(&r->p, platform, &vehicle, &site, 7);
-    gyro_profile_default(&profile);
+    fields_default(&gyro_fields, &profile);
     gyro_init(&r->b, &profile, &cfg, &io, &r->s);
     r->b.base.observed = true;
     r->b.host = (struct gyro_host){.ctx = r, .reading = rig_reading, .condition = rig_condition};

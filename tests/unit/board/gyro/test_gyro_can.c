@@ -56,7 +56,7 @@ static int up(void **state)
     (void)state;
     memset(&r, 0, sizeof r);
     memset(&wire, 0, sizeof wire);
-    gyro_profile_default(&profile);
+    fields_default(&gyro_fields, &profile);
     sched_init(&r.s);
     can_bus_init(&wire.bus, &(struct can_bus_cfg){.bitrate_hz = 1000000}, &r.s);
     wire.host = (struct can_node){.name = "host", .rx = on_frame};

@@ -134,7 +134,8 @@ static inline struct pik_profile rig_ideal(const struct pik_profile *like)
 
 static inline struct pik_profile rig_pik(void)
 {
-    const struct pik_profile p = pik_profile_default();
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
     return rig_ideal(&p);
 }
 

@@ -128,11 +128,12 @@ static void a_step_that_is_told_is_taken_where_it_is(void **state)
 static void specimens_keep_the_printed_error(void **state)
 {
     (void)state;
-    const struct pik_profile profiles[] = {pik_profile_default()};
+    struct pik_profile profile;
+    fields_default(&pik_fields, &profile);
     double worst = 0.0, sum2 = 0.0, last = 0.0;
     unsigned n = 0, same = 0;
     for (uint32_t serial = 1; serial <= 500; serial++) {
-        rig_init(&r, &profiles[0], serial);
+        rig_init(&r, &profile, serial);
         for (unsigned i = 0; i < PIK_AXES; i++) {
             for (int sign = -1; sign <= 1; sign += 2) {
                 for (double degc = -10.0; degc <= 60.0; degc += 35.0) {
@@ -151,7 +152,7 @@ static void specimens_keep_the_printed_error(void **state)
     assert_true(worst <= 0.0015 && worst > 0.0014);
     assert_true(sqrt(sum2 / n) > 0.0002 && sqrt(sum2 / n) < 0.0006);
     assert_int_equal(same, 0);
-    struct pik_profile any = profiles[0];
+    struct pik_profile any = profile;
     any.k_error_pct = 0.0;
     any.uref_tol_ppm = 5000.0;
     worst = 0.0;

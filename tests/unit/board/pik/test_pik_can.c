@@ -60,8 +60,8 @@ static void rig_up(struct rig *rig, const char *key, const char *value)
     struct board_cfg cfg = {.seed = 5, .serial = 42};
     char why[300];
     memset(rig, 0, sizeof *rig);
-    pik_board.profile_default(&p);
-    if (key) assert_true(board_field_set(pik_board.fields, pik_board.field_count, &p, key, 0, value, why, sizeof why));
+    fields_default(&pik_fields, &p);
+    if (key) assert_true(fields_set(pik_board.fields, &p, key, 0, value, why, sizeof why));
     assert_true(pik_board.profile_check(&p, why, sizeof why));
     for (unsigned i = 0; i < PIK_AXES; i++) cfg.afe[i] = afe_nominal(AFE_VOLTAGE);
     pik_board.cfg_default(&cfg);
@@ -247,7 +247,8 @@ static void what_the_table_says(void **state)
     assert_int_equal(truths, 20);
     assert_true(truth_of_x == pik_true_k_hz_per_v(&r.b, 0, 1, 25.0));
     struct board_cfg cfg = {.seed = 1};
-    struct pik_profile p = pik_profile_default();
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
     p.ra_ohm = 768.0;
     pik_board.cfg_default(&cfg);
     assert_true(cfg.afe[2].load_ohm == 735.0 && cfg.afe[0].divider_ratio == 1.0);

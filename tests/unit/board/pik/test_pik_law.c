@@ -79,7 +79,8 @@ static void no_specimen_saturates_at_full_scale(void **state)
 {
     (void)state;
     for (uint32_t serial = 1; serial <= 100; serial++) {
-        struct pik_profile p = pik_profile_default();
+        struct pik_profile p;
+        fields_default(&pik_fields, &p);
         if (serial % 2) p.clock_hz = 40000, p.c_int_nf = 4.7, p.uc_v = 3.9, p.look_ticks = 112;
         rig_up(&r, &p, serial);
         r.degc = serial % 3 == 0 ? -10.0 : serial % 3 == 1 ? 25.0 : 60.0;

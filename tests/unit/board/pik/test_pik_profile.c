@@ -21,7 +21,8 @@ static void figures_of_the_article(void **state)
     } rows[] = {{3480, 174.0, 5.747e-3, 3480.0 * 16 / 31, 60e-3, 0.939, 735.0},
                 {40000, 2000.0, 0.5e-3, 40e3 * 16 / 31, 5e-3, 0.980, 768.0}};
     for (unsigned i = 0; i < COUNT(rows); i++) {
-        struct pik_profile p = pik_profile_default();
+        struct pik_profile p;
+        fields_default(&pik_fields, &p);
         p.clock_hz = rows[i].clock_hz;
         assert_true(near(pik_profile_k_hz_per_v(&p), rows[i].k_hz_per_v, 1e-12));
         assert_true(near(pik_profile_quantum_vs(&p), rows[i].quantum_vs, 1e-4));
@@ -30,7 +31,8 @@ static void figures_of_the_article(void **state)
         assert_true(near(ma_v_per_g, rows[i].ma_v_per_g, 1e-3));
         assert_true(near(rows[i].ra_ohm * 1.28e-3, ma_v_per_g, 4e-3));
     }
-    struct pik_profile p = pik_profile_default();
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
     assert_true(near(pik_profile_step_v(&p), 10.0 / 3480.0 / (10e3 * 56e-9), 1e-12));
     assert_true(near(pik_profile_threshold(&p), 3.75 / 5.1314, 1e-4));
     assert_int_equal(pik_profile_period_ns(&p), 10000000);
@@ -67,8 +69,9 @@ static void bad_profiles_are_refused_in_words(void **state)
     };
     char why[300];
     for (unsigned i = 0; i < COUNT(rows); i++) {
-        struct pik_profile p = pik_profile_default();
-        if (!board_field_set(pik_fields, PIK_FIELDS, &p, rows[i].key, 0, rows[i].value, why, sizeof why))
+        struct pik_profile p;
+        fields_default(&pik_fields, &p);
+        if (!fields_set(&pik_fields, &p, rows[i].key, 0, rows[i].value, why, sizeof why))
             fail_msg("row %u: %s", i, why);
         const bool ok = pik_profile_check(&p, why, sizeof why);
         if (ok != !rows[i].why) fail_msg("row %u: %s", i, ok ? "taken" : why);
@@ -81,13 +84,14 @@ static void bad_together(void **state)
 {
     (void)state;
     char why[300];
-    struct pik_profile p = pik_profile_default();
+    struct pik_profile p;
+    fields_default(&pik_fields, &p);
     p.grid = 64;
     p.clock_hz = 20000;
     p.c_int_nf = 10.0;
     assert_false(pik_profile_check(&p, why, sizeof why));
     assert_non_null(strstr(why, "grid: expected 990000"));
-    p = pik_profile_default();
+    fields_default(&pik_fields, &p);
     p.clock_hz = 60000;
     p.c_int_nf = 3.3;
     p.look_ticks = 19;
@@ -98,12 +102,12 @@ static void bad_together(void **state)
     p.latch_us = 600000;
     assert_false(pik_profile_check(&p, why, sizeof why));
     assert_non_null(strstr(why, "got up to 36000 pulses in 600000 us"));
-    p = pik_profile_default();
+    fields_default(&pik_fields, &p);
     p.latch_us = 200;
     p.latch_ns = 200000;
     assert_false(pik_profile_check(&p, why, sizeof why));
     assert_non_null(strstr(why, "latch_ns: expected less than the period, got 200000"));
-    p = pik_profile_default();
+    fields_default(&pik_fields, &p);
     p.zero_v = 2.0;
     assert_false(pik_profile_check(&p, why, sizeof why));
     assert_non_null(strstr(why, "zero_v"));

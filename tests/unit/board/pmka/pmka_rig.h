@@ -85,7 +85,7 @@ static inline void rig_reading(void *ctx, const struct pmka_reading *reading, in
 static inline struct pmka_profile rig_profile(void)
 {
     struct pmka_profile p;
-    pmka_profile_default(&p);
+    fields_default(&pmka_fields, &p);
     return p;
 }
 

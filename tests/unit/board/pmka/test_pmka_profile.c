@@ -10,9 +10,9 @@ static void the_default_passes(void **state)
     assert_int_equal(pmka_board.period_ns(&p), 4800000);
     pmka_board.about(&p, text, sizeof text);
     assert_string_equal(text, "Ts 4.8 ms, Ur 5.106 V, 2.869 uV s a code, autonomous rotation, beats of 200 Ts");
-    for (unsigned i = 0; i < PMKA_FIELDS; i++) {
-        assert_non_null(pmka_fields[i].key);
-        assert_non_null(pmka_fields[i].what);
+    for (unsigned i = 0; i < pmka_fields.count; i++) {
+        assert_non_null(pmka_fields.row[i].key);
+        assert_non_null(pmka_fields.row[i].what);
     }
 }
 
@@ -43,7 +43,7 @@ static void what_a_board_cannot_be(void **state)
     for (size_t k = 0; k < COUNT(rows); k++) {
         struct pmka_profile p = rig_profile();
         char why[300] = "";
-        const bool set = board_field_set(pmka_fields, PMKA_FIELDS, &p, rows[k].key, 0, rows[k].text, why, sizeof why);
+        const bool set = fields_set(&pmka_fields, &p, rows[k].key, 0, rows[k].text, why, sizeof why);
         const bool ok = set && pmka_profile_check(&p, why, sizeof why);
         const char *says = rows[k].says;
         if (ok != (says && !says[0])) fail_msg("row %zu: %s", k, why);

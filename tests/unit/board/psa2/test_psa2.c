@@ -65,7 +65,8 @@ static void words_follow_the_profile(void **state)
 static void word_order_is_the_profiles(void **state)
 {
     (void)state;
-    struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     p.word[0] = PSA2_WORD_T;
     p.word[3] = PSA2_WORD_X;
     rig_init(&rig, &p, 0.0);

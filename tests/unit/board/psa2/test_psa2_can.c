@@ -236,7 +236,7 @@ static struct rig *real_up(void)
     join_bus(r, &psa2_board, &port, 1000000, 0);
     struct unit_cfg cfg = unit_default("unit");
     static struct psa2_profile profile;
-    profile = psa2_profile_default();
+    fields_default(&psa2_fields, &profile);
     cfg.profile = &profile;
     static struct lab lab;
     struct lab_cfg lab_cfg = lab_default();

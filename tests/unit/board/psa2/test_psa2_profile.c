@@ -30,17 +30,18 @@ static void shipped_profiles_run_and_have_these_times(void **state)
 static void the_default_is_the_file_article(void **state)
 {
     (void)state;
-    const struct psa2_profile want = psa2_profile_default();
+    struct psa2_profile want;
+    fields_default(&psa2_fields, &want);
     const struct psa2_profile got = psa2_profile_file("article");
-    for (unsigned i = 0; i < PSA2_FIELDS; i++) {
-        const struct board_field *f = &psa2_fields[i];
+    for (unsigned i = 0; i < psa2_fields.count; i++) {
+        const struct field *f = &psa2_fields.row[i];
         const bool words = strcmp(f->key, "word") == 0;
-        const size_t size = f->type == BOARD_FIELD_STRING ? strlen(want.name) + 1
-                            : f->type == BOARD_FIELD_REAL ? sizeof(double)
-                            : f->type == BOARD_FIELD_BOOL ? sizeof(bool)
-                            : words                       ? sizeof want.word
-                            : f->type == BOARD_FIELD_LIST ? 0
-                                                          : sizeof(unsigned);
+        const size_t size = f->type == FIELD_TEXT   ? strlen(want.name) + 1
+                            : f->type == FIELD_REAL ? sizeof(double)
+                            : f->type == FIELD_BOOL ? sizeof(bool)
+                            : words                 ? sizeof want.word
+                            : f->type == FIELD_LIST ? 0
+                                                    : sizeof(unsigned);
         if (memcmp((const char *)&want + f->offset, (const char *)&got + f->offset, size) != 0)
             fail_msg("%s differs", f->key);
     }
@@ -99,10 +100,12 @@ static void what_a_board_cannot_run_is_refused_in_words(void **state)
          "24 bits at 1.024 MHz (27.390 us) and INT low (296.000 us), 323.390 us in all"},
     };
     for (size_t i = 0; i < COUNT(rows); i++) {
-        struct psa2_profile p = psa2_profile_default();
+        struct psa2_profile p;
+        fields_default(&psa2_fields, &p);
         char why[300] = "";
         for (int k = 0; k < 3 && rows[i].set[k][0]; k++)
-            if (!psa2_profile_set(&p, rows[i].set[k][0], 0, rows[i].set[k][1], why, sizeof why)) fail_msg("%s", why);
+            if (!fields_set(&psa2_fields, &p, rows[i].set[k][0], 0, rows[i].set[k][1], why, sizeof why))
+                fail_msg("%s", why);
         if (psa2_profile_check(&p, why, sizeof why)) fail_msg("row %zu passed", i);
         assert_string_equal(why, rows[i].why);
     }
@@ -114,10 +117,11 @@ static void clocks_may_be_fast_by_a_crystals_tolerance(void **state)
     (void)state;
     const char *const rows[][2] = {
         {"fclk_hz", "4096410"}, {"temp_clkin_hz", "7680768"}, {"sclk_hz", "1024102"}, {"line_hz", "2000200"}};
-    struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     char why[300] = "";
     for (size_t i = 0; i < COUNT(rows); i++)
-        if (!psa2_profile_set(&p, rows[i][0], 0, rows[i][1], why, sizeof why)) fail_msg("%s", why);
+        if (!fields_set(&psa2_fields, &p, rows[i][0], 0, rows[i][1], why, sizeof why)) fail_msg("%s", why);
     if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
 }
 
@@ -164,7 +168,7 @@ static void texts_that_are_no_values_leave_the_profile_alone(void **state)
         memset(&p, 0x5A, sizeof p);
         memcpy(&before, &p, sizeof p);
         char why[400] = "";
-        assert_false(psa2_profile_set(&p, rows[i].key, rows[i].index, rows[i].text, why, sizeof why));
+        assert_false(fields_set(&psa2_fields, &p, rows[i].key, rows[i].index, rows[i].text, why, sizeof why));
         assert_string_equal(why, rows[i].why);
         assert_memory_equal(&p, &before, sizeof p);
     }
@@ -183,9 +187,10 @@ static void the_data_period_follows_config0(void **state)
         {"DRD_A write_A 42 00 09", 1000000}, {"DRD_T write_T 41 00 66", 1000000},
     };
     for (size_t i = 0; i < COUNT(rows); i++) {
-        struct psa2_profile p = psa2_profile_default();
+        struct psa2_profile p;
+        fields_default(&psa2_fields, &p);
         char why[100];
-        assert_true(psa2_profile_set(&p, "setup", 0, rows[i].step, why, sizeof why));
+        assert_true(fields_set(&psa2_fields, &p, "setup", 0, rows[i].step, why, sizeof why));
         assert_int_equal(p.setup_count, 1);
         assert_int_equal(psa2_profile_period_ns(&p), rows[i].period_ns);
     }

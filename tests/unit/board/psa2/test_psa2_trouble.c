@@ -5,7 +5,8 @@
 static void a_frame_that_finds_int_low_is_dropped_and_counted(void **state)
 {
     (void)state;
-    struct psa2_profile p = psa2_profile_default();
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
     p.line_div = 4;
     rig_init(&rig, &p, 1.0);
     psa2_power_up(&rig.b, 0);

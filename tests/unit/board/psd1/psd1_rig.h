@@ -124,7 +124,7 @@ static inline struct board_cfg rig_unit(double noise_scale)
 static inline struct psd1_profile rig_exact(void)
 {
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     p.gyro_bias_sd_degph = p.gyro_scale_sd_ppm = p.gyro_arw_deg_rth = 0.0;
     p.rate_offset_sd_dps = p.rate_scale_sd_ppm = p.temp_offset_sd_k = p.supply_sd_v = 0.0;
     p.vref_sd_ppm = p.vref_tc_sd_ppm_per_k = p.adc_offset_sd_v = p.adc_gain_sd_ppm = 0.0;

@@ -323,7 +323,7 @@ static void specimens_differ_and_seeds_repeat(void **state)
 {
     (void)state;
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     for (unsigned k = 0; k < 2; k++) {
         struct rig *r = k ? &other : &rig;
         rig_init(r, &p, 1.0);

@@ -304,7 +304,7 @@ static void late_listeners_hear_the_same(void **state)
     const uint64_t seed = rig_seed(20261122);
     struct rng rng = rng_stream(seed, 1, "test");
     struct psd1_profile p;
-    psd1_profile_default(&p);
+    fields_default(&psd1_fields, &p);
     p.bit_access_ns = 120;
     rig_init(&rig, &p, 1.0);
     rig_watch(&rig, ALL);

@@ -7,27 +7,20 @@
 
 /* ---- profile ---- */
 
-#define NAME(standard, what) BOARD_FIELD_NAME(struct toy_profile, standard, what)
-#define ROW(key, type, standard, min, max, what)                                                                       \
-    BOARD_FIELD_ROW(struct toy_profile, key, type, standard, min, max, what)
+#define NAME(...) FIELD_NAME(struct toy_profile, __VA_ARGS__)
+#define ROW(...)  FIELD_ROW(struct toy_profile, __VA_ARGS__)
 
-static const struct board_field fields[] = {
+static const struct field rows[] = {
     NAME("toy", "Name of the profile."),
     ROW(lsb_v, REAL, 320e-6, 1e-6, 1e-3, "Weight of a code. E0."),
-    ROW(period_us, UINT, 10000, 1000, 1000000, "Period of the samples. E0."),
-    ROW(bit_ns, UINT, 1000, 100, 4000, "Period of CLK. E0."),
+    ROW(period_us, U32, 10000, 1000, 1000000, "Period of the samples. E0."),
+    ROW(bit_ns, U32, 1000, 100, 4000, "Period of CLK. E0."),
 };
-enum { FIELDS = sizeof fields / sizeof *fields };
-
-static void set_default(void *profile)
-{
-    *(struct toy_profile *)profile = (struct toy_profile){.name = ""};
-    board_field_defaults(fields, FIELDS, profile);
-}
+static const struct fields fields = FIELDS_OF(struct toy_profile, rows);
 
 static bool check_profile(const void *profile, char *why, size_t cap)
 {
-    return board_field_check(fields, FIELDS, profile, why, cap);
+    return fields_check(&fields, profile, why, cap);
 }
 
 static void describe_profile(const void *profile, char *out, size_t cap)
@@ -128,11 +121,8 @@ const struct board_type toy_board = {
     .name = "toy",
     .title = "TOY",
     .size = sizeof(struct toy),
-    .profile_size = sizeof(struct toy_profile),
-    .fields = fields,
-    .field_count = FIELDS,
+    .fields = &fields,
     .profile_name = "toy",
-    .profile_default = set_default,
     .profile_check = check_profile,
     .about = describe_profile,
     .cfg_default = cfg_default,

@@ -33,16 +33,28 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
 
 #define OF(m) offsetof(struct profile, m)
 static const char *const modes[] = {"slow", "fast", "both", NULL};
-static const struct board_field fields[] = {
-    {.key = "name", .type = BOARD_FIELD_STRING, .offset = OF(name), .min = 1, .max = 31, .standard_name = "new"},
-    {.key = "count", .type = BOARD_FIELD_UINT, .offset = OF(count), .min = 2, .max = 9, .standard = 3},
-    {.key = "gain", .type = BOARD_FIELD_REAL, .offset = OF(gain), .min = -1, .max = 1, .standard = -0.5},
-    {.key = "at_m", .type = BOARD_FIELD_REALS, .offset = OF(at), .min = 0, .max = 5, .count = 3},
-    {.key = "on", .type = BOARD_FIELD_BOOL, .offset = OF(on), .standard = true},
-    {.key = "mode", .type = BOARD_FIELD_CHOICE, .offset = OF(mode), .choices = modes, .standard = 1},
-    {.key = "steps", .type = BOARD_FIELD_LIST, .max = 4, .like = "a digit", .parse = parse_step, .text = step_text},
+static const struct field field_rows[] = {
+    {.key = "name",
+     .type = FIELD_TEXT,
+     .offset = OF(name),
+     .min = 1,
+     .max = 32,
+     .standard_of = (const char *const[]){"new", NULL}},
+    {.key = "count", .type = FIELD_U32, .offset = OF(count), .min = 2, .max = 9, .standard = 3},
+    {.key = "gain", .type = FIELD_REAL, .offset = OF(gain), .min = -1, .max = 1, .standard = -0.5},
+    {.key = "at_m", .type = FIELD_REALS, .offset = OF(at), .min = 0, .max = 5, .count = 3},
+    {.key = "on", .type = FIELD_BOOL, .offset = OF(on), .standard = true},
+    {.key = "mode", .type = FIELD_CHOICE, .offset = OF(mode), .choices = modes, .standard = 1},
+    {.key = "steps",
+     .type = FIELD_LIST,
+     .max = 4,
+     .like = "a digit",
+     .parse = parse_step,
+     .text = step_text,
+     .standard_of = (const char *const[]){"4", "2", NULL}},
 };
-enum { FIELDS = COUNT(fields) };
+static const struct fields fields = FIELDS_OF(struct profile, field_rows);
+enum { ROWS = COUNT(field_rows) };
 
 static struct profile p;
 static char why[200];
@@ -57,7 +69,7 @@ static int sound(void **state)
 
 static bool set(const char *key, unsigned index, const char *text)
 {
-    return board_field_set(fields, FIELDS, &p, key, index, text, why, sizeof why);
+    return fields_set(&fields, &p, key, index, text, why, sizeof why);
 }
 
 static void each_kind_takes_its_text(void **state)
@@ -121,42 +133,42 @@ static void what_is_no_such_value_is_refused_and_changes_nothing(void **state)
 static void a_check_finds_numbers_out_of_range_and_a_missing_name(void **state)
 {
     (void)state;
-    assert_true(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_true(fields_check(&fields, &p, why, sizeof why));
     p.at[2] = 5.5;
-    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_false(fields_check(&fields, &p, why, sizeof why));
     assert_string_equal(why, "at_m: expected 0 to 5, got 5.5");
     p.count = 1;
-    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_false(fields_check(&fields, &p, why, sizeof why));
     assert_string_equal(why, "count: expected 2 to 9, got 1");
     p.name[0] = '\0';
-    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_false(fields_check(&fields, &p, why, sizeof why));
     assert_non_null(strstr(why, "name: expected a name of 1 to 31 characters, got none"));
     p = (struct profile){.name = "a", .count = 2};
     p.gain = 0.0 / (p.gain * 0.0); /* NaN is in no range */
-    assert_false(board_field_check(fields, FIELDS, &p, why, sizeof why));
+    assert_false(fields_check(&fields, &p, why, sizeof why));
 }
 
 static void lists_know_how_many_they_take(void **state)
 {
-    static const unsigned most[FIELDS] = {1, 1, 1, 3, 1, 1, 4};
+    static const unsigned most[ROWS] = {1, 1, 1, 3, 1, 1, 4};
     (void)state;
-    for (unsigned i = 0; i < FIELDS; i++) {
-        assert_int_equal(board_field_elements(&fields[i]), most[i]);
-        assert_int_equal(board_field_is_list(&fields[i]), most[i] > 1);
-        assert_ptr_equal(board_field_find(fields, FIELDS, fields[i].key), &fields[i]);
+    for (unsigned i = 0; i < ROWS; i++) {
+        assert_int_equal(field_elements(&field_rows[i]), most[i]);
+        assert_int_equal(field_is_list(&field_rows[i]), most[i] > 1);
+        assert_ptr_equal(fields_find(&fields, field_rows[i].key), &field_rows[i]);
     }
-    assert_null(board_field_find(fields, FIELDS, "nam"));
+    assert_null(fields_find(&fields, "nam"));
 }
 
-static void defaults_set_all_but_sequences(void **state)
+static void defaults_set_every_field(void **state)
 {
     (void)state;
-    p.steps = 2;
-    board_field_defaults(fields, FIELDS, &p);
+    p.steps = 3;
+    fields_default(&fields, &p);
     assert_string_equal(p.name, "new");
     assert_int_equal(p.count, 3);
     assert_true(p.gain == -0.5 && p.on && p.mode == 1);
-    assert_true(p.at[0] == 1 && p.steps == 2);
+    assert_true(p.at[0] == 0 && p.steps == 2 && p.step[0] == 4 && p.step[1] == 2);
 }
 
 int main(void)
@@ -166,7 +178,7 @@ int main(void)
         cmocka_unit_test_setup(what_is_no_such_value_is_refused_and_changes_nothing, sound),
         cmocka_unit_test_setup(a_check_finds_numbers_out_of_range_and_a_missing_name, sound),
         cmocka_unit_test_setup(lists_know_how_many_they_take, sound),
-        cmocka_unit_test_setup(defaults_set_all_but_sequences, sound),
+        cmocka_unit_test_setup(defaults_set_every_field, sound),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
