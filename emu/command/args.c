@@ -133,41 +133,23 @@ static bool parse_reals(const struct target *t, const cJSON *j, struct control_v
 
 /* ---- and back */
 
-static cJSON *number_json(const struct control_value *v)
+static cJSON *value_json(const struct control_arg *a, const struct control_value *v)
 {
-    return cJSON_CreateNumber(v->real);
-}
-
-static cJSON *bool_json(const struct control_value *v)
-{
-    return cJSON_CreateBool(v->on);
-}
-
-static cJSON *string_json(const struct control_value *v)
-{
-    return cJSON_CreateString(v->text);
-}
-
-static cJSON *numbers_json(const struct control_value *v)
-{
-    return cJSON_CreateDoubleArray(v->reals, (int)v->n);
+    if (a->type == CONTROL_REALS) return cJSON_CreateDoubleArray(v->reals, (int)v->n);
+    if (a->type == CONTROL_BOOL) return cJSON_CreateBool(v->on);
+    return control_type_numeric(a->type) ? cJSON_CreateNumber(v->real) : cJSON_CreateString(v->text);
 }
 
 static const struct {
     const char *name;
     bool (*parse)(const struct target *t, const cJSON *j, struct control_value *v);
-    cJSON *(*print)(const struct control_value *v);
     bool numeric;
 } types[] = {
-    [CONTROL_REAL] = {"number", parse_real, number_json, true},
-    [CONTROL_COUNT] = {"integer", parse_count, number_json, true},
-    [CONTROL_BOOL] = {"boolean", parse_bool, bool_json, false},
-    [CONTROL_NAME] = {"string", parse_name, string_json, false},
-    [CONTROL_TEXT] = {"string", parse_text, string_json, false},
-    [CONTROL_CHOICE] = {"choice", parse_choice, string_json, false},
-    [CONTROL_EVENT] = {"choice", parse_name, string_json, false},
-    [CONTROL_UNIT] = {"unit", parse_unit, string_json, false},
-    [CONTROL_REALS] = {"numbers", parse_reals, numbers_json, true},
+    [CONTROL_REAL] = {"number", parse_real, true},    [CONTROL_COUNT] = {"integer", parse_count, true},
+    [CONTROL_BOOL] = {"boolean", parse_bool, false},  [CONTROL_NAME] = {"string", parse_name, false},
+    [CONTROL_TEXT] = {"string", parse_text, false},   [CONTROL_CHOICE] = {"choice", parse_choice, false},
+    [CONTROL_EVENT] = {"choice", parse_name, false},  [CONTROL_UNIT] = {"unit", parse_unit, false},
+    [CONTROL_REALS] = {"numbers", parse_reals, true},
 };
 
 const char *control_choice(const struct control_arg *a, unsigned i)
@@ -190,7 +172,7 @@ cJSON *control_args_json(const struct control_command *row, const struct control
 {
     cJSON *args = cJSON_CreateObject();
     for (unsigned i = 0; i < control_arg_count(row); i++) {
-        if (v[i].given) cJSON_AddItemToObject(args, row->arg[i].name, types[row->arg[i].type].print(&v[i]));
+        if (v[i].given) cJSON_AddItemToObject(args, row->arg[i].name, value_json(&row->arg[i], &v[i]));
     }
     return args;
 }
@@ -212,20 +194,26 @@ static bool reject_unknown(struct control_error *why, const struct control_comma
     return control_expected(why, "argument", "args", WHY_TEXT(name), "%s", known[0] ? known : "no arguments");
 }
 
-void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
-                        double *min, double *max)
+void control_arg_limits(const struct control_bench *b, const struct control_command *row, unsigned i,
+                        const struct control_value *v, double *min, double *max)
 {
+    const struct control_arg *a = &row->arg[i];
     *min = a->min;
     *max = a->max;
-    if (a->limits && b->lab) a->limits(b, v, min, max);
+    if (!b->lab || (row->missing && row->missing(b))) return;
+    if (a->lab_min) memcpy(min, (const char *)b->lab + a->lab_min, sizeof *min);
+    if (a->lab_max) memcpy(max, (const char *)b->lab + a->lab_max, sizeof *max);
+    if (a->limits) a->limits(b, v, min, max);
 }
 
 /* Limits that depend on this bench's instruments; the arguments before this one are valid. */
-static bool within_limits(const struct target *t, const struct control_value *all, const struct control_value *v)
+static bool within_limits(const struct target *t, const struct control_command *row, unsigned n,
+                          const struct control_value *all)
 {
     double min, max;
-    if (!v->given || !t->arg->limits) return true;
-    control_arg_limits(t->bench, t->arg, all, &min, &max);
+    const struct control_value *v = &all[n];
+    if (!v->given || !control_type_numeric(t->arg->type)) return true;
+    control_arg_limits(t->bench, row, n, all, &min, &max);
     for (unsigned i = 0; i < v->n; i++) {
         if (!in_range(t, v->reals[i], min, max)) return false;
     }
@@ -251,7 +239,7 @@ bool control_args(const struct control_bench *b, const struct control_command *r
         const struct control_arg *a = &row->arg[i];
         if (!v[i].given && !a->optional)
             return control_expected(why, "argument", a->name, "nothing", "a value (%s)", a->what);
-        if (!within_limits(&(struct target){b, a, why}, v, &v[i])) return false;
+        if (!within_limits(&(struct target){b, a, why}, row, i, v)) return false;
     }
     return !row->check || row->check(b, v, why);
 }

@@ -20,9 +20,9 @@ const char *control_choice(const struct control_arg *a, unsigned i);
 /* The arguments that were given, as they would be sent. The caller deletes it. */
 cJSON *control_args_json(const struct control_command *row, const struct control_value *v);
 
-/* The range of an argument on this bench; v: the arguments before it. */
-void control_arg_limits(const struct control_bench *b, const struct control_arg *a, const struct control_value *v,
-                        double *min, double *max);
+/* The range of the row's i-th argument on this bench; v: the arguments before it. */
+void control_arg_limits(const struct control_bench *b, const struct control_command *row, unsigned i,
+                        const struct control_value *v, double *min, double *max);
 
 /* ---- rows */
 

@@ -44,7 +44,9 @@ struct control_arg {
     const char *const *choices; /* CHOICE: up to NULL */
     double def;                 /* what SCPI's DEFault represents */
     double least;               /* magnitude of numbers other than 0 that changes anything; 0: any does */
-    /* Narrows min and max to what this bench's instrument can; v are the arguments before this one. NULL: as they are. */
+    /* What narrows min and max to what this bench's instrument can: doubles in struct lab, 0: none; or a function, v are the
+     * arguments before this one. Not asked while the row's instrument is missing. */
+    size_t lab_min, lab_max;
     void (*limits)(const struct control_bench *b, const struct control_value *v, double *min, double *max);
 };
 

@@ -1,30 +1,16 @@
 /* Commands of the thermal chamber. */
 #include "control/commands.h"
 
-static bool has_chamber(const struct control_bench *b)
+static const char *no_chamber(const struct control_bench *b)
 {
-    return b->lab && b->lab->chamber.cfg.present;
-}
-
-static void temp_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
-{
-    (void)v;
-    if (!has_chamber(b)) return;
-    *min = b->lab->chamber.cfg.min_degc;
-    *max = b->lab->chamber.cfg.max_degc;
+    return b->lab && b->lab->chamber.cfg.present ? NULL : "this scenario has no thermal chamber";
 }
 
 static void ramp_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
 {
     (void)v;
-    if (!has_chamber(b)) return;
     *min = CHAMBER_RAMP_MIN_K_PER_MIN;
     *max = chamber_ramp_max_k_per_min(&b->lab->chamber);
-}
-
-static const char *no_chamber(const struct control_bench *b)
-{
-    return has_chamber(b) ? NULL : "this scenario has no thermal chamber";
 }
 
 static enum control_outcome do_read(const struct control_call *call)
@@ -70,10 +56,12 @@ static enum control_outcome do_reset(const struct control_call *call)
     return do_read(call);
 }
 
+#define OF(m) offsetof(struct lab, chamber.cfg.m)
+
 // clang-format off
 static const struct control_command rows[] = {
     {"chamber.set", "Sets the temperature set point; the air follows at the current ramp.",
-     CONTROL_ARGS({"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .limits = temp_limits}),
+     CONTROL_ARGS({"temp_degc", CONTROL_REAL, false, "degC", -200, 300, .what = "set point", .def = 25, .lab_min = OF(min_degc), .lab_max = OF(max_degc)}),
      .missing = no_chamber, .run = do_set, .changes = true, .scpi = {{"TEMPerature", NULL}}},
     {"chamber.ramp", "Sets the ramp, the limit of the rate of change.",
      CONTROL_ARGS({"ramp_k_per_min", CONTROL_REAL, false, "K/min", 1e-6, 1000, .what = "rate of change, heating and cooling", .def = 1, .limits = ramp_limits}),

@@ -1,35 +1,10 @@
 /* Commands of the laboratory supply. */
 #include "control/commands.h"
 
-static bool has_supply(const struct control_bench *b)
-{
-    return b->lab && b->lab->supply.cfg.present;
-}
-
-static void volt_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
-{
-    (void)v;
-    (void)min;
-    if (has_supply(b)) *max = b->lab->supply.cfg.volt_max_v;
-}
-
-static void ripple_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
-{
-    (void)v;
-    (void)min;
-    if (has_supply(b)) *max = b->lab->supply.cfg.ripple_max_v;
-}
-
-static void frequency_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
-{
-    (void)v;
-    (void)min;
-    if (has_supply(b)) *max = b->lab->supply.cfg.ripple_max_hz;
-}
-
 static const char *no_supply(const struct control_bench *b)
 {
-    return has_supply(b) ? NULL : "this scenario has no power supply; its boards are always powered";
+    return b->lab && b->lab->supply.cfg.present ? NULL
+                                                : "this scenario has no power supply; its boards are always powered";
 }
 
 static enum control_outcome do_read(const struct control_call *call)
@@ -81,16 +56,18 @@ static enum control_outcome do_reset(const struct control_call *call)
     return put_supply(call, SUPPLY_OK);
 }
 
+#define OF(m) offsetof(struct lab, supply.cfg.m)
+
 // clang-format off
 static const struct control_command rows[] = {
     {"supply.set", "Sets the supply voltage.",
-     CONTROL_ARGS({"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "output voltage", .def = 12, .limits = volt_limits}),
+     CONTROL_ARGS({"volt_v", CONTROL_REAL, false, "V", 0, 1000, .what = "output voltage", .def = 12, .lab_max = OF(volt_max_v)}),
      .missing = no_supply, .run = do_set, .changes = true, .scpi = {{"VOLTage", NULL}}},
     {"supply.output", "Switches the supply output.", CONTROL_ARGS({"on", CONTROL_BOOL, .what = "output on"}),
      .missing = no_supply, .run = do_output, .changes = true, .scpi = {{"OUTPut", NULL}}},
     {"supply.ripple", "Adds a sinusoidal ripple to the voltage.",
-     CONTROL_ARGS({"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "ripple amplitude; 0: no ripple", .limits = ripple_limits},
-      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "ripple frequency", .def = 100, .limits = frequency_limits}),
+     CONTROL_ARGS({"amplitude_v", CONTROL_REAL, false, "V", 0, 1000, .what = "ripple amplitude; 0: no ripple", .lab_max = OF(ripple_max_v)},
+      {"frequency_hz", CONTROL_REAL, false, "Hz", 1e-3, 1e6, .what = "ripple frequency", .def = 100, .lab_max = OF(ripple_max_hz)}),
      .missing = no_supply, .run = do_ripple, .changes = true, .scpi = {{"RIPPle", NULL}}},
     {"supply.read", "Reads the supply: voltage set and measured, output state, ripple.", NULL, .missing = no_supply, .run = do_read,
      .scpi = {{"VOLTage?", "volt_v"}, {"MEASure:VOLTage?", "measured_v"}, {"OUTPut?", "on"}, {"RIPPle?", "ripple_v,ripple_hz"}}},

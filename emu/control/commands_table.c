@@ -3,9 +3,9 @@
 
 #include <math.h>
 
-static bool has_table(const struct control_bench *b)
+static const char *no_table(const struct control_bench *b)
 {
-    return b->lab && b->lab->table.cfg.axes > 0;
+    return b->lab && b->lab->table.cfg.axes > 0 ? NULL : "this scenario has no rate table";
 }
 
 /* ---- what this table's axes can */
@@ -13,16 +13,13 @@ static bool has_table(const struct control_bench *b)
 static void axis_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
 {
     (void)v;
-    if (!has_table(b)) return; /* the handler says so */
     *min = 1;
     *max = b->lab->table.cfg.axes;
 }
 
 static const struct table_axis_cfg *axis_of(const struct control_bench *b, const struct control_value *v)
 {
-    return has_table(b) && v[0].count >= 1 && v[0].count <= b->lab->table.cfg.axes
-               ? &b->lab->table.cfg.axis[v[0].count - 1]
-               : NULL;
+    return v[0].count >= 1 && v[0].count <= b->lab->table.cfg.axes ? &b->lab->table.cfg.axis[v[0].count - 1] : NULL;
 }
 
 static void rate_limits(const struct control_bench *b, const struct control_value *v, double *min, double *max)
@@ -47,11 +44,6 @@ static void angle_limits(const struct control_bench *b, const struct control_val
 static unsigned axis_index(const struct control_call *call)
 {
     return (unsigned)call->v[0].count - 1;
-}
-
-static const char *no_table(const struct control_bench *b)
-{
-    return has_table(b) ? NULL : "this scenario has no rate table";
 }
 
 static enum control_outcome do_read(const struct control_call *call)

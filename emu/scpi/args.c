@@ -25,7 +25,7 @@ bool scpi_limit(const struct control_bench *b, const struct control_command *row
     double min, max;
     for (unsigned i = 0; i < 4; i++)
         v[i] = (struct control_value){.given = true, .real = suffix[i], .count = suffix[i]};
-    control_arg_limits(b, &row->arg[arg], v, &min, &max);
+    control_arg_limits(b, row, arg, v, &min, &max);
     if (word_is(word, "MINimum")) *out = min;
     else if (word_is(word, "MAXimum")) *out = max;
     else if (word_is(word, "DEFault")) *out = row->arg[arg].def;
