@@ -20,8 +20,9 @@ enum field_type {
     FIELD_LIST,   /* a list of texts, read and written by functions of the row */
     /* of YAML alone */
     FIELD_SECTION, /* a mapping by the table `sub`, its struct at offset */
-    FIELD_INLINE,  /* rows of `sub`, without a key of their own */
-    FIELD_CUSTOM   /* load and dump get the section */
+    FIELD_STRUCTS, /* a list of mappings by `sub`, dumped as many as the unsigned at `present` has; with a load of its own */
+    FIELD_INLINE, /* rows of `sub`, without a key of their own */
+    FIELD_CUSTOM  /* load and dump alone know */
 };
 
 struct fields;
@@ -48,8 +49,8 @@ struct field {
     /* YAML: scenario/fields.h */
     const struct fields *sub;
     size_t present; /* SECTION: offset of a bool beside it that tells that the section is there; 0: it always is */
-    bool (*load)(struct yaml_file *f, const struct yaml_node *node, void *section);
-    /* Adds the key to the dump, or leaves it out. NULL: never dumped, other keys say the same. */
+    bool (*load)(struct yaml_file *f, const struct yaml_node *node, void *section); /* in place of the type's */
+    /* Adds the key to the dump, or leaves it out. NULL: the type's; of CUSTOM never dumped, other keys say the same. */
     void (*dump)(const struct field *d, const void *section, struct cJSON *to);
 };
 

@@ -90,7 +90,7 @@ static bool load_section(struct yaml_file *f, const struct yaml_node *node, cons
 bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *section)
 {
     void *at = (char *)section + d->offset;
-    if (d->type == FIELD_CUSTOM) return d->load(f, node, section);
+    if (d->load) return d->load(f, node, section);
     if (d->type == FIELD_SECTION) return load_section(f, node, d, section);
     if (d->type == FIELD_REALS || d->type == FIELD_EACH) return load_reals(f, node, d, at);
     if (d->type != FIELD_CHOICE && !yaml_scalar(node))
@@ -218,11 +218,21 @@ cJSON *yaml_dump_value(const struct field *d, const void *section)
         return texts_json(d, section);
     case FIELD_SECTION:
         return section_of(d->sub, at);
+    case FIELD_STRUCTS:
     case FIELD_INLINE:
     case FIELD_CUSTOM:
         break;
     }
     return NULL;
+}
+
+static cJSON *structs_json(const struct field *d, const char *section)
+{
+    const unsigned *count = (const void *)(section + d->present);
+    cJSON *list = cJSON_CreateArray();
+    for (unsigned i = 0; i < *count; i++)
+        cJSON_AddItemToArray(list, section_of(d->sub, section + d->offset + i * d->sub->size));
+    return list;
 }
 
 void yaml_dump(const struct fields *t, const void *section, cJSON *to)
@@ -231,17 +241,11 @@ void yaml_dump(const struct fields *t, const void *section, cJSON *to)
     size_t offset;
     for (size_t i = 0; (d = yaml_row(t, i, &offset)); i++) {
         const char *base = (const char *)section + offset;
-        if (d->type == FIELD_CUSTOM && d->dump) d->dump(d, base, to);
-        if (d->type == FIELD_CUSTOM) continue;
         if (d->type == FIELD_SECTION && d->present && !*(const bool *)(base + d->present)) continue;
-        cJSON_AddItemToObject(to, d->key, yaml_dump_value(d, base));
+        if (d->dump) d->dump(d, base, to);
+        else if (d->type == FIELD_STRUCTS) cJSON_AddItemToObject(to, d->key, structs_json(d, base));
+        else if (d->type != FIELD_CUSTOM) cJSON_AddItemToObject(to, d->key, yaml_dump_value(d, base));
     }
-}
-
-void yaml_dump_list(const struct fields *t, const void *first, size_t size, size_t count, const char *key, cJSON *to)
-{
-    cJSON *list = cJSON_AddArrayToObject(to, key);
-    for (size_t i = 0; i < count; i++) cJSON_AddItemToArray(list, section_of(t, (const char *)first + i * size));
 }
 
 /* ---- arguments that somebody else checks */

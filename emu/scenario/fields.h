@@ -34,9 +34,6 @@ bool yaml_fail_unknown(struct yaml_file *f, const struct yaml_node *key, const c
 /* Adds every key with its value. */
 void yaml_dump(const struct fields *t, const void *section, cJSON *to);
 
-/* Adds a list of mappings: `count` structs of `size` bytes in a row. */
-void yaml_dump_list(const struct fields *t, const void *first, size_t size, size_t count, const char *key, cJSON *to);
-
 /* The row's value; NULL for one that has none of its own. */
 cJSON *yaml_dump_value(const struct field *d, const void *section);
 

@@ -16,7 +16,7 @@ static const struct field buses_rows[] = {
     {.key = "name", .type = FIELD_TEXT, .offset = offsetof(struct scenario_bus, name), .max = 16, .what = "letters, digits and _; the name for `bus` of a unit and `open` of socketcand"},
     {.type = FIELD_INLINE, .offset = offsetof(struct scenario_bus, cfg), .sub = &scenario_bus_fields},
 };
-const struct fields scenario_buses_fields = FIELDS(buses_rows);
+const struct fields scenario_buses_fields = FIELDS_OF(struct scenario_bus, buses_rows);
 
 static const struct field mems_rows[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = MEMS(name), .min = (lo), .max = (hi), .what = (words)}

@@ -38,7 +38,6 @@ void scenario_dump_site(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section);
 void scenario_dump_table(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section);
-void scenario_dump_vehicle(const struct field *d, const void *section, cJSON *to);
 
 struct site scenario_site(const struct scenario_site *s);
 
@@ -51,7 +50,7 @@ bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, 
 /* The node of its level unit, by the name that it gives. */
 void scenario_bind_level(const struct scenario *s, struct scenario_unit *u);
 
-/* An element of `units`, which may be several units. */
-bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s);
+/* The list `units`, an element of which may be several units. */
+bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, void *section);
 
 #endif

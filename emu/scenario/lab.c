@@ -118,15 +118,14 @@ static const struct field axis_rows[] = {
     {.key = "readout_delay_s",          .type = FIELD_REAL, .offset = AXIS(readout_delay_s), .max = 1, .what = "delay of the readout"},
     {.key = "readout_zero_arcsec",      .type = FIELD_REAL, .offset = AXIS(readout_zero_arcsec), .min = -3600, .max = 3600, .what = "offset of the readout"},
 };
-const struct fields scenario_axis_of_table_fields = FIELDS(axis_rows);
+const struct fields scenario_axis_of_table_fields = FIELDS_OF(struct table_axis_cfg, axis_rows);
 
 static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *section);
-static void dump_axes(const struct field *d, const void *section, cJSON *to);
 
 static const struct field table_rows[] = {
     {.key = "base_tilt_x_arcsec", .type = FIELD_REAL, .offset = TABLE(base_tilt_x_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's x"},
     {.key = "base_tilt_y_arcsec", .type = FIELD_REAL, .offset = TABLE(base_tilt_y_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's y"},
-    {.key = "axes", .type = FIELD_CUSTOM, .load = load_axes, .dump = dump_axes, .what = "number of axes, 1 to 3, or a sequence of axes from the outermost"},
+    {.key = "axes", .type = FIELD_STRUCTS, .offset = TABLE(axis), .present = TABLE(axes), .sub = &scenario_axis_of_table_fields, .load = load_axes, .what = "number of axes, 1 to 3, or a sequence of axes from the outermost"},
 };
 const struct fields scenario_table_fields = FIELDS(table_rows);
 // clang-format on
@@ -157,12 +156,6 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
         if (!check_axis(f, item->value, &t->axis[i])) return false;
     }
     return true;
-}
-
-static void dump_axes(const struct field *d, const void *section, cJSON *to)
-{
-    const struct table_cfg *t = section;
-    yaml_dump_list(&scenario_axis_of_table_fields, t->axis, sizeof *t->axis, t->axes, d->key, to);
 }
 
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section)

@@ -58,12 +58,6 @@ bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, vo
     return yaml_load(f, node, "vehicle", &scenario_vehicle_fields, &((struct scenario *)section)->lab.vehicle);
 }
 
-void scenario_dump_vehicle(const struct field *d, const void *section, cJSON *to)
-{
-    const struct lab_cfg *lab = &((const struct scenario *)section)->lab;
-    if (lab->platform.present) yaml_dump(&scenario_vehicle_fields, &lab->vehicle, cJSON_AddObjectToObject(to, d->key));
-}
-
 /* ---- what is in more than one key */
 
 static const struct scenario_unit *unit_named(const struct scenario *s, const char *name)

@@ -74,18 +74,7 @@ static bool buses_are_loaded(struct yaml_file *f, const struct yaml_node *node, 
     return yaml_file_fail(f, node, "buses", "expected bus or buses, got both");
 }
 
-static void dump_buses(const struct field *d, const void *section, cJSON *to)
-{
-    const struct scenario *s = section;
-    yaml_dump_list(&scenario_buses_fields, s->bus, sizeof *s->bus, s->bus_count, d->key, to);
-}
-
 /* ---- units and their spread */
-
-static bool load_units(struct yaml_file *f, const struct yaml_node *node, void *section)
-{
-    return scenario_load_units(f, node, section);
-}
 
 static void dump_units(const struct field *d, const void *section, cJSON *to)
 {
@@ -123,12 +112,6 @@ static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void 
         .key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
     const struct fields all = {.row = rows, .count = n + 1};
     return yaml_load(f, node, "spread", &all, &s->spread);
-}
-
-static void dump_spread(const struct field *d, const void *section, cJSON *to)
-{
-    yaml_dump(&scenario_spread_fields, &((const struct scenario *)section)->spread,
-              cJSON_AddObjectToObject(to, d->key));
 }
 
 // clang-format off
@@ -174,7 +157,7 @@ static const struct field event_rows[] = {
     {.key = "cmd",  .type = FIELD_TEXT, .offset = offsetof(struct scenario_event, cmd), .max = 32, .what = "a command of the control socket"},
     {.key = "args", .type = FIELD_CUSTOM, .load = load_args, .dump = dump_args, .what = "arguments of the command, a mapping"},
 };
-const struct fields scenario_event_fields = FIELDS(event_rows);
+const struct fields scenario_event_fields = FIELDS_OF(struct scenario_event, event_rows);
 // clang-format on
 
 static struct scenario_event *new_event(struct yaml_file *f, const struct yaml_node *node, const char *list,
@@ -221,12 +204,6 @@ static bool load_faults(struct yaml_file *f, const struct yaml_node *node, void 
     return true;
 }
 
-static void dump_timeline(const struct field *d, const void *section, cJSON *to)
-{
-    const struct scenario_events *t = &((const struct scenario *)section)->timeline;
-    yaml_dump_list(&scenario_event_fields, t->event, sizeof *t->event, t->count, d->key, to);
-}
-
 static void dump_faults(const struct field *d, const void *section, cJSON *to)
 {
     const struct scenario_events *t = &((const struct scenario *)section)->faults;
@@ -254,17 +231,17 @@ static const struct field scenario_rows[] = {
     {.key = "seed",  .type = FIELD_U64, .offset = SCENARIO(seed), .max = 18446744073709551615.0, .what = "random seed; each unit and noise source has its own stream"},
     {.key = "start", .type = FIELD_BOOL, .offset = SCENARIO(start), .what = "write the frame forms and start the units from the bench's own node, 1 ms after power-on"},
     {.key = "bus",   .type = FIELD_CUSTOM, .load = load_bus, .what = "the only bus, `can0`"},
-    {.key = "buses", .type = FIELD_CUSTOM, .load = buses_are_loaded, .dump = dump_buses, .what = "a sequence of up to 8 buses"},
+    {.key = "buses", .type = FIELD_STRUCTS, .offset = SCENARIO(bus), .present = SCENARIO(bus_count), .sub = &scenario_buses_fields, .load = buses_are_loaded, .what = "a sequence of up to 8 buses"},
     {.key = "site",  .type = FIELD_CUSTOM, .load = scenario_load_site, .dump = scenario_dump_site, .what = "location of the bench"},
     {.key = "head",  .type = FIELD_SECTION, .offset = SCENARIO(lab.head), .sub = &scenario_head_fields, .what = "the dividing head"},
     {.key = "table", .type = FIELD_CUSTOM, .load = scenario_load_table, .dump = scenario_dump_table, .what = "the rate table; without it there is none"},
     {.key = "chamber", .type = FIELD_SECTION, .offset = SCENARIO(lab.chamber), .sub = &scenario_chamber_fields, .present = SCENARIO(lab.chamber.present), .what = "the thermal chamber; without it there is none"},
     {.key = "supply", .type = FIELD_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
     {.key = "platform", .type = FIELD_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
-    {.key = "vehicle", .type = FIELD_CUSTOM, .load = scenario_load_vehicle, .dump = scenario_dump_vehicle, .what = "the vehicle that carries the platform"},
-    {.key = "spread", .type = FIELD_CUSTOM, .load = load_spread, .dump = dump_spread, .what = "production spread: standard deviations from unit to unit"},
-    {.key = "units", .type = FIELD_CUSTOM, .load = load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
-    {.key = "timeline", .type = FIELD_CUSTOM, .load = load_timeline, .dump = dump_timeline, .what = "a sequence of commands, each at its time"},
+    {.key = "vehicle", .type = FIELD_SECTION, .offset = SCENARIO(lab.vehicle), .sub = &scenario_vehicle_fields, .present = SCENARIO(lab.platform.present), .load = scenario_load_vehicle, .what = "the vehicle that carries the platform"},
+    {.key = "spread", .type = FIELD_SECTION, .offset = SCENARIO(spread), .sub = &scenario_spread_fields, .load = load_spread, .what = "production spread: standard deviations from unit to unit"},
+    {.key = "units", .type = FIELD_CUSTOM, .load = scenario_load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
+    {.key = "timeline", .type = FIELD_STRUCTS, .offset = SCENARIO(timeline.event), .present = SCENARIO(timeline.count), .sub = &scenario_event_fields, .load = load_timeline, .what = "a sequence of commands, each at its time"},
     {.key = "faults", .type = FIELD_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
 };
 const struct fields scenario_fields = FIELDS(scenario_rows);

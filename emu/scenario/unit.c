@@ -366,11 +366,11 @@ static bool load_entry(struct yaml_file *f, const struct yaml_node *node, struct
     return true;
 }
 
-bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, struct scenario *s)
+bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     if (node->kind != YAML_SEQUENCE) return yaml_file_expected(f, node, "units", "a list of units");
     for (const struct yaml_item *i = node->first; i; i = i->next)
-        if (!load_entry(f, i->value, s)) return false;
+        if (!load_entry(f, i->value, section)) return false;
     return true;
 }
 
