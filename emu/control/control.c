@@ -14,8 +14,9 @@ void control_init(struct control *c, const struct control_table *const *tables, 
 
 /* ---- carrying out */
 
-enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
-                                cJSON *result, int64_t t_ns)
+/* The one way to carry out a command. */
+static enum control_outcome carry_out(struct control *c, const struct control_command *row,
+                                      const struct control_value *v, cJSON *result, int64_t t_ns)
 {
     const struct control_call call = {c, c->bench, v, result, t_ns};
     const char *missing = row->missing ? row->missing(c->bench) : NULL;
@@ -35,7 +36,7 @@ enum control_outcome control_call(struct control *c, const char *cmd, const cJSO
     const struct control_command *row = control_find(c->tables, cmd);
     if (!row) return control_reject(c, "command", "\"%.40s\": unknown command; see help", cmd);
     if (!control_args(c->bench, row, args, v, &c->error)) return CONTROL_REJECTED;
-    return control_do(c, row, v, result, t_ns);
+    return carry_out(c, row, v, result, t_ns);
 }
 
 bool control_check(const struct control_table *const *tables, const struct control_bench *b, const char *cmd,

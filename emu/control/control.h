@@ -57,11 +57,7 @@ void control_cycles_forget(struct control *c, const void *client); /* the same f
 
 /* ---- a command without a line: scenarios, SCPI, the journal */
 
-/* The one way to carry out a command: runs the handler and tells the journal. */
-enum control_outcome control_do(struct control *c, const struct control_command *row, const struct control_value *v,
-                                cJSON *result, int64_t t_ns);
-
-/* Both, by name; the error is in c. */
+/* Runs the handler of a command and tells the journal; the error is in c. */
 enum control_outcome control_call(struct control *c, const char *cmd, const cJSON *args, cJSON *result, int64_t t_ns);
 
 /* Whether control_call() of a control with these tables would get as far as the handler; does nothing. False with the reason in why[CONTROL_WHY_MAX]. */

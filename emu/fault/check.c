@@ -66,7 +66,8 @@ static int64_t ns_of_s(double s)
     return (int64_t)nearbyint(s * (double)NS_PER_S);
 }
 
-bool fault_values_fit(const struct fault *f, struct control_error *why)
+/* Whether the values are those of its kind. */
+static bool values_fit(const struct fault *f, struct control_error *why)
 {
     const struct fault_kind *k = f->kind;
     for (unsigned i = FAULT_FOR_S; i < FAULT_ARGS; i++) {
@@ -140,7 +141,7 @@ bool fault_make(const struct control_bench *b, const struct control_value *v, st
     if (!set_trigger(b, v, out, why)) return false;
     why->code = "point";
     if (!(out->kind->places & FAULT_BIT(out->point.place))) return fault_fits(b, out, why->why);
-    if (!fault_values_fit(out, why)) return false;
+    if (!values_fit(out, why)) return false;
     why->code = "point";
     return fault_fits(b, out, why->why);
 }

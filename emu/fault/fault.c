@@ -1,8 +1,36 @@
 /* The life of a fault: it waits for its instant, then for its event, begins, lasts, and ends. */
 #include "fault/fault.h"
 
+#include "fault/internal.h"
+
 #include <assert.h>
 #include <string.h>
+
+/* ---- kinds: a new table is named here, a new kind is a row of its layer's file */
+
+const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog,   &fault_chip,
+                                                  &fault_controller, &fault_line,     &fault_link,
+                                                  &fault_supply,     &fault_platform, NULL};
+
+const struct fault_kind *fault_kind(unsigned i)
+{
+    for (unsigned t = 0; fault_tables[t]; t++) {
+        if (i < fault_tables[t]->count) return &fault_tables[t]->kind[i];
+        i -= fault_tables[t]->count;
+    }
+    return NULL;
+}
+
+const struct fault_kind *fault_kind_find(const char *name)
+{
+    const struct fault_kind *k;
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
+        if (strcmp(k->name, name) == 0) return k;
+    }
+    return NULL;
+}
+
+/* ---- life */
 
 void fault_init(struct fault_engine *e, const struct control_bench *bench, struct sched *s)
 {

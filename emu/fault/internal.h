@@ -20,7 +20,4 @@ static inline bool fault_lasts_at(const struct fault *f, const struct fault *oth
            other->point.index == f->point.index;
 }
 
-/* fault/check.c: whether the values are those of its kind; false with the error. */
-bool fault_values_fit(const struct fault *f, struct control_error *why);
-
 #endif

@@ -100,12 +100,11 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
 
 /* ---- sections */
 
-bool yaml_fail_unknown(struct yaml_file *f, const struct yaml_node *key, const char *(*name)(const void *ctx, size_t i),
-                       const void *ctx)
+static bool fail_unknown(struct yaml_file *f, const struct yaml_node *key, const struct fields *t)
 {
     char known[600] = "";
-    for (size_t i = 0; name(ctx, i); i++) why_list_add(known, sizeof known, name(ctx, i));
-    const char *text = yaml_scalar(key), *near = text ? yaml_nearest(text, name, ctx) : NULL;
+    for (size_t i = 0; key_at(t, i); i++) why_list_add(known, sizeof known, key_at(t, i));
+    const char *text = yaml_scalar(key), *near = text ? yaml_nearest(text, key_at, t) : NULL;
     const bool unit = near && strncmp(near, text, strlen(text)) == 0 && *yaml_unit(near);
     return yaml_file_fail(f, key, text ? text : "?", "unknown key%s%s%s; expected one of %s", near ? ", nearest: " : "",
                           near ? near : "", unit ? " (its unit is part of the name)" : "", known);
@@ -130,7 +129,7 @@ static bool load_pair(struct yaml_file *f, const struct yaml_node *node, const s
             return yaml_file_fail(f, pair->key, name, "expected the key once, got it twice");
         return load_value(f, pair->value, d, section + offset);
     }
-    return yaml_fail_unknown(f, pair->key, key_at, t);
+    return fail_unknown(f, pair->key, t);
 }
 
 bool yaml_load_by(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct fields *t,

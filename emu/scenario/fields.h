@@ -27,10 +27,6 @@ bool yaml_load(struct yaml_file *f, const struct yaml_node *node, const char *na
 bool yaml_load_by(struct yaml_file *f, const struct yaml_node *node, const char *name, const struct fields *t,
                   void *section, yaml_value_fn *load_value, const char *except);
 
-/* The error of a key that is none of name(ctx, i), i = 0 ... NULL; false. */
-bool yaml_fail_unknown(struct yaml_file *f, const struct yaml_node *key, const char *(*name)(const void *ctx, size_t i),
-                       const void *ctx);
-
 /* Adds every key with its value. */
 void yaml_dump(const struct fields *t, const void *section, cJSON *to);
 

@@ -87,31 +87,21 @@ static void dump_units(const struct field *d, const void *section, cJSON *to)
     }
 }
 
-enum { SPREAD_ROWS = 64 };
-
-/* The rows of numbers, each from 0 to the width of its range: deviations. */
-static size_t make_deviation_rows(const struct fields *t, struct field *out)
+/* A number, from 0 to the width of its range: a deviation. */
+static bool load_deviation(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *section)
 {
-    size_t n = 0, offset;
-    for (const struct field *d; (d = yaml_row(t, n, &offset)) && n < SPREAD_ROWS; n++) {
-        out[n] = *d;
-        out[n].offset += offset;
-        out[n].min = 0;
-        out[n].max = d->max - d->min;
-    }
-    return n;
+    struct field row = *d;
+    if (d->type == FIELD_SECTION)
+        return yaml_load_by(f, node, d->key, d->sub, (char *)section + d->offset, load_deviation, NULL);
+    row.min = 0;
+    row.max = d->max - d->min;
+    return yaml_load_value(f, node, &row, section);
 }
 
 static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void *section)
 {
     struct scenario *s = section;
-    struct field afe[SPREAD_ROWS], rows[SPREAD_ROWS + 1];
-    const struct fields afe_fields = {.row = afe, .count = make_deviation_rows(&scenario_afe_numbers, afe)};
-    const size_t n = make_deviation_rows(&scenario_mems_fields, rows);
-    rows[n] = (struct field){
-        .key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &afe_fields};
-    const struct fields all = {.row = rows, .count = n + 1};
-    return yaml_load(f, node, "spread", &all, &s->spread);
+    return yaml_load_by(f, node, "spread", &scenario_spread_fields, &s->spread, load_deviation, NULL);
 }
 
 // clang-format off

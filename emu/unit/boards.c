@@ -9,13 +9,6 @@
 const struct board_type *const board_types[] = {BOARD_TYPES(TYPE) NULL};
 const struct board_name board_names[] = {BOARD_TYPES(OWN_NAME) BOARD_ALIASES(ALIAS){NULL, NULL, NULL, NULL}};
 
-const struct board_type *board_find(const char *name)
-{
-    for (unsigned i = 0; board_types[i]; i++)
-        if (strcmp(board_types[i]->name, name) == 0) return board_types[i];
-    return NULL;
-}
-
 const struct board_name *board_name_find(const char *name)
 {
     for (const struct board_name *n = board_names; n->name; n++)

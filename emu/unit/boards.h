@@ -26,7 +26,6 @@ struct board_name {
 };
 extern const struct board_name board_names[]; /* up to a NULL name; the types' own first */
 
-const struct board_type *board_find(const char *name); /* a type by its own name; NULL: none */
 const struct board_name *board_name_find(const char *name);
 const char *board_name_title(const struct board_name *n);
 

@@ -37,12 +37,22 @@ static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
     q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
 }
 
+/* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is
+ * in the unit: at_m stays in the case's axes. */
+static void gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
+{
+    double a[3];
+    lab_sensor_mps2(u->lab, &u->cfg.mounting, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns,
+                    a);
+    for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
+}
+
 static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
 {
     struct unit *u = ctx;
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
-    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    gravity_mps2(u, axis, t_ns, a_mps2);
     warm_sensor(u, axis, t_ns);
     const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
                                                                : mems_out_v(&u->mems[axis], a_mps2, t_ns);
@@ -224,21 +234,11 @@ struct can_node *unit_node(const struct unit *u)
     return u->can ? &u->type->can->node(u->can)->stream : NULL;
 }
 
-/* The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is
- * in the unit: at_m stays in the case's axes. */
-void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
-{
-    double a[3];
-    lab_sensor_mps2(u->lab, &u->cfg.mounting, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns,
-                    a);
-    for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
-}
-
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
 {
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
-    unit_gravity_mps2(u, axis, t_ns, a_mps2);
+    gravity_mps2(u, axis, t_ns, a_mps2);
     warm_sensor(u, axis, t_ns);
     if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);

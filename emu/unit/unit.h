@@ -86,9 +86,6 @@ struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
 void unit_subscribe(struct unit *u, struct unit_observer *l);
 void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless without a subscription */
 
-/* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. Truth. */
-void unit_gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3]);
-
 /* What the sensor of a channel would give without noise: volts, or amperes if it is a quartz. Truth. */
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns);
 

@@ -63,12 +63,12 @@ static void each_type_is_complete(void **state)
         every_pointer_is_there(*t);
         every_part_says_what_it_can(*t);
         every_key_is_told(*t);
-        assert_ptr_equal(board_find((*t)->name), *t);
+        assert_ptr_equal(board_name_find((*t)->name)->type, *t);
         for (unsigned i = 0; i < (*t)->event_count; i++) assert_non_null((*t)->events[i]);
         for (const struct board_type *const *other = board_types; other < t; other++)
             assert_int_not_equal((*t)->node, (*other)->node);
     }
-    assert_null(board_find("psa1")); /* a name, not a type */
+    assert_non_null(board_name_find("psa1")->profile); /* a name, not a type */
 }
 
 static void names_lead_to_types_and_their_profiles(void **state)
@@ -398,7 +398,7 @@ static void a_refusal_says_what_would_be_right(void **state)
     for (size_t i = 0; i < COUNT(rows); i++) {
         char why[BOARD_CYCLE_WHY_MAX];
         struct board_cycle c = rows[i].c;
-        live(board_find(rows[i].board), NS_PER_S);
+        live(board_name_find(rows[i].board)->type, NS_PER_S);
         const enum board_cycle_result r = cycle(&c);
         board_cycle_why(w.u.type->bus, w.u.board, &c, r, why);
         if (!strstr(why, rows[i].why)) fail_msg("\"%s\" does not say \"%s\"", why, rows[i].why);
