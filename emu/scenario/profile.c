@@ -18,7 +18,7 @@ static bool set_element(struct yaml_file *f, const struct yaml_node *node, const
     return yaml_file_fail(f, node, NULL, "%s", why);
 }
 
-static bool set_value(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *profile)
+bool profile_yaml_value(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *profile)
 {
     unsigned index = 0;
     if (!field_is_list(d)) return set_element(f, node, d, 0, profile);
@@ -28,12 +28,6 @@ static bool set_value(struct yaml_file *f, const struct yaml_node *node, const s
     if (d->count && index != d->count)
         return yaml_file_fail(f, node, d->key, "expected %u elements, got %u", d->count, index);
     return index > 0 || yaml_file_fail(f, node, d->key, "expected at least one element, got none");
-}
-
-bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
-                         void *profile)
-{
-    return yaml_load_by(f, mapping, "", type->fields, profile, set_value, NULL);
 }
 
 /* Node of the key that a sentence of the check begins with, or the mapping: so that the message has its line. */
@@ -55,23 +49,16 @@ bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, co
     return yaml_file_fail(f, find_blamed(mapping, why), NULL, "%s", why);
 }
 
-void profile_yaml_boards(char *known, size_t cap)
+const struct board_name *profile_yaml_board(struct yaml_file *f, const struct yaml_node *mapping)
 {
-    known[0] = '\0';
-    for (const struct board_name *n = board_names; n->name; n++) {
-        const size_t at = strlen(known);
-        snprintf(known + at, cap - at, "%s%s", !at ? "" : n[1].name ? ", " : " or ", n->name);
-    }
-}
-
-/* The board that a file names; NULL with its line in why. */
-static const struct board_name *find_board(struct yaml_file *f)
-{
-    char known[160];
-    const struct yaml_node *node = f->root->kind == YAML_MAPPING ? yaml_get(f->root, "board") : NULL;
+    char known[160] = "";
+    const struct yaml_node *node = yaml_get(mapping, "board");
     const char *name = node ? yaml_scalar(node) : board_names[0].name;
     const struct board_name *found = name ? board_name_find(name) : NULL;
-    profile_yaml_boards(known, sizeof known);
+    for (const struct board_name *n = board_names; !found && n->name; n++) {
+        const size_t at = strlen(known);
+        snprintf(known + at, sizeof known - at, "%s%s", !at ? "" : n[1].name ? ", " : " or ", n->name);
+    }
     if (!found) (void)yaml_file_expected(f, node, "board", "%s", known);
     return found;
 }
@@ -81,12 +68,12 @@ bool profile_yaml_load(const char *path, const struct board_name **board, union 
 {
     struct yaml_file f;
     if (!yaml_file_open(&f, path, why, cap)) return false;
-    *board = find_board(&f);
+    *board = profile_yaml_board(&f, f.root);
     bool ok = *board != NULL;
     if (ok) {
         const struct board_type *type = (*board)->type;
         fields_default(type->fields, p);
-        ok = yaml_load_by(&f, f.root, "", type->fields, p, set_value, "board") &&
+        ok = yaml_load_by(&f, f.root, "", type->fields, p, profile_yaml_value, "board") &&
              profile_yaml_check(&f, f.root, type, p);
     }
     yaml_file_close(&f);

@@ -13,12 +13,11 @@
 bool profile_yaml_load(const char *path, const struct board_name **board, union board_profile_store *p, char *why,
                        size_t cap);
 
-/* The names of all boards: "psa2, psd1 or pmka". */
-void profile_yaml_boards(char *known, size_t cap);
+/* The board that a file or a unit names by its key `board`, psa2 without it; NULL with the error in f, which lists all names. */
+const struct board_name *profile_yaml_board(struct yaml_file *f, const struct yaml_node *mapping);
 
-/* The same in two steps, of a mapping in a file that is open: its keys into the profile, and whether a board can run it. */
-bool profile_yaml_fields(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
-                         void *profile);
+/* The same in two steps, of a mapping in a file that is open: its values by yaml_load_by(), and whether a board can run it. */
+yaml_value_fn profile_yaml_value;
 bool profile_yaml_check(struct yaml_file *f, const struct yaml_node *mapping, const struct board_type *type,
                         const void *profile);
 

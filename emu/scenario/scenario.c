@@ -105,13 +105,9 @@ static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void 
 }
 
 // clang-format off
-static const struct field spread_afe_rows[] = {
-    {.type = FIELD_INLINE, .sub = &scenario_afe_numbers},
-};
-static const struct fields spread_afe_fields = FIELDS(spread_afe_rows);
 static const struct field spread_rows[] = {
     {.type = FIELD_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
-    {.key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &spread_afe_fields, .what = "parameters of the analog chain"},
+    {.key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &scenario_afe_numbers, .what = "parameters of the analog chain"},
 };
 const struct fields scenario_spread_fields = FIELDS(spread_rows);
 // clang-format on

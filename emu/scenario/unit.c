@@ -13,13 +13,6 @@
 
 /* ---- board and profile: they decide what the other keys default to, so they are read first, wherever they stand */
 
-static bool fail_board(struct yaml_file *f, const struct yaml_node *node)
-{
-    char known[160];
-    profile_yaml_boards(known, sizeof known);
-    return yaml_file_expected(f, node, "board", "%s", known);
-}
-
 /* What is wrong within the profile is reported with its line there, that it is another board's with the line here. */
 static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
 {
@@ -41,16 +34,15 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
 static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        struct scenario_unit *u)
 {
-    const struct yaml_node *board = yaml_get(node, "board"), *profile = yaml_get(node, "profile");
-    const char *name = board ? yaml_scalar(board) : board_names[0].name;
-    const struct board_name *found = name ? board_name_find(name) : NULL;
-    if (!found) return fail_board(f, board);
+    const struct yaml_node *profile = yaml_get(node, "profile");
+    const struct board_name *found = profile_yaml_board(f, node);
+    if (!found) return false;
     scenario_unit_board(u, found);
     unsigned before = 0;
     for (unsigned i = 0; i < s->unit_count; i++) before += s->units[i].cfg.type == found->type;
     u->cfg.node = (uint8_t)(u->cfg.node + before);
     if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
-    name = yaml_scalar(profile);
+    const char *name = yaml_scalar(profile);
     if (!name) return yaml_file_expected(f, profile, "profile", "a name of proto/profiles or a path");
     return find_profile(f, profile, name, u);
 }
@@ -75,9 +67,7 @@ static bool load_profile_set(struct yaml_file *f, const struct yaml_node *node, 
     struct scenario_unit *u = section;
     const struct board_type *type = u->board->type;
     const size_t outer = strlen(f->where);
-    if (node->kind != YAML_MAPPING) return yaml_file_expected(f, node, "profile_set", "a mapping `key: value`");
-    snprintf(f->where + outer, sizeof f->where - outer, "profile_set.");
-    if (!profile_yaml_fields(f, node, type, &u->profile)) return false;
+    if (!yaml_load_by(f, node, "profile_set", type->fields, &u->profile, profile_yaml_value, NULL)) return false;
     snprintf(f->where + outer, sizeof f->where - outer, "profile_set: "); /* a whole sentence follows */
     if (!profile_yaml_check(f, node, type, &u->profile)) return false;
     f->where[outer] = '\0';

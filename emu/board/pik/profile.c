@@ -63,11 +63,6 @@ double pik_profile_step_v(const struct pik_profile *p)
     return p->uref_v / (p->rr_ohm * p->c_int_nf * 1e-9 * p->clock_hz);
 }
 
-double pik_profile_threshold(const struct pik_profile *p)
-{
-    return p->uc_v / pik_profile_step_v(p);
-}
-
 int64_t pik_profile_period_ns(const void *profile)
 {
     const struct pik_profile *p = profile;

@@ -43,12 +43,11 @@ struct pik_profile {
 extern const struct fields pik_fields;
 
 /* Of the nominal parts: Hz/V; V s of a pulse at the input, 1/K; pulses/s at most, either sign; V by which a reset moves the
- * integrator; pulses at which a reset begins. */
+ * integrator. */
 double pik_profile_k_hz_per_v(const struct pik_profile *p);
 double pik_profile_quantum_vs(const struct pik_profile *p);
 double pik_profile_limit_hz(const struct pik_profile *p);
 double pik_profile_step_v(const struct pik_profile *p);
-double pik_profile_threshold(const struct pik_profile *p);
 
 /* Between two readings by the clock; 0: none come by themselves. */
 int64_t pik_profile_period_ns(const void *profile);

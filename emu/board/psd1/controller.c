@@ -252,8 +252,8 @@ static void stop_all(struct psd1 *b, enum board_cycle_result why, int64_t t_ns)
     b->seq = 0;
     b->latest = (struct psd1_cycle){0};
     b->staged = b->last_command = b->temp_channel = b->service_channel = 0;
-    b->uc1 = psd1_profile_uc1(&b->profile);
-    b->uc2 = psd1_profile_uc2(&b->profile);
+    b->uc1 = psd1_profile_control(&b->profile, AD7712_SELF_CAL);
+    b->uc2 = psd1_profile_control(&b->profile, AD7712_NORMAL);
     psd1_job_stop(b, why, t_ns);
 }
 

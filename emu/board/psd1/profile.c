@@ -1,7 +1,6 @@
 #include "board/psd1/profile.h"
 
 #include "base/clk.h"
-#include "chip/ad7712/ad7712.h"
 
 #include <stdio.h>
 
@@ -64,19 +63,9 @@ static unsigned gain_log2(const struct psd1_profile *p)
     return n;
 }
 
-static uint32_t control_word(const struct psd1_profile *p, enum ad7712_md md)
+uint32_t psd1_profile_control(const struct psd1_profile *p, enum ad7712_md md)
 {
     return AD7712_CONTROL(md, gain_log2(p), p->adc_input - 1, 0, 0, p->adc_fs);
-}
-
-uint32_t psd1_profile_uc1(const struct psd1_profile *p)
-{
-    return control_word(p, AD7712_SELF_CAL);
-}
-
-uint32_t psd1_profile_uc2(const struct psd1_profile *p)
-{
-    return control_word(p, AD7712_NORMAL);
 }
 
 int64_t psd1_profile_period_ns(const void *profile)

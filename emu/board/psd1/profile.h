@@ -4,6 +4,7 @@
 #define PSABENCH_BOARD_PSD1_PROFILE_H
 
 #include "board/field.h"
+#include "chip/ad7712/ad7712.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -45,9 +46,8 @@ struct psd1_profile {
 
 extern const struct fields psd1_fields;
 
-/* Control words: UC1 calibrates, UC2 works (sources 3.2). */
-uint32_t psd1_profile_uc1(const struct psd1_profile *p);
-uint32_t psd1_profile_uc2(const struct psd1_profile *p);
+/* Control word of a mode: UC1 is that of self-calibration, UC2 the normal one (sources 3.2). */
+uint32_t psd1_profile_control(const struct psd1_profile *p, enum ad7712_md md);
 
 int64_t psd1_profile_period_ns(const void *profile); /* of the converters' words */
 

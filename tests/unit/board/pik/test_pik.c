@@ -198,7 +198,7 @@ static void counters_follow_the_specimen(void **state)
     for (unsigned i = 0; i < PIK_AXES; i++) {
         const double c = 1.0 + 1e-2 * r.b.specimen.c_pct[i];
         const double threshold = (double)r.b.channel[i].drive.threshold / (double)PIK_PULSE;
-        assert_true(fabs(c - 1.0) > 1e-3 && fabs(threshold - c * pik_profile_threshold(&p)) < 1e-9);
+        assert_true(fabs(c - 1.0) > 1e-3 && fabs(threshold - c * p.uc_v / pik_profile_step_v(&p)) < 1e-9);
     }
 }
 

@@ -53,7 +53,7 @@ static void a_pulse_rises_where_the_integral_is_at_uc(void **state)
 {
     (void)state;
     const struct pik_profile p = rig_pik6();
-    const double uc = pik_profile_threshold(&p);
+    const double uc = p.uc_v / pik_profile_step_v(&p);
     rig_init(&r, &p, 1);
     trace_attach(&r.b.base.trace, &r.sink);
     pik_power_up(&r.b, 0);
