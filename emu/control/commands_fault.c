@@ -69,9 +69,9 @@ static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
     cJSON_AddStringToObject(j, "what", a->what);
 }
 
-static void add_kind(cJSON *to, const struct fault_kind *k, const struct fault_types *types)
+static void add_kind(const struct control_bench *b, const struct fault_kind *k, cJSON *to)
 {
-    char name[FAULT_POINT_MAX];
+    struct fault_names names;
     cJSON *j = cJSON_CreateObject();
     cJSON_AddItemToArray(to, j);
     cJSON_AddStringToObject(j, "kind", k->name);
@@ -79,10 +79,8 @@ static void add_kind(cJSON *to, const struct fault_kind *k, const struct fault_t
     cJSON_AddStringToObject(j, "seen", k->seen);
     cJSON_AddBoolToObject(j, "once", k->once);
     cJSON *places = cJSON_AddArrayToObject(j, "points");
-    for (unsigned p = 0; p < FAULT_PLACES; p++) {
-        for (unsigned i = 0; k->places & FAULT_BIT(p) && fault_place_name(types, (enum fault_place)p, i, name); i++)
-            cJSON_AddItemToArray(places, cJSON_CreateString(name));
-    }
+    fault_place_names(b, NULL, k->places, &names);
+    for (unsigned i = 0; i < names.count; i++) cJSON_AddItemToArray(places, cJSON_CreateString(names.name[i]));
     cJSON *args = cJSON_AddArrayToObject(j, "args");
     for (unsigned i = 0; i < FAULT_ARGS; i++) {
         if ((k->need | k->may) & FAULT_BIT(i)) add_arg(args, (enum fault_arg)i, !(k->need & FAULT_BIT(i)));
@@ -93,8 +91,7 @@ static enum control_outcome do_kinds(const struct control_call *call)
 {
     cJSON *kinds = cJSON_AddArrayToObject(call->result, "kinds");
     const struct fault_kind *k;
-    const struct fault_types types = fault_types_of(call->bench);
-    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(kinds, k, &types);
+    for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) add_kind(call->bench, k, kinds);
     return CONTROL_DONE;
 }
 

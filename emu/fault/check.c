@@ -40,13 +40,9 @@ static bool has_unit(enum fault_place place)
 /* Where a kind works, in the names of the board that the point is on, or of the boards that there are. */
 static void join_places(const struct control_bench *b, const struct fault *f, char *out, size_t cap)
 {
-    char name[FAULT_POINT_MAX];
-    const bool on_board = has_unit(f->point.place);
-    const struct fault_types t = on_board ? fault_type_of(b->unit[f->point.unit]->type) : fault_types_of(b);
-    for (unsigned p = 0; p < FAULT_PLACES; p++) {
-        for (unsigned i = 0; f->kind->places & FAULT_BIT(p) && fault_place_name(&t, (enum fault_place)p, i, name); i++)
-            why_list_add(out, cap, name);
-    }
+    struct fault_names names;
+    fault_place_names(b, has_unit(f->point.place) ? b->unit[f->point.unit]->type : NULL, f->kind->places, &names);
+    for (unsigned i = 0; i < names.count; i++) why_list_add(out, cap, names.name[i]);
 }
 
 bool fault_fits(const struct control_bench *b, const struct fault *f, char *why)

@@ -32,24 +32,6 @@ const char *fault_place_what(enum fault_place place)
     return places[place].what;
 }
 
-/* ---- types of boards */
-
-struct fault_types fault_type_of(const struct board_type *t)
-{
-    return (struct fault_types){.type = {t}, .count = 1};
-}
-
-struct fault_types fault_types_of(const struct control_bench *b)
-{
-    struct fault_types t = {.count = 0};
-    for (unsigned i = 0; i < b->units; i++) {
-        unsigned k = 0;
-        while (k < t.count && t.type[k] != b->unit[i]->type) k++;
-        if (k == t.count && k < FAULT_TYPES_MAX) t.type[t.count++] = b->unit[i]->type;
-    }
-    return t;
-}
-
 /* ---- points of one unit, in a row */
 
 static const struct {
@@ -197,47 +179,39 @@ static bool same_group(const char *a, const char *b)
     return n > 0 && n == group_len(b) && strncmp(a, b, n) == 0;
 }
 
-/* The i-th group of parts of a board at a place, or how many there are less than that. */
-static bool part_name(const struct board_type *t, enum fault_place place, unsigned *i, char *name)
+static void add_name(struct fault_names *names, const char *name)
+{
+    for (unsigned i = 0; i < names->count; i++)
+        if (strcmp(names->name[i], name) == 0) return;
+    if (names->count < FAULT_NAMES_MAX) snprintf(names->name[names->count++], FAULT_POINT_MAX, "%s", name);
+}
+
+static void add_parts(const struct board_type *t, enum fault_place place, struct fault_names *names)
 {
     unsigned first;
-    const unsigned count = index_count(t, place, &first);
-    for (unsigned p = first; p < first + count; p++) {
+    const unsigned count = index_count(t, place, &first), end = first + count;
+    for (unsigned p = first; p < end; p++) {
+        char name[FAULT_POINT_MAX];
         const char *part = t->parts[p].name;
-        const bool begins = part && (p == first || !t->parts[p - 1].name || !same_group(part, t->parts[p - 1].name));
-        if (!begins || (*i)-- > 0) continue;
-        size_t at = (size_t)snprintf(name, FAULT_POINT_MAX, "UNIT.%s", part);
-        for (p++; p < first + count && t->parts[p].name && same_group(part, t->parts[p].name); p++) {
-            if (at < FAULT_POINT_MAX)
-                at += (size_t)snprintf(name + at, FAULT_POINT_MAX - at, "|%s", t->parts[p].name + group_len(part));
+        if (!part) continue;
+        size_t at = (size_t)snprintf(name, sizeof name, "UNIT.%s", part);
+        for (; p + 1 < end && t->parts[p + 1].name && same_group(part, t->parts[p + 1].name); p++) {
+            if (at < sizeof name)
+                at += (size_t)snprintf(name + at, sizeof name - at, "|%s", t->parts[p + 1].name + group_len(part));
         }
-        return true;
+        add_name(names, name);
     }
-    return false;
 }
 
-/* Whether an earlier type has this name, too. */
-static bool named_before(const struct fault_types *t, unsigned type, enum fault_place place, const char *name)
+void fault_place_names(const struct control_bench *b, const struct board_type *only, uint64_t at,
+                       struct fault_names *names)
 {
-    char other[FAULT_POINT_MAX];
-    for (unsigned k = 0; k < type; k++) {
-        for (unsigned i = 0, left = 0; part_name(t->type[k], place, &left, other); left = ++i) {
-            if (strcmp(other, name) == 0) return true;
-        }
+    names->count = 0;
+    for (unsigned p = 0; p < FAULT_PLACES; p++) {
+        const bool of_parts = p == FAULT_AT_CHIP || p == FAULT_AT_CONTROLLER;
+        if (!(at >> p & 1)) continue;
+        if (!of_parts) add_name(names, places[p].name);
+        for (unsigned i = 0; of_parts && i < (only ? 1 : b->units); i++)
+            add_parts(only ? only : b->unit[i]->type, (enum fault_place)p, names);
     }
-    return false;
-}
-
-bool fault_place_name(const struct fault_types *t, enum fault_place place, unsigned i, char name[FAULT_POINT_MAX])
-{
-    if (place != FAULT_AT_CHIP && place != FAULT_AT_CONTROLLER) {
-        snprintf(name, FAULT_POINT_MAX, "%s", places[place].name);
-        return i == 0;
-    }
-    for (unsigned k = 0; k < t->count; k++) {
-        for (unsigned n = 0, left = 0; part_name(t->type[k], place, &left, name); left = ++n) {
-            if (!named_before(t, k, place, name) && i-- == 0) return true;
-        }
-    }
-    return false;
 }

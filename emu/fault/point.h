@@ -26,22 +26,21 @@ struct fault_point {
     unsigned unit, index; /* index: axis, part, line or bus, from 0; of a client its control_client.slot */
 };
 
-#define FAULT_TYPES_MAX 8u /* of boards */
-
-/* Types of boards whose points are meant. */
-struct fault_types {
-    const struct board_type *type[FAULT_TYPES_MAX];
-    unsigned count;
-};
-
-struct fault_types fault_types_of(const struct control_bench *b); /* each once, in order of the units */
-struct fault_types fault_type_of(const struct board_type *t);     /* this one alone */
-
 /* The n-th point of a bench with its name; false past the last. */
 bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX]);
 
-/* The i-th way in which points of a place are named on such boards: "UNIT.sensor.x|y|z"; false past the last. */
-bool fault_place_name(const struct fault_types *t, enum fault_place place, unsigned i, char name[FAULT_POINT_MAX]);
+#define FAULT_NAMES_MAX 64u
+
+/* How points are named: "UNIT.sensor.x|y|z", each once. */
+struct fault_names {
+    char name[FAULT_NAMES_MAX][FAULT_POINT_MAX];
+    unsigned count;
+};
+
+/* Names of the points at these places (bits of enum fault_place): on the boards of a bench, or on those of a type alone
+ * (NULL: of all). */
+void fault_place_names(const struct control_bench *b, const struct board_type *only, uint64_t at,
+                       struct fault_names *names);
 
 const char *fault_place_any(enum fault_place place); /* on whatever board: "UNIT.CHIP" */
 bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
