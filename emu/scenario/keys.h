@@ -28,7 +28,6 @@ extern const struct fields scenario_fields;               /* of struct scenario 
 
 void scenario_default(struct scenario *s, const char *path);
 struct scenario_unit scenario_unit_default(unsigned i); /* of the i-th unit, with the first of the boards */
-void scenario_unit_board(struct scenario_unit *u, const struct board_name *name); /* with another; sets its defaults */
 
 void scenario_dump_unit(const struct scenario_unit *u, cJSON *to); /* the keys that its board has */
 

@@ -177,27 +177,21 @@ void scenario_dump_table(const struct field *d, const void *section, cJSON *to)
 
 /* ---- what is in two keys */
 
-static const struct yaml_node *node_at(const struct yaml_node *root, const char *section, const char *key)
-{
-    const struct yaml_node *in = yaml_get(root, section), *value = yaml_get(in, key);
-    return value ? value : in ? in : root;
-}
-
 bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab)
 {
     const struct chamber_cfg *c = &lab->chamber;
     const struct supply_cfg *s = &lab->supply;
     if (!(c->min_degc <= c->start_degc && c->start_degc <= c->max_degc)) {
-        return yaml_file_fail(f, node_at(root, "chamber", "start_degc"), "chamber.start_degc",
+        return yaml_file_fail(f, yaml_at(yaml_at(root, "chamber"), "start_degc"), "chamber.start_degc",
                               "expected %.10g to %.10g (min_degc to max_degc), got %.10g", c->min_degc, c->max_degc,
                               c->start_degc);
     }
     if (s->volt_v > s->volt_max_v)
-        return yaml_file_fail(f, node_at(root, "supply", "volt_v"), "supply.volt_v",
+        return yaml_file_fail(f, yaml_at(yaml_at(root, "supply"), "volt_v"), "supply.volt_v",
                               "expected up to %.10g (volt_max_v), got %.10g", s->volt_max_v, s->volt_v);
     if (s->ripple_v > s->ripple_max_v || s->ripple_hz > s->ripple_max_hz)
         return yaml_file_fail(
-            f, node_at(root, "supply", "ripple_v"), "supply.ripple_v",
+            f, yaml_at(yaml_at(root, "supply"), "ripple_v"), "supply.ripple_v",
             "expected up to %.10g V (ripple_max_v) and %.10g Hz (ripple_max_hz), got %.10g V and %.10g Hz",
             s->ripple_max_v, s->ripple_max_hz, s->ripple_v, s->ripple_hz);
     return true;

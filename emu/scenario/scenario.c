@@ -17,9 +17,8 @@
 static bool check_rate(struct yaml_file *f, const struct yaml_node *node, const struct scenario_bus *b)
 {
     if (!b->cfg.bitrate_hz || b->cfg.bitrate_hz >= 10000) return true;
-    const struct yaml_node *at = yaml_get(node, "bitrate_hz");
-    return yaml_file_fail(f, at ? at : node, "bitrate_hz", "expected 10000 or more, or 0 (frames take no time), got %u",
-                          b->cfg.bitrate_hz);
+    return yaml_file_fail(f, yaml_at(node, "bitrate_hz"), "bitrate_hz",
+                          "expected 10000 or more, or 0 (frames take no time), got %u", b->cfg.bitrate_hz);
 }
 
 static bool load_bus(struct yaml_file *f, const struct yaml_node *node, void *section)

@@ -30,6 +30,14 @@ static bool find_profile(struct yaml_file *f, const struct yaml_node *node, cons
     return true;
 }
 
+/* Makes it a unit of another board, with its defaults. */
+static void set_board(struct scenario_unit *u, const struct board_name *name)
+{
+    u->board = name;
+    unit_cfg_type(&u->cfg, name->type);
+    fields_default(name->type->fields, &u->profile);
+}
+
 /* A unit of the type that its mapping names, the i-th of it, with its profile; the type's defaults for the rest. */
 static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        struct scenario_unit *u)
@@ -37,7 +45,7 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
     const struct yaml_node *profile = yaml_get(node, "profile");
     const struct board_name *found = profile_yaml_board(f, node);
     if (!found) return false;
-    scenario_unit_board(u, found);
+    set_board(u, found);
     unsigned before = 0;
     for (unsigned i = 0; i < s->unit_count; i++) before += s->units[i].cfg.type == found->type;
     u->cfg.node = (uint8_t)(u->cfg.node + before);
@@ -159,13 +167,6 @@ const struct fields scenario_unit_fields = FIELDS(unit_rows);
 
 /* ---- what no table can say */
 
-/* The node of a key that is wrong, else that of the whole. */
-static const struct yaml_node *node_at(const struct yaml_node *unit, const char *key)
-{
-    const struct yaml_node *value = yaml_get(unit, key);
-    return value ? value : unit;
-}
-
 static bool is_plain(const char *name)
 {
     return name[strspn(name, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
@@ -221,7 +222,7 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
 {
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         if (u->cfg.axis[i].sensor == UNIT_QUARTZ && u->cfg.board.afe[i].input != AFE_CURRENT) {
-            return yaml_file_fail(f, node_at(node, "axes"), "axes",
+            return yaml_file_fail(f, yaml_at(node, "axes"), "axes",
                                   "%c: expected afe: {input: current} for a quartz sensor", "xyz"[i]);
         }
     }
@@ -233,18 +234,18 @@ static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const 
                        const struct scenario_unit *u)
 {
     if (!is_plain(u->name))
-        return yaml_file_fail(f, node_at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
+        return yaml_file_fail(f, yaml_at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
     if (!check_inputs(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
-            return yaml_file_fail(f, node_at(node, "name"), "name",
+            return yaml_file_fail(f, yaml_at(node, "name"), "name",
                                   "expected a name of its own, got \"%s\", which another unit has", u->name);
         if (other->cfg.node == u->cfg.node && other->bus == u->bus) {
-            return yaml_file_fail(f, node_at(node, "node"), "node",
+            return yaml_file_fail(f, yaml_at(node, "node"), "node",
                                   "expected a node of its own, got %u, which unit %s has", u->cfg.node, other->name);
         }
         if (other->cfg.board.serial == u->cfg.board.serial) {
-            return yaml_file_fail(f, node_at(node, "serial"), "serial",
+            return yaml_file_fail(f, yaml_at(node, "serial"), "serial",
                                   "expected a number of its own, got %u, which unit %s has", u->cfg.board.serial,
                                   other->name);
         }
@@ -279,7 +280,7 @@ static bool find_bus(struct yaml_file *f, const struct yaml_node *node, const st
         why_list_add(known, sizeof known, s->bus[u->bus].name);
     }
     const char *near = yaml_nearest(u->bus_name, bus_at, s);
-    return yaml_file_fail(f, node_at(node, "bus"), "bus", "expected one of %s%s%s%s, got \"%s\"", known,
+    return yaml_file_fail(f, yaml_at(node, "bus"), "bus", "expected one of %s%s%s%s, got \"%s\"", known,
                           near ? " (nearest: " : "", near ? near : "", near ? ")" : "", u->bus_name);
 }
 
@@ -302,15 +303,8 @@ struct scenario_unit scenario_unit_default(unsigned i)
     if (i < 26) snprintf(u.name, sizeof u.name, "%c", 'a' + (int)i);
     else snprintf(u.name, sizeof u.name, "u%02u", i + 1);
     u.cfg.board.serial = i + 1;
-    scenario_unit_board(&u, &board_names[0]);
+    set_board(&u, &board_names[0]);
     return u;
-}
-
-void scenario_unit_board(struct scenario_unit *u, const struct board_name *name)
-{
-    u->board = name;
-    unit_cfg_type(&u->cfg, name->type);
-    fields_default(name->type->fields, &u->profile);
 }
 
 /* The k-th of the units that an entry represents. */
@@ -322,15 +316,15 @@ static bool place_unit(struct yaml_file *f, const struct yaml_node *node, const 
     struct scenario_unit *u = &s->units[s->unit_count];
     *u = e->unit;
     if (e->count && !number_name(e->unit.name, k + 1, u->name, sizeof u->name)) {
-        return yaml_file_fail(f, node_at(node, "name"), "name",
+        return yaml_file_fail(f, yaml_at(node, "name"), "name",
                               "expected a place for the number, as in u%%02u, got \"%s\"", e->unit.name);
     }
     const unsigned id = e->unit.cfg.node + k;
-    if (id > 127) return yaml_file_fail(f, node_at(node, "node"), "node", "expected 1 to 127, got %u", id);
+    if (id > 127) return yaml_file_fail(f, yaml_at(node, "node"), "node", "expected 1 to 127, got %u", id);
     u->cfg.node = (uint8_t)id;
     u->cfg.board.serial = e->unit.cfg.board.serial + k;
     if (u->cfg.board.serial < e->unit.cfg.board.serial || u->cfg.board.serial == 0)
-        return yaml_file_fail(f, node_at(node, "serial"), "serial", "expected up to 4294967295, got more by count");
+        return yaml_file_fail(f, yaml_at(node, "serial"), "serial", "expected up to 4294967295, got more by count");
     if (!check_unit(f, node, s, u)) return false;
     s->unit_count++;
     return true;

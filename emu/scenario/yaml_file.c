@@ -333,6 +333,12 @@ struct yaml_node *yaml_get(const struct yaml_node *node, const char *key)
     return NULL;
 }
 
+const struct yaml_node *yaml_at(const struct yaml_node *mapping, const char *key)
+{
+    const struct yaml_node *value = yaml_get(mapping, key);
+    return value ? value : mapping;
+}
+
 unsigned yaml_count(const struct yaml_node *node)
 {
     unsigned n = 0;

@@ -61,6 +61,9 @@ const char *yaml_scalar(const struct yaml_node *node);
 /* Value of a key of a mapping; NULL when it is not there, or node is no mapping. */
 struct yaml_node *yaml_get(const struct yaml_node *node, const char *key);
 
+/* Where to report what is wrong with a key: its value, or the mapping where it is not there. */
+const struct yaml_node *yaml_at(const struct yaml_node *mapping, const char *key);
+
 unsigned yaml_count(const struct yaml_node *node); /* items of a sequence or pairs of a mapping */
 
 /* The one of the names that is most like a mistyped word: name(ctx, i) for i = 0 ... NULL. A name without its unit at the
