@@ -29,7 +29,7 @@ struct can_bits can_bits_worst(uint8_t flags, uint8_t len);
 /* Time they take, each phase rounded to the nearest nanosecond; 0 on an ideal bus. */
 int64_t can_bits_ns(struct can_bits n, const struct can_bus_cfg *cfg);
 
-/* Code of a length in the frame's DLC field (9..15 for 12..64 bytes). */
+/* Code of a length in the frame's DLC field (9..15 for 12..64 bytes; the next larger one for an odd length). */
 uint8_t can_dlc(uint8_t len);
 
 #endif

@@ -4,7 +4,6 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -43,13 +42,7 @@ static void on_closed(struct text_link *t, int64_t t_ns)
     t->link.gone = true;
 }
 
-static void on_release(struct link *l)
-{
-    text_link_free((struct text_link *)l);
-    free(l);
-}
-
-static const struct text_link_ops ops = {on_line, on_ready, NULL, on_closed};
+static const struct text_link_ops ops = {.line = on_line, .ready = on_ready, .closed = on_closed};
 
 void ctl_reply(struct ctl_client *c, const char *line)
 {
@@ -96,16 +89,14 @@ static void on_connection(struct link *l, int64_t t_ns)
     (void)t_ns;
     const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) return;
-    struct ctl_client *c = s->clients < CTL_CLIENTS_MAX ? calloc(1, sizeof *c) : NULL;
     const struct text_link_cfg cfg = {
         .fd = fd, .end = '\n', .line_max = CTL_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
-    if (!c || !text_link_init(&c->io, &cfg, &ops)) {
-        free(c);
+    struct ctl_client *c = s->clients < CTL_CLIENTS_MAX ? text_link_new(sizeof *c, &cfg, &ops) : NULL;
+    if (!c) {
         close(fd);
         return;
     }
     c->server = s;
-    c->io.link.release = on_release;
     c->io.link.flush = on_flush;
     s->clients++;
     links_add_last(s->links, &c->io.link);
@@ -149,8 +140,6 @@ int ctl_listen(struct ctl_server *s, const char *path)
 void ctl_close(struct ctl_server *s)
 {
     if (s->listen.fd < 0) return;
-    close(s->listen.fd);
+    link_close(&s->listen);
     unlink(s->path);
-    s->listen.fd = -1;
-    s->listen.gone = true;
 }

@@ -1,5 +1,7 @@
 #include "link/link.h"
 
+#include <unistd.h>
+
 void links_add_first(struct links *ls, struct link *l)
 {
     l->next = ls->first;
@@ -12,6 +14,13 @@ void links_add_last(struct links *ls, struct link *l)
     while (*p) p = &(*p)->next;
     l->next = NULL;
     *p = l;
+}
+
+void link_close(struct link *l)
+{
+    if (l->fd >= 0) close(l->fd);
+    l->fd = -1;
+    l->gone = true;
 }
 
 void links_reap(struct links *ls)

@@ -35,6 +35,9 @@ struct links {
 void links_add_first(struct links *ls, struct link *l);
 void links_add_last(struct links *ls, struct link *l);
 
+/* Closes the descriptor; the link is gone. Harmless once more. */
+void link_close(struct link *l);
+
 /* Unlinks and releases the links that are gone. */
 void links_reap(struct links *ls);
 

@@ -1,14 +1,10 @@
-#define _GNU_SOURCE /* accept4 */
 #include "link/scpi_port.h"
 
 #include "link/tcp.h"
 
 #include <errno.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 struct scpi_peer {
@@ -68,42 +64,35 @@ static void on_release(struct link *l)
     free(p);
 }
 
-/* One line after the other: what is asked in one packet need not wait for the acknowledgement of the packet before. */
-static void on_read(struct text_link *t)
+static const struct text_link_ops tcp_ops = {
+    .line = on_line, .ready = on_ready, .was_read = tcp_quick_ack, .closed = on_closed};
+
+static struct text_link_cfg link_cfg(int fd)
 {
-    const int on = 1;
-    setsockopt(t->link.fd, IPPROTO_TCP, TCP_QUICKACK, &on, sizeof on);
+    return (struct text_link_cfg){
+        .fd = fd, .end = '\n', .line_max = SCPI_PORT_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
 }
 
-static struct scpi_peer *peer_new(struct scpi_port *port, int fd, const struct text_link_ops *ops)
+static struct scpi_peer *peer_new(struct scpi_port *port, int fd)
 {
-    const struct text_link_cfg cfg = {
-        .fd = fd, .end = '\n', .line_max = SCPI_PORT_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
-    struct scpi_peer *p = calloc(1, sizeof *p);
-    if (!p || !text_link_init(&p->io, &cfg, ops)) {
-        free(p);
-        return NULL;
-    }
+    const struct text_link_cfg cfg = link_cfg(fd);
+    struct scpi_peer *p = text_link_new(sizeof *p, &cfg, &tcp_ops);
+    if (!p) return NULL;
     p->port = port;
     p->io.link.release = on_release;
     if (open_session(p)) return p;
     p->io.link.fd = -1; /* the caller's */
-    text_link_free(&p->io);
-    free(p);
+    on_release(&p->io.link);
     return NULL;
 }
-
-static const struct text_link_ops tcp_ops = {on_line, on_ready, on_read, on_closed};
 
 static void on_connection(struct link *l, int64_t t_ns)
 {
     struct scpi_port *port = (struct scpi_port *)l;
-    const int on = 1;
     (void)t_ns;
-    const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int fd = tcp_accept(l->fd);
     if (fd < 0) return;
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    struct scpi_peer *p = port->clients < SCPI_PORT_CLIENTS_MAX ? peer_new(port, fd, &tcp_ops) : NULL;
+    struct scpi_peer *p = port->clients < SCPI_PORT_CLIENTS_MAX ? peer_new(port, fd) : NULL;
     if (!p) {
         close(fd);
         return;
@@ -125,53 +114,39 @@ int scpi_port_tcp(struct scpi_port *p, uint16_t port)
 
 /* ---- pseudo-terminal */
 
-/* No program has it open. */
-static void on_pty_flush(struct link *l, int64_t t_ns)
-{
-    struct scpi_peer *p = (struct scpi_peer *)l;
-    if (!p->port->pty.openers) text_link_forget_output(&p->io);
-    text_link_flush(l, t_ns);
-}
-
 /* A new client gets a session of its own. The last bytes of the previous client are still executed in the old one. */
-static void on_opened(void *ctx, bool open, int64_t t_ns)
+static void on_opened(struct text_link *t, bool open)
 {
-    struct scpi_port *port = ctx;
-    (void)t_ns;
+    struct scpi_peer *p = (struct scpi_peer *)t;
+    void *old = p->session;
     if (!open) return;
-    void *old = port->terminal->session;
-    if (open_session(port->terminal)) port->closed(old);
-    else port->terminal->session = old;
-    text_link_forget(&port->terminal->io);
-    pty_discard(&port->pty);
+    if (open_session(p)) p->port->closed(old);
+    else p->session = old;
 }
 
-static const struct text_link_ops pty_ops = {on_line, on_ready, NULL, NULL};
+static const struct text_link_ops pty_ops = {.line = on_line, .ready = on_ready, .opened = on_opened};
 
 int scpi_port_pty(struct scpi_port *p, const char *name)
 {
+    const struct text_link_cfg cfg = link_cfg(-1);
+    struct scpi_peer *t = calloc(1, sizeof *t);
     p->listen = (struct link){.fd = -1};
-    const int err = pty_open(&p->pty, name);
-    if (err) return err;
-    p->terminal = peer_new(p, p->pty.master, &pty_ops);
-    if (!p->terminal) {
-        pty_close(&p->pty);
-        return -ENOMEM;
+    if (t) t->port = p;
+    int err = t && open_session(t) ? 0 : -ENOMEM;
+    if (!err) err = text_link_open_pty(&t->io, &p->pty, &cfg, &pty_ops, p->links, name);
+    if (err) {
+        if (t) close_session(t);
+        free(t);
+        return err;
     }
-    p->pty.master = -1; /* the peer's now */
-    p->pty.opened = on_opened;
-    p->pty.ctx = p;
-    p->terminal->io.link.flush = on_pty_flush;
-    links_add_first(p->links, &p->terminal->io.link);
-    links_add_first(p->links, &p->pty.watch);
+    t->io.link.release = on_release;
+    p->terminal = t;
     return 0;
 }
 
 void scpi_port_close(struct scpi_port *p)
 {
-    if (p->listen.fd >= 0) close(p->listen.fd);
-    p->listen.fd = -1;
-    p->listen.gone = true;
+    link_close(&p->listen);
     if (p->terminal) p->terminal->io.link.gone = true;
     if (p->terminal) pty_close(&p->pty);
     p->terminal = NULL;

@@ -1,9 +1,10 @@
-#define _GNU_SOURCE /* SOCK_NONBLOCK */
+#define _GNU_SOURCE /* accept4 */
 #include "link/tcp.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <sys/socket.h>
@@ -25,6 +26,20 @@ int tcp_listen(uint16_t *port)
     }
     *port = ntohs(a.sin_port);
     return fd;
+}
+
+int tcp_accept(int listener)
+{
+    const int on = 1;
+    const int fd = accept4(listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd >= 0) setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    return fd;
+}
+
+void tcp_quick_ack(int fd)
+{
+    const int on = 1;
+    setsockopt(fd, IPPROTO_TCP, TCP_QUICKACK, &on, sizeof on);
 }
 
 /* One row of /proc/net/tcp: "sl: LOCAL:PORT REMOTE:PORT ST TX:RX ...", addresses in network order as hexadecimal words. */

@@ -40,7 +40,7 @@ static void on_readable(struct link *l, int64_t t_ns)
     if (t->in_pos < t->in_len || t->eof) return;
     const ssize_t n = read(l->fd, t->in, sizeof t->in);
     if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
-    if (t->ops->was_read) t->ops->was_read(t);
+    if (t->ops->was_read) t->ops->was_read(l->fd);
     t->in_pos = 0;
     t->in_len = n > 0 ? (size_t)n : 0;
     t->eof = n <= 0;
@@ -52,6 +52,7 @@ void text_link_flush(struct link *l, int64_t t_ns)
 {
     struct text_link *t = (struct text_link *)l;
     if (t->ended) return;
+    if (t->pty && !t->pty->openers) outbuf_clear(&t->out);
     if (t->in_pos < t->in_len) take_lines(t, t_ns);
     if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
         outbuf_clear(&t->out); /* the peer is gone; its input is still processed */
@@ -61,7 +62,7 @@ void text_link_flush(struct link *l, int64_t t_ns)
     refresh_link(t);
 }
 
-bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops)
+static bool init_link(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops)
 {
     *t = (struct text_link){.ops = ops, .out_high = cfg->out_high};
     char *line = malloc(cfg->line_max + 1);
@@ -75,10 +76,59 @@ bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const 
     return true;
 }
 
+static void release_link(struct link *l)
+{
+    text_link_free((struct text_link *)l);
+    free(l);
+}
+
+void *text_link_new(size_t size, const struct text_link_cfg *cfg, const struct text_link_ops *ops)
+{
+    struct text_link *t = calloc(1, size);
+    if (!t || !init_link(t, cfg, ops)) {
+        free(t);
+        return NULL;
+    }
+    t->link.release = release_link;
+    return t;
+}
+
+static void on_opened(void *ctx, bool open, int64_t t_ns)
+{
+    struct text_link *t = ctx;
+    (void)t_ns;
+    if (t->ops->opened) t->ops->opened(t, open);
+    if (!open) return;
+    lines_reset(&t->lines);
+    t->in_pos = t->in_len = 0;
+    outbuf_clear(&t->out);
+    refresh_link(t);
+    pty_discard(t->pty);
+}
+
+int text_link_open_pty(struct text_link *t, struct pty *p, const struct text_link_cfg *cfg,
+                       const struct text_link_ops *ops, struct links *links, const char *name)
+{
+    const int err = pty_open(p, name);
+    if (err) return err;
+    if (!init_link(t, cfg, ops)) {
+        pty_close(p);
+        return -ENOMEM;
+    }
+    t->pty = p;
+    t->link.fd = p->master;
+    p->master = -1; /* the link's now */
+    p->opened = on_opened;
+    p->ctx = t;
+    links_add_first(links, &t->link);
+    links_add_first(links, &p->watch);
+    return 0;
+}
+
 void text_link_free(struct text_link *t)
 {
-    if (t->link.fd >= 0) close(t->link.fd);
-    t->link.fd = -1;
+    link_close(&t->link);
+    if (t->pty) pty_close(t->pty);
     free(t->lines.buf);
     t->lines.buf = NULL;
     outbuf_free(&t->out);
@@ -95,17 +145,4 @@ void text_link_stall(struct text_link *t, bool on)
 {
     t->stall = on;
     refresh_link(t);
-}
-
-void text_link_forget_output(struct text_link *t)
-{
-    outbuf_clear(&t->out);
-    refresh_link(t);
-}
-
-void text_link_forget(struct text_link *t)
-{
-    lines_reset(&t->lines);
-    t->in_pos = t->in_len = 0;
-    text_link_forget_output(t);
 }

@@ -9,20 +9,24 @@
 #include "link/lines.h"
 #include "link/link.h"
 #include "link/outbuf.h"
+#include "link/pty.h"
 
 struct text_link;
 
 struct text_link_ops {
     /* One line, or the news that an overlong one was skipped. */
     void (*line)(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns);
-    bool (*ready)(struct text_link *t);    /* takes another line now; NULL: always */
-    void (*was_read)(struct text_link *t); /* after each read of the descriptor; may be NULL */
-    /* The peer has gone and all its lines were taken; called once. NULL: a pty, whose slave we have open ourselves. */
+    bool (*ready)(struct text_link *t); /* takes another line now; NULL: always */
+    void (*was_read)(int fd);           /* after each read of the descriptor; may be NULL */
+    /* The peer has gone and all its lines were taken; called once. Not of a pty, whose slave we have open ourselves. */
     void (*closed)(struct text_link *t, int64_t t_ns);
+    /* Of a pty: the first program has opened it, the last has closed it; its last bytes may still be on their way. May be
+     * NULL. */
+    void (*opened)(struct text_link *t, bool open);
 };
 
 struct text_link_cfg {
-    int fd;          /* non-blocking; owned by the link from here on */
+    int fd;          /* non-blocking; owned by the link from here on. Not of a pty */
     char end;        /* of a line */
     size_t line_max; /* longest line */
     size_t out_max;  /* bytes of output kept for a slow peer */
@@ -32,6 +36,7 @@ struct text_link_cfg {
 struct text_link {
     struct link link; /* first: the loop's pointer is ours */
     const struct text_link_ops *ops;
+    struct pty *pty; /* NULL: a socket */
     struct lines lines;
     struct outbuf out;
     size_t out_high;
@@ -44,9 +49,16 @@ struct text_link {
     size_t in_pos, in_len;
 };
 
-/* False when there is no memory; then the descriptor is still the caller's. */
-bool text_link_init(struct text_link *t, const struct text_link_cfg *cfg, const struct text_link_ops *ops);
-void text_link_free(struct text_link *t); /* closes the descriptor */
+/* Allocates `size` bytes, zero, that begin with a text link, for one peer; link.release() frees them. NULL when there is no
+ * memory; then the descriptor is still the caller's. */
+void *text_link_new(size_t size, const struct text_link_cfg *cfg, const struct text_link_ops *ops);
+
+/* The same link on a pseudo-terminal, in the loop from here on. One program after the other sits there: for each the link
+ * starts again, and while there is none output is thrown away. 0, or -errno as pty_open(). Neither may move. */
+int text_link_open_pty(struct text_link *t, struct pty *p, const struct text_link_cfg *cfg,
+                       const struct text_link_ops *ops, struct links *links, const char *name);
+
+void text_link_free(struct text_link *t); /* closes the descriptor or the pty; the link is gone */
 
 /* The link's flush(), for owners that add to it. */
 void text_link_flush(struct link *l, int64_t t_ns);
@@ -55,7 +67,5 @@ void text_link_flush(struct link *l, int64_t t_ns);
 bool text_link_put(struct text_link *t, const char *text, size_t n);
 
 void text_link_stall(struct text_link *t, bool on);
-void text_link_forget_output(struct text_link *t);
-void text_link_forget(struct text_link *t); /* drops a partial line and all output: another peer sits at the pty */
 
 #endif

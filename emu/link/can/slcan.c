@@ -1,5 +1,6 @@
 #include "link/can/slcan.h"
 
+#include "base/canbits.h"
 #include "link/hex.h"
 
 #include <string.h>
@@ -18,13 +19,6 @@ static const struct {
 uint8_t slcan_len(uint8_t dlc)
 {
     return dlc_len[dlc & 15];
-}
-
-uint8_t slcan_dlc(uint8_t len)
-{
-    uint8_t dlc = 0;
-    while (dlc < 15 && dlc_len[dlc] < len) dlc++;
-    return dlc;
 }
 
 static int kind_of(char letter)
@@ -78,7 +72,7 @@ size_t slcan_encode(const struct can_msg *m, char *out, size_t cap)
         if (kinds[i].flags == flags) out[0] = kinds[i].letter;
     }
     hex_put(out + 1, m->id, id_digits);
-    hex_put(out + 1 + id_digits, slcan_dlc(m->len), 1);
+    hex_put(out + 1 + id_digits, can_dlc(m->len), 1);
     for (size_t i = 0; i < bytes; i++) hex_put(out + 2 + id_digits + 2 * i, m->data[i], 2);
     return len;
 }

@@ -42,8 +42,7 @@ enum {
 /* Status bits that an error message (can_error.h) sets. */
 uint8_t slcan_error_status(const struct can_msg *m);
 
-/* DLC of a data length (the next larger one for an odd length), and back (dlc 0..15). */
-uint8_t slcan_dlc(uint8_t len);
+/* Data length of a DLC, 0..15. */
 uint8_t slcan_len(uint8_t dlc);
 
 #endif

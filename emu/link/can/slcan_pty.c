@@ -3,7 +3,6 @@
 #include "link/can/slcan.h"
 #include "link/hex.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -183,7 +182,6 @@ static void on_flush(struct link *l, int64_t t_ns)
     if (!s->pty.openers) {
         if (s->open) cmd_close(s, "");
         s->stamps = false;
-        text_link_forget_output(&s->io);
     }
     if (s->closing && !s->can.node.queued) {
         s->closing = false;
@@ -192,39 +190,26 @@ static void on_flush(struct link *l, int64_t t_ns)
     text_link_flush(l, t_ns);
 }
 
-static void on_opened(void *ctx, bool open, int64_t t_ns)
+/* The channel is closed by on_flush(), after the last bytes. */
+static void on_opened(struct text_link *t, bool open)
 {
-    struct slcan_pty *s = ctx;
-    (void)t_ns;
-    log_line(s, open ? "slcan: port opened" : "slcan: port closed");
-    if (!open) return; /* its last bytes may still be on their way: on_flush closes the channel after them */
-    text_link_forget(&s->io);
-    pty_discard(&s->pty);
+    log_line((struct slcan_pty *)t, open ? "slcan: port opened" : "slcan: port closed");
 }
 
-static const struct text_link_ops ops = {on_line, on_ready, NULL, NULL};
+static const struct text_link_ops ops = {.line = on_line, .ready = on_ready, .opened = on_opened};
 
 int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
 {
+    static const struct text_link_cfg cfg = {
+        .end = '\r', .line_max = SLCAN_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
     *s = (struct slcan_pty){.hub = hub};
-    const int err = pty_open(&s->pty, name);
+    const int err = text_link_open_pty(&s->io, &s->pty, &cfg, &ops, hub->links, name);
     if (err) return err;
-    const struct text_link_cfg cfg = {
-        .fd = s->pty.master, .end = '\r', .line_max = SLCAN_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
-    if (!text_link_init(&s->io, &cfg, &ops)) {
-        pty_close(&s->pty);
-        return -ENOMEM;
-    }
-    s->pty.master = -1; /* the text link's now */
-    s->pty.opened = on_opened;
-    s->pty.ctx = s;
     s->io.link.flush = on_flush;
     s->can.adapter = "slcan";
     snprintf(s->can.name, sizeof s->can.name, "%.31s", s->pty.path);
     s->can.node = (struct can_node){.order = CAN_ORDER_FIFO, .fd = true, .rx = on_frame, .error = on_error, .ctx = s};
     s->can.stall = on_stall;
-    links_add_first(hub->links, &s->io.link);
-    links_add_first(hub->links, &s->pty.watch);
     return 0;
 }
 
@@ -232,6 +217,4 @@ void slcan_pty_close(struct slcan_pty *s)
 {
     can_hub_leave(s->hub, &s->can);
     text_link_free(&s->io);
-    s->io.link.gone = true;
-    pty_close(&s->pty);
 }

@@ -224,7 +224,5 @@ int socketcan_open(struct socketcan *s, struct can_hub *hub, const char *interfa
 void socketcan_close(struct socketcan *s)
 {
     can_hub_leave(s->hub, &s->can);
-    if (s->link.fd >= 0) close(s->link.fd);
-    s->link.fd = -1;
-    s->link.gone = true;
+    link_close(&s->link);
 }

@@ -1,13 +1,9 @@
-#define _GNU_SOURCE /* accept4 */
 #include "link/can/socketcand_tcp.h"
 
 #include "link/can/socketcand.h"
 #include "link/tcp.h"
 #include "link/text_link.h"
 
-#include <errno.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -206,12 +202,6 @@ static bool on_ready(struct text_link *t)
     return can_hub_room(&((struct client *)t)->can);
 }
 
-static void on_read(struct text_link *t)
-{
-    const int on = 1;
-    setsockopt(t->link.fd, IPPROTO_TCP, TCP_QUICKACK, &on, sizeof on);
-}
-
 /* ---- coming and going */
 
 static void begin_leaving(struct client *c)
@@ -273,17 +263,15 @@ static void on_release(struct link *l)
     free(c);
 }
 
-static const struct text_link_ops client_ops = {on_line, on_ready, on_read, on_closed};
+static const struct text_link_ops client_ops = {
+    .line = on_line, .ready = on_ready, .was_read = tcp_quick_ack, .closed = on_closed};
 
 static struct client *client_new(struct socketcand_server *s, int fd)
 {
-    struct client *c = calloc(1, sizeof *c);
     const struct text_link_cfg cfg = {
         .fd = fd, .end = '>', .line_max = SOCKETCAND_MSG_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
-    if (!c || !text_link_init(&c->io, &cfg, &client_ops)) {
-        free(c);
-        return NULL;
-    }
+    struct client *c = text_link_new(sizeof *c, &cfg, &client_ops);
+    if (!c) return NULL;
     c->server = s;
     c->hub = s->hub;
     c->io.link.flush = on_flush;
@@ -298,10 +286,9 @@ static struct client *client_new(struct socketcand_server *s, int fd)
 static void on_connection(struct link *l, int64_t t_ns)
 {
     struct socketcand_server *s = (struct socketcand_server *)l;
-    const int on = 1, size = SNDBUF;
-    const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int size = SNDBUF;
+    const int fd = tcp_accept(l->fd);
     if (fd < 0) return;
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     struct client *c = s->clients < SOCKETCAND_CLIENTS_MAX ? client_new(s, fd) : NULL;
     if (!c) {
@@ -328,7 +315,5 @@ int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned
 
 void socketcand_close(struct socketcand_server *s)
 {
-    if (s->listen.fd >= 0) close(s->listen.fd);
-    s->listen.fd = -1;
-    s->listen.gone = true;
+    link_close(&s->listen);
 }

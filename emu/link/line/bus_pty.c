@@ -1,6 +1,5 @@
 #include "link/line/bus_pty.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -76,50 +75,25 @@ void bus_pty_failed(struct bus_pty *p, const char *code, int64_t t_ns)
     if (!p->orphan) reject_request(p, &p->request, 2, code, t_ns);
 }
 
-/* No program has it open. */
-static void on_flush(struct link *l, int64_t t_ns)
+/* A cycle of the program before goes on without an answer. */
+static void on_opened(struct text_link *t, bool open)
 {
-    struct bus_pty *p = (struct bus_pty *)l;
-    if (!p->pty.openers) text_link_forget_output(&p->io);
-    text_link_flush(l, t_ns);
+    struct bus_pty *p = (struct bus_pty *)t;
+    if (open) p->orphan = p->busy;
 }
 
-static void on_opened(void *ctx, bool open, int64_t t_ns)
-{
-    struct bus_pty *p = ctx;
-    (void)t_ns;
-    if (!open) return;
-    p->orphan = p->busy;
-    text_link_forget(&p->io);
-    pty_discard(&p->pty);
-}
-
-static const struct text_link_ops text_ops = {on_line, on_ready, NULL, NULL};
+static const struct text_link_ops text_ops = {.line = on_line, .ready = on_ready, .opened = on_opened};
 
 int bus_pty_open(struct bus_pty *p, struct links *links, const struct bus_pty_ops *ops, const char *name)
 {
+    static const struct text_link_cfg cfg = {
+        .end = '\n', .line_max = BUS_TEXT_LINE_MAX + 1, .out_max = OUT_MAX, .out_high = OUT_MAX};
     *p = (struct bus_pty){.ops = *ops};
-    const int err = pty_open(&p->pty, name);
-    if (err) return err;
-    const struct text_link_cfg cfg = {
-        .fd = p->pty.master, .end = '\n', .line_max = BUS_TEXT_LINE_MAX + 1, .out_max = OUT_MAX, .out_high = OUT_MAX};
-    if (!text_link_init(&p->io, &cfg, &text_ops)) {
-        pty_close(&p->pty);
-        return -ENOMEM;
-    }
-    p->pty.master = -1; /* the text link's now */
-    p->pty.opened = on_opened;
-    p->pty.ctx = p;
-    p->io.link.flush = on_flush;
-    links_add_first(links, &p->io.link);
-    links_add_first(links, &p->pty.watch);
-    return 0;
+    return text_link_open_pty(&p->io, &p->pty, &cfg, &text_ops, links, name);
 }
 
 void bus_pty_close(struct bus_pty *p)
 {
     p->busy = false;
     text_link_free(&p->io);
-    p->io.link.gone = true;
-    pty_close(&p->pty);
 }

@@ -1,7 +1,11 @@
 #include "link/line/bus_text.h"
 
+#include "link/hex.h"
+
 #include <inttypes.h>
 #include <stdio.h>
+
+static const char op_letter[] = {[BUS_READ] = 'R', [BUS_WRITE] = 'W', [BUS_WHO] = '?'};
 
 /* What is left of a line. */
 struct text {
@@ -28,14 +32,6 @@ static bool is_empty(struct text f)
     return f.at == f.end;
 }
 
-static int digit_value(char c)
-{
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return 16;
-}
-
 /* An address may have the h with which answers write it. */
 static struct text without_h(struct text f)
 {
@@ -49,8 +45,8 @@ static bool parse_number(struct text f, int base, unsigned most, uint32_t *out)
     uint32_t v = 0;
     if (is_empty(f) || (size_t)(f.end - f.at) > most) return false;
     for (; f.at < f.end; f.at++) {
-        const int d = digit_value(*f.at);
-        if (d >= base) return false;
+        const int d = hex_digit(*f.at);
+        if (d < 0 || d >= base) return false;
         v = v * (uint32_t)base + (uint32_t)d;
     }
     *out = v;
@@ -59,11 +55,10 @@ static bool parse_number(struct text f, int base, unsigned most, uint32_t *out)
 
 static bool op_of(struct text f, enum bus_op *op)
 {
-    static const char letter[] = {'R', 'W', '?'};
     if (f.end - f.at != 1) return false;
-    for (unsigned i = 0; i < sizeof letter; i++) {
+    for (unsigned i = 0; i < sizeof op_letter; i++) {
         const bool lower = *f.at >= 'a' && *f.at <= 'z';
-        if ((lower ? *f.at - 'a' + 'A' : *f.at) != letter[i]) continue;
+        if ((lower ? *f.at - 'a' + 'A' : *f.at) != op_letter[i]) continue;
         *op = (enum bus_op)i;
         return true;
     }
@@ -119,8 +114,6 @@ const char *bus_text_code(enum bus_text_err err)
     static const char *const code[] = {"", "syntax", "number", "overlong"};
     return code[err];
 }
-
-static const char op_letter[] = {[BUS_READ] = 'R', [BUS_WRITE] = 'W', [BUS_WHO] = '?'};
 
 size_t bus_text_done(const struct bus_request *r, uint16_t data, int64_t t_ns, char *out)
 {

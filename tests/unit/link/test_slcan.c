@@ -1,5 +1,6 @@
 #include "can_rig.h"
 
+#include "base/canbits.h"
 #include "link/can/slcan.h"
 
 #include <string.h>
@@ -126,9 +127,9 @@ static void dlc_and_length_follow_the_fd_table(void **state)
     static const uint8_t len[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64}; /* ISO 11898-1 */
     for (uint8_t dlc = 0; dlc < 16; dlc++) {
         assert_int_equal(slcan_len(dlc), len[dlc]);
-        assert_int_equal(slcan_dlc(len[dlc]), dlc);
+        assert_int_equal(can_dlc(len[dlc]), dlc);
     }
-    assert_int_equal(slcan_dlc(9), 9); /* the next larger one */
+    assert_int_equal(can_dlc(9), 9); /* the next larger one */
 }
 
 static void status_bits_show_the_controller_state(void **state)
