@@ -106,3 +106,13 @@ double det_atan2(double y, double x)
     if (x < 0.0) a = (2.0 * PIO2_1 - a) + 2.0 * PIO2_2;
     return y < 0.0 ? -a : a;
 }
+
+double det_wrap_rad(double angle_rad)
+{
+    return angle_rad - TURN_RAD * ceil(angle_rad / TURN_RAD - 0.5);
+}
+
+double det_quantise(double x, double step)
+{
+    return step > 0.0 ? nearbyint(x / step) * step : x;
+}

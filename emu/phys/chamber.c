@@ -86,9 +86,7 @@ double chamber_air_degc(const struct chamber *c, int64_t t_ns)
 
 double chamber_shown_degc(const struct chamber *c, int64_t t_ns)
 {
-    const double degc = chamber_air_degc(c, t_ns) + c->cfg.readout_offset_k;
-    const double step_k = c->cfg.readout_resolution_k;
-    return step_k > 0.0 ? nearbyint(degc / step_k) * step_k : degc;
+    return det_quantise(chamber_air_degc(c, t_ns) + c->cfg.readout_offset_k, c->cfg.readout_resolution_k);
 }
 
 int64_t chamber_stable_ns(const struct chamber *c)

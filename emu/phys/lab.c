@@ -80,29 +80,37 @@ static void mount_kinematics(struct lab *l, enum lab_mount on, const double r_m[
     memcpy(out->w_radps, p->w_ib_b_radps, sizeof out->w_radps);
 }
 
-void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
-                    struct kinematics *out)
+/* The same at at_m from the unit's origin, in the axes of its case; returns how these are in the mount's. */
+static struct pose unit_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3],
+                                   int64_t t_ns, struct kinematics *out)
 {
     const struct pose in_mount = case_in_mount(l, mounting, t_ns);
     double r_m[3];
     pose_out_of(&in_mount, at_m, r_m);
     for (unsigned k = 0; k < 3; k++) r_m[k] += mounting->lever_m[k];
     mount_kinematics(l, mounting->on, r_m, t_ns, out);
+    return in_mount;
+}
+
+void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
+                    struct kinematics *out)
+{
+    const struct pose in_mount = unit_kinematics(l, mounting, at_m, t_ns, out);
     pose_into(&in_mount, out->f_mps2, out->f_mps2);
     pose_into(&in_mount, out->w_radps, out->w_radps);
 }
 
-/* -f in the mount's axes, by way of the poses. */
-static void mount_reaction(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
-                           double mount[3])
+/* f in the mount's axes: without lever arms the platform's own arithmetic, else by way of the poses. */
+static void mount_force_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
+                             double f_mps2[3])
 {
-    const struct pose in_mount = case_in_mount(l, mounting, t_ns);
     struct kinematics kin;
-    double r_m[3];
-    pose_out_of(&in_mount, at_m, r_m);
-    for (unsigned k = 0; k < 3; k++) r_m[k] += mounting->lever_m[k];
-    mount_kinematics(l, mounting->on, r_m, t_ns, &kin);
-    for (unsigned k = 0; k < 3; k++) mount[k] = -kin.f_mps2[k];
+    if (mounting->on == LAB_PLATFORM && is_zero(at_m) && is_zero(mounting->lever_m)) {
+        platform_force_mps2(&l->platform, t_ns, f_mps2);
+        return;
+    }
+    unit_kinematics(l, mounting, at_m, t_ns, &kin);
+    memcpy(f_mps2, kin.f_mps2, sizeof kin.f_mps2);
 }
 
 static void apply_misalignment(const struct lab_mounting *mounting, double a_mps2[3])
@@ -113,37 +121,19 @@ static void apply_misalignment(const struct lab_mounting *mounting, double a_mps
     pose_into(&misaligned, a_mps2, a_mps2);
 }
 
-/* Without lever arms the platform's own arithmetic, then the turn of the level sensors' block. */
-static void sensor_on_platform(struct lab *l, const struct lab_mounting *mounting, const double at_m[3],
-                               double cos_alpha0, double sin_alpha0, int64_t t_ns, double a_mps2[3])
-{
-    double mount[3];
-    if (is_zero(at_m) && is_zero(mounting->lever_m)) {
-        platform_force_mps2(&l->platform, t_ns, mount);
-        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
-    } else {
-        mount_reaction(l, mounting, at_m, t_ns, mount);
-    }
-    pose_into(platform_level(&l->platform, t_ns), mount, mount);
-    head_sensor_mps2(HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
-    if (!is_zero(mounting->misalignment_rad)) apply_misalignment(mounting, a_mps2);
-}
-
 void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3])
 {
-    if (mounting->on == LAB_PLATFORM) {
-        sensor_on_platform(l, mounting, at_m, cos_alpha0, sin_alpha0, t_ns, a_mps2);
-        return;
-    }
     double mount[3];
     const bool on_head = mounting->on == LAB_HEAD;
     const bool square = is_zero(mounting->misalignment_rad);
     if (on_head && square && is_zero(at_m) && is_zero(mounting->lever_m)) {
         head_gravity_mps2(&l->head, t_ns, mount);
     } else {
-        mount_reaction(l, mounting, at_m, t_ns, mount);
+        mount_force_mps2(l, mounting, at_m, t_ns, mount);
+        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
     }
+    if (mounting->on == LAB_PLATFORM) pose_into(platform_level(&l->platform, t_ns), mount, mount);
     head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
     if (!square) apply_misalignment(mounting, a_mps2);
 }
@@ -154,12 +144,4 @@ static const char *const mounts[] = {
 const char *lab_mount_name(enum lab_mount on)
 {
     return (unsigned)on < sizeof mounts / sizeof *mounts ? mounts[on] : NULL;
-}
-
-int lab_mount_by_name(const char *name)
-{
-    for (unsigned i = 0; i < sizeof mounts / sizeof *mounts; i++) {
-        if (strcmp(mounts[i], name) == 0) return (int)i;
-    }
-    return -1;
 }

@@ -67,8 +67,7 @@ void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const do
 void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3]);
 
-/* "head", "table", "fixed", "platform"; NULL and -1 for none. */
+/* "head", "table", "fixed", "platform"; NULL for none. */
 const char *lab_mount_name(enum lab_mount on);
-int lab_mount_by_name(const char *name);
 
 #endif

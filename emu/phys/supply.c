@@ -5,8 +5,6 @@
 
 #include <math.h>
 
-#define TURN_RAD 6.283185307179586
-
 struct supply_cfg supply_default(void)
 {
     return (struct supply_cfg){
@@ -80,9 +78,7 @@ double supply_volts(const struct supply *s, int64_t t_ns)
 
 double supply_shown_v(const struct supply *s, int64_t t_ns)
 {
-    const double v = supply_volts(s, t_ns);
-    const double step_v = s->cfg.readout_resolution_v;
-    return step_v > 0.0 ? nearbyint(v / step_v) * step_v : v;
+    return det_quantise(supply_volts(s, t_ns), s->cfg.readout_resolution_v);
 }
 
 /* ---- commands */

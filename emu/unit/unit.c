@@ -6,8 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define RAD_PER_DEG 0.017453292519943295
-
 /* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
 {

@@ -6,8 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define CALM_NS     1000000000 /* after which lost frames and limited rates are over */
-#define RAD_PER_DEG GYRO_RAD_PER_DEG
+#define CALM_NS 1000000000 /* after which lost frames and limited rates are over */
 
 const struct board_line gyro_lines[GYRO_LINES] = {
     [GYRO_LINE_STEP] = {"STEP", false},     [GYRO_LINE_READY] = {"READY", false},

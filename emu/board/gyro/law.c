@@ -5,9 +5,8 @@
 
 #include <math.h>
 
-#define PI          3.141592653589793238
-#define RAD_PER_DEG 0.017453292519943295
-#define ALIKE_RAD   1e-6 /* half a turn, whatever the rounding */
+#define PI        3.141592653589793238
+#define ALIKE_RAD 1e-6 /* half a turn, whatever the rounding */
 
 /* ---- level ---- */
 

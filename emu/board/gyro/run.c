@@ -5,10 +5,9 @@
 
 #include <math.h>
 
-#define RAD_PER_ARCMIN (GYRO_RAD_PER_DEG / 60.0)
-#define RADPS_PER_DPH  (GYRO_RAD_PER_DEG / 3600.0)
-#define TURN_MARGIN    0.9 /* of the torquers' limit: the rest is for the servo */
-#define MEAN_NS        1000000000
+#define RADPS_PER_DPH (GYRO_RAD_PER_DEG / 3600.0)
+#define TURN_MARGIN   0.9 /* of the torquers' limit: the rest is for the servo */
+#define MEAN_NS       1000000000
 
 static int64_t ns_of(double s)
 {

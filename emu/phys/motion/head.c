@@ -3,11 +3,7 @@
 #include "base/detmath.h"
 #include "base/sched.h"
 
-#include <math.h>
 #include <string.h>
-
-#define RAD_PER_DEG    0.017453292519943295
-#define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
 
 void head_init(struct head *h, const struct head_cfg *cfg, const struct site *site, struct rng error)
 {
@@ -16,9 +12,7 @@ void head_init(struct head *h, const struct head_cfg *cfg, const struct site *si
 
 static double quantise_rad(const struct head_cfg *c, double angle_rad)
 {
-    if (c->resolution_arcsec <= 0.0) return angle_rad;
-    const double step_rad = c->resolution_arcsec * RAD_PER_ARCSEC;
-    return nearbyint(angle_rad / step_rad) * step_rad;
+    return det_quantise(angle_rad, c->resolution_arcsec * RAD_PER_ARCSEC);
 }
 
 static double periodic_rad(const struct head_cfg *c, double angle_rad)
@@ -156,11 +150,4 @@ double head_face_rad(enum head_face face)
 const char *head_face_name(enum head_face face)
 {
     return (unsigned)face < HEAD_FACES ? faces[face].name : NULL;
-}
-
-int head_face_by_name(const char *name)
-{
-    for (unsigned i = 0; i < HEAD_FACES; i++)
-        if (strcmp(faces[i].name, name) == 0) return (int)i;
-    return -1;
 }

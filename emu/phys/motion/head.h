@@ -80,8 +80,7 @@ void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0,
 /* Angle about Ox by which a face turns the unit: 0, 180, -90 and +90 deg. */
 double head_face_rad(enum head_face face);
 
-/* "direct", "reversed", "side", "side_reversed"; NULL and -1 for none. */
+/* "direct", "reversed", "side", "side_reversed"; NULL for none. */
 const char *head_face_name(enum head_face face);
-int head_face_by_name(const char *name);
 
 #endif

@@ -6,7 +6,6 @@
 #include <assert.h>
 #include <math.h>
 
-#define TURN_RAD   6.283185307179586
 #define FAR_RAD    1e9  /* further than any table is sent */
 #define FAR_S      9e9  /* 285 years: past it the nanoseconds of an int64_t end */
 #define ROUNDING_S 1e-9 /* a ramp that ends when the next begins may be later by this */

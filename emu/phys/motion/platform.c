@@ -6,11 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define RAD_PER_DEG     0.017453292519943295
-#define RAD_PER_ARCMIN  (RAD_PER_DEG / 60.0)
-#define RAD_PER_ARCSEC  (RAD_PER_DEG / 3600.0)
 #define RADPS_PER_DEGPH (RAD_PER_DEG / 3600.0)
-#define TURN_RAD        6.283185307179586
 #define STOP_RAD        (PLATFORM_STOP_DEG * RAD_PER_DEG)
 #define AFRESH_EVERY    64 /* steps: sines and cosines are then computed again, in between turned on */
 
@@ -426,12 +422,6 @@ void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
     }
 }
 
-/* In (-pi, pi]. */
-static double wrap_rad(double angle_rad)
-{
-    return angle_rad - TURN_RAD * ceil(angle_rad / TURN_RAD - 0.5);
-}
-
 static const struct platform_setting *setting_at(const struct platform *p, int64_t t_ns)
 {
     return t_ns < p->setting.from_ns ? &p->setting_before : &p->setting;
@@ -455,14 +445,13 @@ static double sensor_rad(struct platform *p, int64_t t_ns)
 
 double platform_servo_rad(struct platform *p, int64_t t_ns)
 {
-    return wrap_rad(sensor_rad(p, t_ns) + setting_at(p, t_ns)->set_rad);
+    return det_wrap_rad(sensor_rad(p, t_ns) + setting_at(p, t_ns)->set_rad);
 }
 
 double platform_encoder_rad(struct platform *p, int64_t t_ns)
 {
-    const double step_rad = p->cfg.angle_step_arcsec * RAD_PER_ARCSEC;
     const double shown_rad = sensor_rad(p, t_ns) + setting_at(p, t_ns)->read_rad;
-    return wrap_rad(step_rad > 0.0 ? nearbyint(shown_rad / step_rad) * step_rad : shown_rad);
+    return det_wrap_rad(det_quantise(shown_rad, p->cfg.angle_step_arcsec * RAD_PER_ARCSEC));
 }
 
 const struct pose *platform_level(const struct platform *p, int64_t t_ns)

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#define TURN_RAD     6.283185307179586
 #define REDUCE_ABOVE 1000.0 /* rad: a table that has been turning for long; det_sin() takes up to 1e6 */
 
 void pose_start(struct pose *p, const struct site *site)
@@ -50,7 +49,7 @@ void pose_tilt(struct pose *p, const double angle_rad[3])
     for (unsigned k = 0; k < 3; k++) pose_turn(p, (enum pose_axis)k, angle_rad[k], 0.0, 0.0);
 }
 
-static void cross_product(const double a[3], const double b[3], double out[3])
+void pose_cross(const double a[3], const double b[3], double out[3])
 {
     for (unsigned k = 0; k < 3; k++) {
         const unsigned i = (k + 1) % 3;
@@ -65,9 +64,9 @@ void pose_force_mps2(const struct pose *p, double g_mps2, const double r_m[3], d
     double tangential[3];
     double speed[3];
     double centripetal[3];
-    cross_product(p->dw_ib_b_radps2, r_m, tangential);
-    cross_product(p->w_ib_b_radps, r_m, speed);
-    cross_product(p->w_ib_b_radps, speed, centripetal);
+    pose_cross(p->dw_ib_b_radps2, r_m, tangential);
+    pose_cross(p->w_ib_b_radps, r_m, speed);
+    pose_cross(p->w_ib_b_radps, speed, centripetal);
     for (unsigned k = 0; k < 3; k++) f_mps2[k] = -g_mps2 * p->C_nb[2][k] + tangential[k] + centripetal[k];
 }
 

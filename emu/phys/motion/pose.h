@@ -28,6 +28,9 @@ void pose_tilt(struct pose *p, const double angle_rad[3]);
 /* Specific force at a point that is fixed in the frame, r_m from the origin, in the frame's axes. At rest: -g along down. */
 void pose_force_mps2(const struct pose *p, double g_mps2, const double r_m[3], double f_mps2[3]);
 
+/* out = a x b; out is neither of them. */
+void pose_cross(const double a[3], const double b[3], double out[3]);
+
 /* v = C_nb^T v_n and back. */
 void pose_into(const struct pose *p, const double v_n[3], double v_b[3]);
 void pose_out_of(const struct pose *p, const double v_b[3], double v_n[3]);

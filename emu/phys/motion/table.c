@@ -7,11 +7,8 @@
 #include <assert.h>
 #include <math.h>
 
-#define RAD_PER_DEG    0.017453292519943295
-#define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
-#define TURN_RAD       6.283185307179586
-#define WHOLE_ABOVE    1000.0 /* rad */
-#define ROUNDING_RAD   1e-9   /* by which a limit may be missed that was given as the readout shows it */
+#define WHOLE_ABOVE  1000.0 /* rad */
+#define ROUNDING_RAD 1e-9   /* by which a limit may be missed that was given as the readout shows it */
 
 /* Of the kind of a one-axis iXBlue EVO 30 L; figures E0 (docs/instruments.md). */
 static const struct table_axis_cfg precise = {
@@ -138,9 +135,8 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
     const struct motion *m = &t->axis[axis];
     const int64_t shown_ns = t_ns - (int64_t)nearbyint(c->readout_delay_s * (double)NS_PER_S);
     const struct motion_state s = motion_at(m, shown_ns);
-    const double step_rad = c->readout_resolution_arcsec * RAD_PER_ARCSEC;
-    double angle_rad = s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns);
-    if (step_rad > 0.0) angle_rad = nearbyint(angle_rad / step_rad) * step_rad;
+    const double angle_rad = det_quantise(s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns),
+                                          c->readout_resolution_arcsec * RAD_PER_ARCSEC);
     const int64_t rest_ns = motion_rest_ns(m);
     return (struct table_reading){
         .angle_deg = angle_rad / RAD_PER_DEG,

@@ -2,24 +2,16 @@
 
 #include "base/detmath.h"
 #include "base/sched.h"
+#include "phys/motion/pose.h"
 
 #include <math.h>
 #include <string.h>
 
-#define RAD_PER_DEG      0.017453292519943295
-#define RAD_PER_ARCMIN   (RAD_PER_DEG / 60.0)
-#define TURN_RAD         6.283185307179586
 #define LATITUDE_MAX_RAD (VEHICLE_LATITUDE_MAX_DEG * RAD_PER_DEG)
 
 static double since_s(int64_t from_ns, int64_t t_ns)
 {
     return t_ns > from_ns ? (double)(t_ns - from_ns) / (double)NS_PER_S : 0.0;
-}
-
-/* In (-pi, pi]. */
-static double wrap_rad(double angle_rad)
-{
-    return angle_rad - TURN_RAD * ceil(angle_rad / TURN_RAD - 0.5);
 }
 
 /* ---- ramps and sines */
@@ -138,8 +130,9 @@ static struct vehicle_plan *next_plan(struct vehicle *v, int64_t t_ns)
 static void turn_to(const struct vehicle *v, struct vehicle_plan *p, double heading_deg, int64_t t_ns)
 {
     const double from_rad = ramp_at(&p->heading_rad, t_ns).at;
-    const double way_rad = wrap_rad(heading_deg * RAD_PER_DEG - from_rad);
-    p->heading_rad = make_ramp(wrap_rad(from_rad), wrap_rad(from_rad) + way_rad, v->cfg.turn_dps * RAD_PER_DEG, t_ns);
+    const double way_rad = det_wrap_rad(heading_deg * RAD_PER_DEG - from_rad);
+    p->heading_rad =
+        make_ramp(det_wrap_rad(from_rad), det_wrap_rad(from_rad) + way_rad, v->cfg.turn_dps * RAD_PER_DEG, t_ns);
 }
 
 static void tilt_to(const struct vehicle *v, struct vehicle_ramp *angle, double from_rad, double to_rad, int64_t t_ns)
@@ -161,7 +154,7 @@ void vehicle_init(struct vehicle *v, const struct vehicle_cfg *cfg, const struct
 {
     *v = (struct vehicle){.cfg = *cfg, .site = *site};
     v->plan[0] = (struct vehicle_plan){
-        .heading_rad = at_rest(wrap_rad(cfg->heading_deg * RAD_PER_DEG)),
+        .heading_rad = at_rest(det_wrap_rad(cfg->heading_deg * RAD_PER_DEG)),
         .pitch_rad = at_rest(cfg->pitch_deg * RAD_PER_DEG),
         .roll_rad = at_rest(cfg->roll_deg * RAD_PER_DEG),
         .speed_mps = at_rest(0.0),
@@ -198,15 +191,6 @@ void vehicle_fly(struct vehicle *v, double speed_mps, double track_deg, int64_t 
 
 /* ---- state */
 
-static void cross_product(const double a[3], const double b[3], double out[3])
-{
-    for (unsigned k = 0; k < 3; k++) {
-        const unsigned i = (k + 1) % 3;
-        const unsigned j = (k + 2) % 3;
-        out[k] = a[i] * b[j] - a[j] * b[i];
-    }
-}
-
 /* C_lc = Rz(-heading) Rx(pitch) Ry(roll), and the rate from the three angles' rates; ch, sh: cosine and sine of the heading. */
 static void set_attitude(struct vehicle_state *s, double ch, double sh, const double rate_radps[3])
 {
@@ -241,7 +225,7 @@ static void set_flight(struct vehicle_state *s, const struct site *site, double 
         s->w_il_l_radps[k] = w_ie[k] + w_el[k];
         twice[k] = 2.0 * w_ie[k] + w_el[k];
     }
-    cross_product(twice, v_l, s->accel_l_mps2);
+    pose_cross(twice, v_l, s->accel_l_mps2);
     s->accel_l_mps2[0] += accel_mps2 * sh + s->speed_mps * turn_radps * ch;
     s->accel_l_mps2[1] += accel_mps2 * ch - s->speed_mps * turn_radps * sh;
 }
@@ -266,7 +250,7 @@ void vehicle_at(const struct vehicle *v, int64_t t_ns, struct vehicle_state *out
     const double rate_radps[3] = {heading.rate, pitch.rate + pitch_sway.rate, roll.rate + roll_sway.rate};
     const double ch = det_cos(heading.at);
     const double sh = det_sin(heading.at);
-    out->heading_rad = wrap_rad(heading.at);
+    out->heading_rad = det_wrap_rad(heading.at);
     out->pitch_rad = pitch.at + pitch_sway.at;
     out->roll_rad = roll.at + roll_sway.at;
     out->speed_mps = speed.at;

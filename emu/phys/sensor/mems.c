@@ -1,11 +1,11 @@
 #include "phys/sensor/mems.h"
 
+#include "base/detmath.h"
 #include "base/sched.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#define RAD_PER_DEG   0.017453292519943295
 #define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
 #define FIRST_PULL_NS 31250 /* interval assumed before the first pull: one block of the converter at 1000 SPS */
 

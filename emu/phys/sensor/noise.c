@@ -50,6 +50,5 @@ double noise_slow_u(struct noise *n, int64_t t_ns)
 
 double noise_quantise_u(const struct noise *n, double u)
 {
-    const double q = n->cfg.quantum_u;
-    return q > 0.0 ? nearbyint(u / q) * q : u;
+    return det_quantise(u, n->cfg.quantum_u);
 }

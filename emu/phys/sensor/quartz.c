@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define TURN_RAD      6.283185307179586
 #define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
 #define FIRST_LOOK_NS 31250 /* interval assumed before the first look, as in mems.c */
 #define GONE          700.0 /* exponents past which nothing is left */

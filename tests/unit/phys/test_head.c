@@ -64,6 +64,7 @@ static void faces_project_gravity_on_the_sensors_axes(void **state)
 
 static void a_face_is_a_rotation_about_ox(void **state)
 {
+    static const char *const names[HEAD_FACES] = {"direct", "reversed", "side", "side_reversed"};
     (void)state;
     for (unsigned f = 0; f < HEAD_FACES; f++) {
         const double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -71,9 +72,9 @@ static void a_face_is_a_rotation_about_ox(void **state)
         for (int k = 0; k < 3; k++) head_sensor_mps2((enum head_face)f, 1.0, 0.0, e[k], r[k]);
         near(r[0][0], 1, 0);
         near(r[1][1] * r[2][2] - r[1][2] * r[2][1], 1, 0);
-        assert_int_equal(head_face_by_name(head_face_name((enum head_face)f)), f);
+        assert_string_equal(head_face_name((enum head_face)f), names[f]);
     }
-    assert_int_equal(head_face_by_name("upside_down"), -1);
+    assert_null(head_face_name(HEAD_FACES));
 }
 
 static void a_turn_takes_its_time_and_moves_smoothly(void **state)
