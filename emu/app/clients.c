@@ -62,18 +62,15 @@ static struct can_node *do_client_node(void *ctx, uint32_t slot)
 static bool do_stall(void *ctx, const struct can_node *node, bool on)
 {
     const struct ports *p = &((struct service *)ctx)->ports;
-    for (unsigned i = 0; i < p->hubs; i++) {
-        for (struct can_client *c = p->hub[i].clients; c; c = c->next) {
-            if (&c->node != node) continue;
-            can_hub_stall(c, on);
-            return true;
-        }
-    }
-    return false;
+    const struct can_client *c = client_after(p, 0);
+    while (c && &c->node != node) c = client_after(p, c->connection);
+    if (c) can_hub_stall((struct can_client *)c, on);
+    return c != NULL;
 }
 
-static void sum_gone(const struct ports *p, struct control_client *out)
+static void do_gone(void *ctx, struct control_client *out)
 {
+    const struct ports *p = &((struct service *)ctx)->ports;
     struct can_client sum = {.adapter = NULL};
     for (unsigned i = 0; i < p->hubs; i++) {
         const struct can_client *gone = &p->hub[i].gone;
@@ -84,11 +81,6 @@ static void sum_gone(const struct ports *p, struct control_client *out)
         sum.refused += gone->refused;
     }
     put_client(&sum, out);
-}
-
-static void do_gone(void *ctx, struct control_client *out)
-{
-    sum_gone(&((struct service *)ctx)->ports, out);
 }
 
 const struct control_clients service_clients = {
@@ -112,7 +104,7 @@ void service_sweep_detached(struct service *s, bool all)
     for (unsigned i = 0; i < s->ports.hubs; i++) can_hub_sweep_detached(&s->ports.hub[i], all);
 }
 
-void service_print_clients(const struct service *s)
+void service_print_clients(struct service *s)
 {
     for (const struct can_client *c = client_after(&s->ports, 0); c; c = client_after(&s->ports, c->connection)) {
         fprintf(stderr,
@@ -121,7 +113,7 @@ void service_print_clients(const struct service *s)
                 c->adapter, c->name, c->delivered, c->taken, c->dropped, c->overrun, c->refused);
     }
     struct control_client gone;
-    sum_gone(&s->ports, &gone);
+    do_gone(s, &gone);
     fprintf(stderr,
             "psa-emu: clients gone: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", refused %" PRIu64
             "\n",

@@ -40,7 +40,7 @@ static void list_profile(FILE *out, const char *path, const char *comment)
     if (*comment) fprintf(out, "             %s\n", comment);
 }
 
-static bool list_files(FILE *out, const char *proto_folder, char *why, size_t cap)
+bool list_files(FILE *out, const char *proto_folder, char *why, size_t cap)
 {
     char folder[FIND_PATH_MAX], path[FIND_PATH_MAX + FIND_NAME_MAX + 8], comment[256];
     char(*names)[FIND_NAME_MAX];
@@ -56,16 +56,6 @@ static bool list_files(FILE *out, const char *proto_folder, char *why, size_t ca
     }
     free(names);
     return true;
-}
-
-bool list_profiles(FILE *out, char *why, size_t cap)
-{
-    return list_files(out, "profiles", why, cap);
-}
-
-bool list_scenarios(FILE *out, char *why, size_t cap)
-{
-    return list_files(out, "scenarios", why, cap);
 }
 
 /* ---- commands */

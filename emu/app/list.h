@@ -6,11 +6,9 @@
 
 #include <stdio.h>
 
-/* Two lines a profile of proto/profiles: its numbers, and what tells it apart, the first comment of its file. False with one line in why. */
-bool list_profiles(FILE *out, char *why, size_t cap);
-
-/* One line a scenario of proto/scenarios: its name and the first comment of its file. */
-bool list_scenarios(FILE *out, char *why, size_t cap);
+/* The files of a folder of proto. Two lines for each of "profiles": its numbers, and what distinguishes it, the first comment of
+ * its file; one for each of "scenarios": its name and the comment. False with one line in why. */
+bool list_files(FILE *out, const char *proto_folder, char *why, size_t cap);
 
 /* In Markdown: one table of commands; those of both ports; the SCPI headers, common ones first; the kinds of faults, where each
  * can be, which the chips and the controller of each type of board have, and its events. */

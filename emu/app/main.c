@@ -24,8 +24,8 @@ static void override_scenario(struct scenario *s, const struct options *o)
 {
     if (o->seed_given) s->seed = o->seed;
     for (unsigned i = 0; i < s->bus_count; i++) {
-        if (o->bitrate_given) s->bus[i].cfg.bitrate_hz = o->bitrate_hz;
-        if (o->data_bitrate_given) s->bus[i].cfg.data_bitrate_hz = o->data_bitrate_hz;
+        if (o->bitrate.given) s->bus[i].cfg.bitrate_hz = o->bitrate.hz;
+        if (o->data_bitrate.given) s->bus[i].cfg.data_bitrate_hz = o->data_bitrate.hz;
     }
     if (o->start) s->start = true;
 }
@@ -43,14 +43,22 @@ static bool write_resolved(const struct scenario *s, const char *path)
     return ok;
 }
 
+/* The scenario of the snapshot or the options, and its bench. */
+static bool load_bench(const struct options *o, const struct snapshot *from, struct scenario *s, struct bench *bench,
+                       char *why, size_t cap)
+{
+    const bool loaded = from ? scenario_parse(o->restore, from->scenario, from->scenario_len, s, why, cap)
+                             : scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
+    if (!loaded) return false;
+    override_scenario(s, o);
+    bench_init(bench, s, 0);
+    return timeline_check(bench, why, cap);
+}
+
 static int dump_scenario(const struct options *o, struct scenario *s, struct bench *bench)
 {
     char why[1024];
-    if (!scenario_load(o->scenario ? o->scenario : "calibrate", s, why, sizeof why))
-        return print_error(SERVICE_INPUT, why);
-    override_scenario(s, o);
-    bench_init(bench, s, 0);
-    if (!timeline_check(bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    if (!load_bench(o, NULL, s, bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
     return write_resolved(s, NULL) ? SERVICE_DONE : print_error(SERVICE_MACHINE, "--dump: stdout cannot be written");
 }
 
@@ -63,21 +71,11 @@ static char *resolved_line(const struct scenario *s)
     return line;
 }
 
-static bool load_scenario(const struct options *o, const struct snapshot *from, struct scenario *s, char *why,
-                          size_t cap)
-{
-    if (from) return scenario_parse(o->restore, from->scenario, from->scenario_len, s, why, cap);
-    return scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
-}
-
 static int run_bench(const struct options *o, const struct snapshot *from, struct scenario *scenario,
                      struct bench *bench, struct service *service)
 {
     char why[1024];
-    if (!load_scenario(o, from, scenario, why, sizeof why)) return print_error(SERVICE_INPUT, why);
-    override_scenario(scenario, o);
-    bench_init(bench, scenario, 0);
-    if (!timeline_check(bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    if (!load_bench(o, from, scenario, bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
     if (o->resolved && !write_resolved(scenario, o->resolved)) {
         snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
         return print_error(SERVICE_MACHINE, why);
@@ -122,10 +120,10 @@ int main(int argc, char *argv[])
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
     if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);
-    if (o.action == OPTIONS_LIST_PROFILES && !list_profiles(stdout, why, sizeof why))
-        return print_error(SERVICE_MACHINE, why);
-    if (o.action == OPTIONS_LIST_SCENARIOS && !list_scenarios(stdout, why, sizeof why))
-        return print_error(SERVICE_MACHINE, why);
+    if (o.action == OPTIONS_LIST_PROFILES || o.action == OPTIONS_LIST_SCENARIOS) {
+        const char *folder = o.action == OPTIONS_LIST_PROFILES ? "profiles" : "scenarios";
+        if (!list_files(stdout, folder, why, sizeof why)) return print_error(SERVICE_MACHINE, why);
+    }
     if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
     if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return SERVICE_DONE;
     struct scenario *scenario = malloc(sizeof *scenario);

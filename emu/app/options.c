@@ -110,7 +110,7 @@ struct target {
 struct row {
     const char *name; /* with its dashes */
     bool (*set)(const struct target *t, const char *arg);
-    size_t offset;              /* in struct options: of set_path() and set_flag() */
+    size_t offset;              /* in struct options: of set_path(), set_flag(), set_rate() */
     enum options_action action; /* of set_action() */
 };
 
@@ -204,23 +204,14 @@ static bool set_seed(const struct target *t, const char *arg)
     return t->o->seed_given || expected(t, arg, "an integer from 0 to 2^64 - 1");
 }
 
-static bool set_rate(const struct target *t, const char *arg, uint32_t *hz, bool *given)
+static bool set_rate(const struct target *t, const char *arg)
 {
+    struct options_rate *r = (struct options_rate *)((char *)t->o + t->row->offset);
     uint64_t v;
-    *given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
-    if (!*given) return expected(t, arg, "0 or 10000 to 8000000 bit/s");
-    *hz = (uint32_t)v;
+    r->given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
+    if (!r->given) return expected(t, arg, "0 or 10000 to 8000000 bit/s");
+    r->hz = (uint32_t)v;
     return true;
-}
-
-static bool set_bitrate(const struct target *t, const char *arg)
-{
-    return set_rate(t, arg, &t->o->bitrate_hz, &t->o->bitrate_given);
-}
-
-static bool set_data_bitrate(const struct target *t, const char *arg)
-{
-    return set_rate(t, arg, &t->o->data_bitrate_hz, &t->o->data_bitrate_given);
 }
 
 static bool set_epoch(const struct target *t, const char *arg)
@@ -303,7 +294,7 @@ static const struct row can_row = {"--can", .set = set_can}, scenario_row = {"SC
 static const struct row rows[] = {
     {"--can", .set = set_can},                         {"--pace", .set = set_pace},
     {"--for", .set = set_for},                         {"--seed", .set = set_seed},
-    {"--bitrate", .set = set_bitrate},                 {"--data-bitrate", .set = set_data_bitrate},
+    {"--bitrate", set_rate, .offset = IN(bitrate)},    {"--data-bitrate", set_rate, .offset = IN(data_bitrate)},
     {"--epoch", .set = set_epoch},                     {"--scpi", .set = set_scpi},
     {"--bus-port", .set = set_bus_port},               {"--truth-every", .set = set_truth_every},
     {"--vcd-unit", .set = set_vcd_unit},               {"--line-hz", .set = set_line_hz},
@@ -374,7 +365,7 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     if (o->wait_client && o->pace == PACE_STEP) {
         return why_fail(why, cap, "--wait-client: expected --pace wall or free, got step");
     }
-    if (o->restore && (o->scenario || o->seed_given || o->bitrate_given || o->data_bitrate_given || o->start)) {
+    if (o->restore && (o->scenario || o->seed_given || o->bitrate.given || o->data_bitrate.given || o->start)) {
         return why_fail(
             why, cap,
             "--restore %s: expected no SCENARIO, --seed, --bitrate, --data-bitrate and --start: the snapshot has them",

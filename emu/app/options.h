@@ -35,6 +35,12 @@ struct options_bus {
     const char *link; /* symbolic link; NULL: none */
 };
 
+/* Of the buses, instead of the scenario's. */
+struct options_rate {
+    bool given;
+    uint32_t hz;
+};
+
 enum options_action {
     OPTIONS_RUN,
     OPTIONS_HELP,
@@ -72,8 +78,7 @@ struct options {
     const char *truth_log;       /* file; NULL: none */
     int64_t truth_every_ns;
     const char *resolved; /* file for the scenario with every key; NULL: none */
-    bool bitrate_given, data_bitrate_given;
-    uint32_t bitrate_hz, data_bitrate_hz;
+    struct options_rate bitrate, data_bitrate;
     int64_t epoch_ns; /* added to time stamps */
     bool wait_client; /* time begins with the first CAN client */
     bool until_eof;   /* end with standard input */

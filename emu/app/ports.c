@@ -8,6 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, int err)
+{
+    static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
+    return why_fail(why, cap, "%s%s: %s", option, arg, err == -EEXIST ? expected : strerror(-err));
+}
+
 /* ---- CAN */
 
 static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
@@ -26,11 +32,7 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
 static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
-    if (!err) return true;
-    if (err == -EEXIST)
-        return why_fail(why, cap, "--can slcan:%s: expected a new name or a symbolic link to a pty, got another file",
-                        o->arg);
-    return why_fail(why, cap, "--can slcan%s%s: %s", o->arg ? ":" : "", o->arg ? o->arg : "", strerror(-err));
+    return !err || fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "", err);
 }
 
 static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -137,10 +139,100 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     if (!err) return true;
     free(p->line);
     p->line = NULL;
-    if (err == -EEXIST)
-        return why_fail(why, cap, "--line %s: expected a new name or a symbolic link to a pty, got another file",
-                        o->line);
-    return why_fail(why, cap, "--line %s: %s", o->line, strerror(-err));
+    return fail_pty(why, cap, "--line ", o->line, err);
+}
+
+/* ---- bus ports: cycles of the parallel buses of units as lines of text */
+
+static const struct board_type *type_of(const struct bench *b, unsigned unit)
+{
+    return b->scenario.units[unit].cfg.type;
+}
+
+/* The unit of that name, the first that has a bus for none; the number of units if there is none. */
+static unsigned find_unit(const struct bench *b, const char *name)
+{
+    unsigned i = 0;
+    for (; i < b->scenario.unit_count; i++)
+        if (name[0] ? strcmp(b->scenario.units[i].name, name) == 0 : type_of(b, i)->bus != NULL) break;
+    return i;
+}
+
+/* Whether there are such units and their boards have a bus. */
+static bool check_bus_ports(const struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->bus_count; i++) {
+        const struct options_bus *p = &o->bus[i];
+        const unsigned unit = find_unit(b, p->unit);
+        if (unit == b->scenario.unit_count && p->unit[0])
+            return why_fail(why, cap, "--bus-port %s: expected a unit of the scenario, got \"%s\"", p->arg, p->unit);
+        if (unit == b->scenario.unit_count)
+            return why_fail(why, cap, "--bus-port %s: expected a scenario with a unit that has a parallel bus", p->arg);
+        if (!type_of(b, unit)->bus) {
+            return why_fail(why, cap, "--bus-port %s: expected a unit with a parallel bus, got %s, a %s", p->arg,
+                            p->unit, type_of(b, unit)->title);
+        }
+        for (unsigned k = 0; k < i; k++)
+            if (find_unit(b, o->bus[k].unit) == unit)
+                return why_fail(why, cap, "--bus-port %s: expected one bus port per unit, got a second for %s", p->arg,
+                                b->scenario.units[unit].name);
+    }
+    return true;
+}
+
+static void on_done(void *ctx, const struct board_cycle *c, enum board_cycle_result r, int64_t t_ns)
+{
+    struct bus_port *p = ctx;
+    if (r == BOARD_CYCLE_OK) bus_pty_done(&p->pty, c->data, t_ns);
+    else bus_pty_failed(&p->pty, board_cycle_word(r), t_ns);
+}
+
+static const char *submit_cycle(void *ctx, const struct bus_request *r, int64_t t_ns)
+{
+    struct bus_port *p = ctx;
+    const struct board_cycle cycle = {
+        .write = r->op == BUS_WRITE, .address = r->address, .data = r->data, .strobe_ns = r->strobe_ns};
+    const struct bench_cycle request = {.cycle = cycle, .done = on_done, .ctx = p};
+    const enum board_cycle_result result = bench_cycle(p->bench, p->unit, &request, t_ns);
+    return result == BOARD_CYCLE_OK ? NULL : board_cycle_word(result);
+}
+
+static const char *name_of(void *ctx, unsigned address)
+{
+    const struct bus_port *p = ctx;
+    return type_of(p->bench, p->unit)->bus->name(address);
+}
+
+static bool open_bus_port(struct ports *p, struct bench *b, const struct options_bus *o, char *why, size_t cap)
+{
+    struct bus_port *bus = calloc(1, sizeof *bus);
+    if (!bus) return why_fail(why, cap, "--bus-port %s: out of memory", o->arg);
+    bus->bench = b;
+    bus->unit = find_unit(b, o->unit);
+    const struct board_type *type = type_of(b, bus->unit);
+    const struct bus_pty_ops ops = {
+        .ctx = bus, .submit = submit_cycle, .board = type->name, .addresses = type->bus->addresses, .name = name_of};
+    const int err = bus_pty_open(&bus->pty, &p->links, &ops, o->link);
+    if (!err) {
+        p->bus[p->bus_count++] = bus;
+        return true;
+    }
+    free(bus);
+    return fail_pty(why, cap, "--bus-port ", o->arg, err);
+}
+
+static bool open_bus_ports(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->bus_count; i++)
+        if (!open_bus_port(p, b, &o->bus[i], why, cap)) return false;
+    return true;
+}
+
+/* A cycle under way goes on, no client waits for it. */
+static void close_bus_port(struct bus_port *p)
+{
+    bench_cycle_forget(p->bench, p->unit);
+    bus_pty_close(&p->pty);
 }
 
 /* ---- sockets and file */
@@ -189,44 +281,59 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && bus_ports_check(b, o, why, cap);
+    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
-    return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) &&
-           bus_ports_open(&p->bus, &p->links, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
-           instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
+    return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
+           open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
+           open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
-static void ready_pty(FILE *out, const char *what, const struct pty *pty, const char *bus)
+static void put_key(FILE *out, const char *key, const char *value)
 {
-    fprintf(out, "ready %s pty=%s%s%s%s%s\n", what, pty->path, pty->name ? " link=" : "", pty->name ? pty->name : "",
-            bus ? " bus=" : "", bus ? bus : "");
+    if (value) fprintf(out, " %s=%s", key, value);
+}
+
+static void put_pty(FILE *out, const struct pty *pty)
+{
+    put_key(out, "pty", pty->path);
+    put_key(out, "link", pty->name);
+}
+
+static void ready_can(const struct ports_can *c, FILE *out)
+{
+    fprintf(out, "ready ");
+    if (c->kind == OPTIONS_SOCKETCAND) fprintf(out, "can=socketcand host=127.0.0.1 port=%u", c->socketcand.port);
+    if (c->kind == OPTIONS_SLCAN) {
+        fprintf(out, "can=slcan");
+        put_pty(out, &c->slcan.pty);
+    }
+    if (c->kind == OPTIONS_SOCKETCAN) {
+        const struct can_client *client = &c->socketcan.can;
+        fprintf(out, "can=socketcan channel=%s fd=%s", client->name, client->node.fd ? "true" : "false");
+    }
+    if (c->kind == OPTIONS_CAN_LOG) fprintf(out, "log=%s", c->log.path);
+    put_key(out, "bus", c->bus);
+    fprintf(out, "\n");
 }
 
 void ports_ready(const struct ports *p, const struct options *o, FILE *out)
 {
-    for (unsigned i = 0; i < p->can_count; i++) {
-        const struct ports_can *c = p->can[i];
-        if (c->kind == OPTIONS_SOCKETCAND)
-            fprintf(out, "ready can=socketcand host=127.0.0.1 port=%u%s%s\n", c->socketcand.port, c->bus ? " bus=" : "",
-                    c->bus ? c->bus : "");
-        if (c->kind == OPTIONS_SLCAN) ready_pty(out, "can=slcan", &c->slcan.pty, c->bus);
-        if (c->kind == OPTIONS_SOCKETCAN) {
-            fprintf(out, "ready can=socketcan channel=%s fd=%s%s%s\n", c->socketcan.can.name,
-                    c->socketcan.can.node.fd ? "true" : "false", c->bus ? " bus=" : "", c->bus ? c->bus : "");
-        }
-        if (c->kind == OPTIONS_CAN_LOG)
-            fprintf(out, "ready log=%s%s%s\n", c->log.path, c->bus ? " bus=" : "", c->bus ? c->bus : "");
-    }
+    for (unsigned i = 0; i < p->can_count; i++) ready_can(p->can[i], out);
     if (p->line) {
-        char what[64];
-        snprintf(what, sizeof what, "line=sampled hz=%" PRId64, o->line_hz);
-        ready_pty(out, what, &p->line->pty, NULL);
+        fprintf(out, "ready line=sampled hz=%" PRId64, o->line_hz);
+        put_pty(out, &p->line->pty);
+        fprintf(out, "\n");
     }
-    bus_ports_ready(&p->bus, out);
+    for (unsigned i = 0; i < p->bus_count; i++) {
+        const struct bus_port *b = p->bus[i];
+        fprintf(out, "ready bus=pty unit=%s", b->bench->scenario.units[b->unit].name);
+        put_pty(out, &b->pty.pty);
+        fprintf(out, "\n");
+    }
     instruments_ready(&p->scpi, out);
     if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);
     if (o->control) fprintf(out, "ready control=%s\n", o->control);
@@ -261,18 +368,18 @@ static void close_all(struct ports *p)
 {
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
-    bus_ports_close(&p->bus);
+    for (unsigned i = 0; i < p->bus_count; i++) close_bus_port(p->bus[i]);
     instruments_close(&p->scpi);
     ctl_close(&p->control);
     ctl_close(&p->truth);
     for (struct link *l = p->links.first; l; l = l->next) l->gone = true;
     links_reap(&p->links);
     for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
-    bus_ports_free(&p->bus);
+    for (unsigned i = 0; i < p->bus_count; i++) free(p->bus[i]);
     instruments_free(&p->scpi);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
-    p->can_count = 0;
+    p->can_count = p->bus_count = 0;
     p->line = NULL;
     p->vcd = NULL;
 }
@@ -290,7 +397,7 @@ void ports_abandon(struct ports *p)
     }
     for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
     if (p->line) p->line->pty.name = NULL;
-    bus_ports_abandon(&p->bus);
+    for (unsigned i = 0; i < p->bus_count; i++) p->bus[i]->pty.pty.name = NULL;
     p->control.path = p->truth.path = "";
     close_all(p);
 }

@@ -2,7 +2,6 @@
 #ifndef PSABENCH_APP_PORTS_H
 #define PSABENCH_APP_PORTS_H
 
-#include "app/bus_ports.h"
 #include "app/instruments.h"
 #include "app/options.h"
 #include "bench/bench.h"
@@ -12,6 +11,7 @@
 #include "link/can/socketcan.h"
 #include "link/can/socketcand_tcp.h"
 #include "link/ctl_sock.h"
+#include "link/line/bus_pty.h"
 #include "link/line/line_pty.h"
 
 #include <cjson/cJSON.h>
@@ -28,6 +28,12 @@ struct ports_can {
     };
 };
 
+struct bus_port {
+    struct bus_pty pty;
+    struct bench *bench;
+    unsigned unit;
+};
+
 struct ports {
     struct links links;
     struct can_hub hub[SCENARIO_BUSES_MAX]; /* one a bus */
@@ -36,7 +42,8 @@ struct ports {
     struct ports_can *can[OPTIONS_CAN_MAX];
     unsigned can_count;
     struct line_pty *line;
-    struct bus_ports bus;
+    struct bus_port *bus[OPTIONS_BUS_MAX];
+    unsigned bus_count;
     struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;

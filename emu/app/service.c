@@ -52,7 +52,7 @@ int service_run(struct service *s)
     return run_and_drain(s);
 }
 
-static void print_counters(const struct service *s)
+static void print_counters(struct service *s)
 {
     uint64_t frames = 0;
     for (unsigned i = 0; i < s->bench->buses; i++) frames += s->bench->bus[i].frames;

@@ -65,7 +65,7 @@ void service_power_up(struct service *s);      /* bench, faults and timeline of 
 extern const struct control_clients service_clients;
 bool service_taken(void *ctx, uint64_t count);            /* for loop.taken */
 void service_sweep_detached(struct service *s, bool all); /* see can_hub.h */
-void service_print_clients(const struct service *s);
+void service_print_clients(struct service *s);
 
 /* recording.c */
 extern const struct control_recording service_recording;

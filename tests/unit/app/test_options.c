@@ -49,7 +49,7 @@ static void every_option_reaches_its_field(void **state)
     assert_string_equal(o.can[3].arg, "vcan0");
     assert_int_equal(o.pace, PACE_STEP);
     assert_true(o.for_ns == 300000000 && o.seed_given && o.seed == UINT64_MAX && o.epoch_ns == 1500000000);
-    assert_true(o.bitrate_given && o.bitrate_hz == 500000 && o.data_bitrate_given && o.data_bitrate_hz == 0);
+    assert_true(o.bitrate.given && o.bitrate.hz == 500000 && o.data_bitrate.given && o.data_bitrate.hz == 0);
     assert_true(o.vcd_unit_ns == 100 && o.line_hz == 1000 && o.start && o.quiet && o.until_eof && !o.wait_client);
     assert_string_equal(o.vcd, "a.vcd");
     assert_string_equal(o.line, "b");
