@@ -304,17 +304,10 @@ INLINE void compute_lanes(const struct closed_plan *plan, uint64_t seed, uint64_
     }
 }
 
-#define COMPUTE(name, target, count, unknowns)                                                                         \
-    target static void name(const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x)        \
-    {                                                                                                                  \
-        compute_lanes<count, unknowns>(plan, seed, first_run, x);                                                      \
-    }
-COMPUTE(three_any, , 3, 3)
-COMPUTE(three_wide, TARGET_WIDE, 3, 3)
-COMPUTE(three_widest, TARGET_WIDEST, 3, 3)
-COMPUTE(more_any, , 0, 0)
-COMPUTE(more_wide, TARGET_WIDE, 0, 0)
-COMPUTE(more_widest, TARGET_WIDEST, 0, 0)
+BY_WIDTH(three, (const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x),
+         compute_lanes<3, 3>(plan, seed, first_run, x))
+BY_WIDTH(more, (const struct closed_plan *plan, uint64_t seed, uint64_t first_run, struct lanes *x),
+         compute_lanes<0, 0>(plan, seed, first_run, x))
 
 static void put_lanes(double *array, uint64_t at, int n, const double *lane)
 {
@@ -333,16 +326,14 @@ static void put_all(const struct nav_mc_out *out, const struct lanes *x, uint64_
 int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_run, uint64_t runs,
                   const struct nav_mc_out *out)
 {
-    static void (*const by_width[2][3])(const struct closed_plan *, uint64_t, uint64_t, struct lanes *) = {
-        {more_any, more_wide, more_widest}, {three_any, three_wide, three_widest}};
     struct closed_plan plan;
     const int refused = plan_make(cfg, &plan);
     if (refused) return refused;
-    const int three = plan.lin.count == 3 && plan.lin.unknowns == 3;
-    const int width = random_width();
+    const bool three = plan.lin.count == 3 && plan.lin.unknowns == 3;
+    const auto compute = (three ? three_by_width : more_by_width)[random_width()];
     struct lanes x;
     for (uint64_t at = 0; at < runs; at += LANES) {
-        by_width[three][width](&plan, seed, first_run + at, &x);
+        compute(&plan, seed, first_run + at, &x);
         put_all(out, &x, at, runs - at < LANES ? (int)(runs - at) : LANES);
     }
     return NAV_OK;

@@ -111,31 +111,17 @@ INLINE void draw_stretches(const double *noise, int steps, double rho, double *s
     memcpy(ends, w, sizeof w);
 }
 
-static void stretches_any(const double *noise, int steps, double rho, double *sums, double *ends)
-{
-    draw_stretches(noise, steps, rho, sums, ends);
-}
-
-TARGET_WIDE static void stretches_wide(const double *noise, int steps, double rho, double *sums, double *ends)
-{
-    draw_stretches(noise, steps, rho, sums, ends);
-}
-
-TARGET_WIDEST static void stretches_widest(const double *noise, int steps, double rho, double *sums, double *ends)
-{
-    draw_stretches(noise, steps, rho, sums, ends);
-}
+BY_WIDTH(stretches, (const double *noise, int steps, double rho, double *sums, double *ends),
+         draw_stretches(noise, steps, rho, sums, ends))
 
 /* Sum of n samples of the drift w, which comes back as it is after the last. Each is computed, as noise started from zero and
  * what is left of w. */
 static double drift_sum(const struct samples_plan *plan, const double *noise, int n, double *w)
 {
-    static void (*const by_width[])(const double *, int, double, double *, double *) = {stretches_any, stretches_wide,
-                                                                                        stretches_widest};
     const int steps = n / STRETCHES;
     double sums[STRETCHES];
     double ends[STRETCHES];
-    by_width[plan->width](noise, steps, plan->decay, sums, ends);
+    stretches_by_width[plan->width](noise, steps, plan->decay, sums, ends);
     double sum = 0.0;
     for (int j = 0; j < STRETCHES; j++) {
         sum += plan->decay_sums[steps] * *w + plan->step_sd_radps * sums[j];

@@ -7,24 +7,10 @@ INLINE void fill_uniform(uint64_t state, int n, double *out)
         random_pair(random_mix(state + (uint64_t)(k + 1) * RANDOM_STEP), &out[k], &out[half + k]);
 }
 
-static void fill_any(uint64_t state, int n, double *out)
-{
-    fill_uniform(state, n, out);
-}
-
-TARGET_WIDE static void fill_wide(uint64_t state, int n, double *out)
-{
-    fill_uniform(state, n, out);
-}
-
-TARGET_WIDEST static void fill_widest(uint64_t state, int n, double *out)
-{
-    fill_uniform(state, n, out);
-}
+BY_WIDTH(fill, (uint64_t state, int n, double *out), fill_uniform(state, n, out))
 
 uint64_t random_fill(uint64_t state, int n, double *out)
 {
-    static void (*const by_width[])(uint64_t, int, double *) = {fill_any, fill_wide, fill_widest};
-    by_width[random_width()](state, n, out);
+    fill_by_width[random_width()](state, n, out);
     return state + (uint64_t)(n / 2) * RANDOM_STEP;
 }

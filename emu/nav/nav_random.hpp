@@ -5,11 +5,9 @@
 #define PSABENCH_NAV_RANDOM_HPP
 
 #include "nav/nav_math.hpp"
+#include "nav/nav_width.hpp"
 
 #include <cstring>
-
-/* Into code for a newer processor, too: see VECTORS. */
-#define INLINE __attribute__((always_inline)) static inline
 
 constexpr uint64_t RANDOM_STEP = UINT64_C(0x9E3779B97F4A7C15);
 
@@ -123,23 +121,5 @@ struct random_stream {
         return store[--left];
     }
 };
-
-/* Which code this processor can run: the same source, compiled for vectors of 2, 4 or 8 doubles. No fused operations in any. */
-#ifdef __x86_64__
-#define TARGET_WIDE   __attribute__((target("avx2")))
-#define TARGET_WIDEST __attribute__((target("avx512f,avx512dq,avx512vl")))
-inline int random_width(void)
-{
-    if (__builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return 2;
-    return __builtin_cpu_supports("avx2") ? 1 : 0;
-}
-#else
-#define TARGET_WIDE
-#define TARGET_WIDEST
-inline int random_width(void)
-{
-    return 0;
-}
-#endif
 
 #endif
