@@ -200,7 +200,7 @@ static const char *submit_cycle(void *ctx, const struct bus_request *r, int64_t 
 static const char *name_of(void *ctx, unsigned address)
 {
     const struct bus_port *p = ctx;
-    return type_of(p->bench, p->unit)->bus->name(address);
+    return board_bus_name(type_of(p->bench, p->unit)->bus, address);
 }
 
 static bool open_bus_port(struct ports *p, struct bench *b, const struct options_bus *o, char *why, size_t cap)

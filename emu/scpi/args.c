@@ -18,14 +18,20 @@ unsigned scpi_suffixes(const char *pattern)
     return n;
 }
 
+static void arg_range(const struct control_bench *b, const struct control_command *row, unsigned arg,
+                      const unsigned suffix[4], double *min, double *max)
+{
+    struct control_value v[CONTROL_ARGS_MAX] = {{0}};
+    for (unsigned i = 0; i < 4; i++)
+        v[i] = (struct control_value){.given = true, .real = suffix[i], .count = suffix[i]};
+    control_arg_limits(b, row, arg, v, min, max);
+}
+
 bool scpi_limit(const struct control_bench *b, const struct control_command *row, unsigned arg,
                 const unsigned suffix[4], struct scpi_text word, double *out)
 {
-    struct control_value v[CONTROL_ARGS_MAX] = {{0}};
     double min, max;
-    for (unsigned i = 0; i < 4; i++)
-        v[i] = (struct control_value){.given = true, .real = suffix[i], .count = suffix[i]};
-    control_arg_limits(b, row, arg, v, &min, &max);
+    arg_range(b, row, arg, suffix, &min, &max);
     if (word_is(word, "MINimum")) *out = min;
     else if (word_is(word, "MAXimum")) *out = max;
     else if (word_is(word, "DEFault")) *out = row->arg[arg].def;
@@ -90,15 +96,6 @@ static cJSON *to_bool(const struct source *s)
     return reject_param(s, -224, "ON, OFF, 1 or 0");
 }
 
-static bool same_word(struct scpi_text t, const char *word, size_t len)
-{
-    if (t.n != len) return false;
-    for (size_t i = 0; i < len; i++) {
-        if ((t.p[i] | 0x20) != (word[i] | 0x20)) return false; /* letters, digits and _ */
-    }
-    return true;
-}
-
 /* Four letters, three if the fourth is a vowel: SCPI-99 volume 1, 6.2.1. */
 static size_t short_form(const char *word)
 {
@@ -111,8 +108,8 @@ static const char *find_choice(const struct control_arg *a, struct scpi_text t)
     const char *found = NULL;
     unsigned shorts = 0;
     for (unsigned i = 0; a->choices[i]; i++) {
-        if (same_word(t, a->choices[i], strlen(a->choices[i]))) return a->choices[i];
-        if (!same_word(t, a->choices[i], short_form(a->choices[i]))) continue;
+        if (word_is(t, a->choices[i])) return a->choices[i];
+        if (!scpi_is(a->choices[i], short_form(a->choices[i]), t)) continue;
         shorts++;
         found = a->choices[i];
     }
@@ -162,9 +159,8 @@ static cJSON *convert_param(const struct source *s)
 static bool suffix_fits(const struct control_bench *b, const struct control_command *row, unsigned arg,
                         const unsigned suffix[4], struct scpi_failure *why)
 {
-    double min = 0, max = 0;
-    (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MIN", 3}, &min);
-    (void)scpi_limit(b, row, arg, suffix, (struct scpi_text){"MAX", 3}, &max);
+    double min, max;
+    arg_range(b, row, arg, suffix, &min, &max);
     if (suffix[arg] >= min && suffix[arg] <= max) return true;
     why->code = -114;
     return why_expected(why->what, sizeof why->what, row->arg[arg].name, WHY_REAL(suffix[arg]), "%.10g to %.10g", min,

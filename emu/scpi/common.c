@@ -8,48 +8,32 @@
 
 /* ---- registers of struct scpi_status */
 
-static void *status_reg(const struct scpi_call *call)
+static uint16_t *status_reg(const struct scpi_call *call)
 {
-    return (char *)&call->s->status + call->row->offset;
+    return (uint16_t *)(void *)((char *)&call->s->status + call->row->offset);
 }
 
-static void ask_u8(const struct scpi_call *call)
+static void ask_reg(const struct scpi_call *call)
 {
-    scpi_putf(call->s, "%u", *(const uint8_t *)status_reg(call));
+    scpi_putf(call->s, "%u", *status_reg(call));
 }
 
-static void set_u8(const struct scpi_call *call)
+static void set_reg(const struct scpi_call *call)
 {
-    *(uint8_t *)status_reg(call) = (uint8_t)call->value;
+    *status_reg(call) = call->value & 0x7FFF; /* bit 15 is always 0: SCPI-99 volume 1, 9.1 */
 }
 
 static void set_sre(const struct scpi_call *call)
 {
     const unsigned enabled = call->value & ~(unsigned)SCPI_STB_MSS; /* bit 6 is not to be enabled: 488.2 11.3.2.3 */
-    call->s->status.sre = (uint8_t)enabled;
-}
-
-static void ask_u16(const struct scpi_call *call)
-{
-    scpi_putf(call->s, "%u", *(const uint16_t *)status_reg(call));
-}
-
-static void set_u16(const struct scpi_call *call)
-{
-    *(uint16_t *)status_reg(call) = call->value & 0x7FFF; /* bit 15 is always 0: SCPI-99 volume 1, 9.1 */
+    call->s->status.sre = (uint16_t)enabled;
 }
 
 /* Event registers are cleared by reading. */
-static void take_u8(const struct scpi_call *call)
+static void take_reg(const struct scpi_call *call)
 {
-    ask_u8(call);
-    *(uint8_t *)status_reg(call) = 0;
-}
-
-static void take_u16(const struct scpi_call *call)
-{
-    ask_u16(call);
-    *(uint16_t *)status_reg(call) = 0;
+    ask_reg(call);
+    *status_reg(call) = 0;
 }
 
 /* ---- common commands */
@@ -146,15 +130,15 @@ static void do_preset(const struct scpi_call *call)
 // clang-format off
 static const struct scpi_command rows[] = {
     {"*CLS", "Clear status: event registers and error queue.", .run = do_cls},
-    {"*ESE", "Event status enable register.", .run = set_u8, .max = 255, .offset = REG(ese)},
-    {"*ESE?", "Event status enable register.", .run = ask_u8, .offset = REG(ese)},
-    {"*ESR?", "Event status register; cleared by reading.", .run = take_u8, .offset = REG(esr)},
+    {"*ESE", "Event status enable register.", .run = set_reg, .max = 255, .offset = REG(ese)},
+    {"*ESE?", "Event status enable register.", .run = ask_reg, .offset = REG(ese)},
+    {"*ESR?", "Event status register; cleared by reading.", .run = take_reg, .offset = REG(esr)},
     {"*IDN?", "Identification: manufacturer, model, serial number 0, version.", .run = do_idn},
     {"*OPC", "Operation complete: sets bit 0 of the event status register at the end of the motion.", .run = do_opc},
     {"*OPC?", "Operation complete query: returns 1 at the end of the motion.", .run = do_opc_query},
     {"*RST", "Resets the instrument to its power-on settings.", .run = do_rst},
     {"*SRE", "Service request enable register.", .run = set_sre, .max = 255, .offset = REG(sre)},
-    {"*SRE?", "Service request enable register.", .run = ask_u8, .offset = REG(sre)},
+    {"*SRE?", "Service request enable register.", .run = ask_reg, .offset = REG(sre)},
     {"*STB?", "Status byte.", .run = do_stb},
     {"*TST?", "Self-test: 0, passed.", put_answer, .answer = "0"},
     {"*WAI", "Wait: the rest of the message waits for the end of the motion.", .run = do_wai},
@@ -162,14 +146,14 @@ static const struct scpi_command rows[] = {
     {"SYSTem:ERRor:ALL?", "All entries of the error queue; removed by reading.", .run = do_error_all},
     {"SYSTem:ERRor:COUNt?", "Number of entries in the error queue.", .run = do_error_count},
     {"SYSTem:VERSion?", "SCPI version.", put_answer, .answer = "1999.0"},
-    {"STATus:OPERation[:EVENt]?", "Operation event register (bit 1 settling, bit 3 sweeping); cleared by reading.", .run = take_u16, .offset = REG(operation.event)},
-    {"STATus:OPERation:CONDition?", "Operation condition register.", .run = ask_u16, .offset = REG(operation.condition)},
-    {"STATus:OPERation:ENABle", "Operation enable register: event bits summed in bit 7 of the status byte.", .run = set_u16, .max = 65535, .offset = REG(operation.enable)},
-    {"STATus:OPERation:ENABle?", "Operation enable register.", .run = ask_u16, .offset = REG(operation.enable)},
-    {"STATus:QUEStionable[:EVENt]?", "Questionable event register (bit 0 voltage, bit 4 temperature); cleared by reading.", .run = take_u16, .offset = REG(questionable.event)},
-    {"STATus:QUEStionable:CONDition?", "Questionable condition register.", .run = ask_u16, .offset = REG(questionable.condition)},
-    {"STATus:QUEStionable:ENABle", "Questionable enable register: event bits summed in bit 3 of the status byte.", .run = set_u16, .max = 65535, .offset = REG(questionable.enable)},
-    {"STATus:QUEStionable:ENABle?", "Questionable enable register.", .run = ask_u16, .offset = REG(questionable.enable)},
+    {"STATus:OPERation[:EVENt]?", "Operation event register (bit 1 settling, bit 3 sweeping); cleared by reading.", .run = take_reg, .offset = REG(operation.event)},
+    {"STATus:OPERation:CONDition?", "Operation condition register.", .run = ask_reg, .offset = REG(operation.condition)},
+    {"STATus:OPERation:ENABle", "Operation enable register: event bits summed in bit 7 of the status byte.", .run = set_reg, .max = 65535, .offset = REG(operation.enable)},
+    {"STATus:OPERation:ENABle?", "Operation enable register.", .run = ask_reg, .offset = REG(operation.enable)},
+    {"STATus:QUEStionable[:EVENt]?", "Questionable event register (bit 0 voltage, bit 4 temperature); cleared by reading.", .run = take_reg, .offset = REG(questionable.event)},
+    {"STATus:QUEStionable:CONDition?", "Questionable condition register.", .run = ask_reg, .offset = REG(questionable.condition)},
+    {"STATus:QUEStionable:ENABle", "Questionable enable register: event bits summed in bit 3 of the status byte.", .run = set_reg, .max = 65535, .offset = REG(questionable.enable)},
+    {"STATus:QUEStionable:ENABle?", "Questionable enable register.", .run = ask_reg, .offset = REG(questionable.enable)},
     {"STATus:PRESet", "Clears the operation and questionable enable registers.", .run = do_preset},
 };
 // clang-format on

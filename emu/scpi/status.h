@@ -40,7 +40,7 @@ struct scpi_error {
 };
 
 struct scpi_status {
-    uint8_t esr, ese, sre;
+    uint16_t esr, ese, sre; /* of 8 bits */
     struct scpi_group operation, questionable;
     struct scpi_error error[SCPI_ERRORS_MAX]; /* a ring */
     unsigned first, errors;
