@@ -14,8 +14,7 @@ void board_init(struct board *b, const struct board_line *lines, unsigned count,
     b->sched = s;
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < count; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
-    for (unsigned i = 0; i < BOARD_AXES; i++)
-        afe_init(&b->afe[i], &cfg->afe[i], rng_stream(cfg->seed, cfg->serial, afe_noise[i]));
+    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], board_noise(b, afe_noise[i]));
 }
 
 void board_put_truth(board_truth_fn *put, void *ctx, double value, const char *name, ...)

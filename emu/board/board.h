@@ -97,6 +97,12 @@ struct board_type {
 void board_init(struct board *b, const struct board_line *lines, unsigned count, const struct board_cfg *cfg,
                 const struct board_io *io, struct sched *s);
 
+/* One of the specimen's noise sources, or what it is off by. */
+static inline struct rng board_noise(const struct board *b, const char *source)
+{
+    return rng_stream(b->cfg.seed, b->cfg.serial, source);
+}
+
 /* An event, a number in board_type.events. */
 static inline void board_notify(const struct board *b, unsigned event, int64_t t_ns)
 {

@@ -4,7 +4,7 @@
  * as objects (2002h: sub-index = address + 1, answered when the cycle is done; strobe length 2051h), the reason of the last
  * rejection (2031h), a remark (2040h); the stream is checked against the bus before it flows. The rest of proto/<board>.yaml a
  * board answers by a table of handlers. Owned by the caller, never moved after init, one thread, no allocation. A board's
- * <board>_can.c, in the order of proto/<board>.yaml:
+ * can.c, in the order of proto/<board>.yaml:
  *
  *     struct psd1_can { struct board_node node; ...settings of its own... };     // the node first
  *     static const struct board_object objects[] = {{PSD1_OD_CODES, .value = read_code}, ...};
@@ -12,7 +12,7 @@
  *                                                 .period_ns = period_of};
  *     const struct board_can psd1_can = {.size = sizeof(struct psd1_can), .init = init, BOARD_NODE_LIFE};
  *     static void init(void *can, const struct board_can_cfg *cfg, void *board, struct can_bus *bus, struct sched *s)
- *     {   board_node_init(can, &type, cfg, board, bus, s);  ((struct psd1 *)board)->reading = on_reading; ... }
+ *     {   board_node_init(can, &type, cfg, board, bus, s);  ((struct psd1 *)board)->host = (struct psd1_host){...}; }
  *
  * and when a reading is complete board_node_stream(&can->node, PSD1_CYCLE_TPDO, m, 1, t_ns).                         */
 #ifndef PSABENCH_BOARD_NODE_H

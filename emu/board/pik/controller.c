@@ -78,7 +78,7 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
     b->specimen = pik_specimen_draw(p, cfg->seed, cfg->serial);
     set_clock(b, 0, 0);
     pik_warm(b, 25.0);
-    for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = rng_stream(cfg->seed, cfg->serial, noise[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = board_noise(&b->base, noise[i]);
     sched_ev(&b->look, look_at_inputs, b);
     pik_lines_init(b);
     pik_latch_init(b);

@@ -31,11 +31,6 @@ static double draw_gauss(struct rng *r, double sd)
     return sd * rng_gauss(r);
 }
 
-static struct rng noise_source(const struct pmka *b, const char *name)
-{
-    return rng_stream(b->base.cfg.seed, b->base.cfg.serial, name);
-}
-
 static double from_ppm(double x)
 {
     return 1e-6 * x;
@@ -45,9 +40,9 @@ static double from_ppm(double x)
 static void draw_integrators(struct pmka *b)
 {
     const struct pmka_profile *p = &b->profile;
-    struct rng cap = noise_source(b, "pmka.capacitor"), res = noise_source(b, "pmka.resistors"),
-               tc = noise_source(b, "pmka.resistor_tc"), zero = noise_source(b, "pmka.zero"),
-               zero_tc = noise_source(b, "pmka.zero_tc");
+    struct rng cap = board_noise(&b->base, "pmka.capacitor"), res = board_noise(&b->base, "pmka.resistors"),
+               tc = board_noise(&b->base, "pmka.resistor_tc"), zero = board_noise(&b->base, "pmka.zero"),
+               zero_tc = board_noise(&b->base, "pmka.zero_tc");
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         struct pmka_int_cfg c = {.cap_f = p->cap_f * (1.0 + draw_gauss(&cap, p->cap_tol_sd)),
                                  .cap_tc_per_k = from_ppm(p->cap_tc_ppm_per_k),
@@ -69,8 +64,8 @@ static void draw_integrators(struct pmka *b)
 static void draw_specimen(struct pmka *b)
 {
     const struct pmka_profile *p = &b->profile;
-    struct rng uref = noise_source(b, "pmka.uref"), uc = noise_source(b, "pmka.uc"), adc = noise_source(b, "pmka.adc"),
-               temp = noise_source(b, "pmka.thermometer");
+    struct rng uref = board_noise(&b->base, "pmka.uref"), uc = board_noise(&b->base, "pmka.uc"),
+               adc = board_noise(&b->base, "pmka.adc"), temp = board_noise(&b->base, "pmka.thermometer");
     struct pmka_specimen *s = &b->specimen;
     s->uref_v = p->uref_v * (1.0 + from_ppm(draw_gauss(&uref, p->uref_tol_sd_ppm)));
     s->uref_tc_v_per_k = p->uref_v * from_ppm(draw_gauss(&uref, p->uref_tc_sd_ppm_per_k));
@@ -90,7 +85,7 @@ static void burn_rom(struct pmka *b)
 {
     struct pmka_rom_cfg cfg = {
         .uref_nominal_v = b->profile.uref_v, .ts_s = 1e-9 * b->profile.ts_ns, .serial = b->base.cfg.serial};
-    struct rng factory = noise_source(b, "pmka.factory");
+    struct rng factory = board_noise(&b->base, "pmka.factory");
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         cfg.integrator[i] = &b->channel[i].integrator.cfg;
         cfg.ct_error[i] = from_ppm(draw_gauss(&factory, b->profile.rom_ct_sd_ppm));
@@ -202,8 +197,8 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
     draw_integrators(b);
     draw_specimen(b);
     burn_rom(b);
-    b->adc_noise = noise_source(b, "adc");
-    b->temp_noise = noise_source(b, "temp");
+    b->adc_noise = board_noise(&b->base, "adc");
+    b->temp_noise = board_noise(&b->base, "temp");
     pmka_rotation_start(b);
     for (unsigned i = 0; i < PMKA_INTS; i++) b->channel[i].axis = b->channel[i].said_axis = i < PMKA_K ? (int)i : -1;
 }

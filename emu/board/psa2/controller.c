@@ -288,8 +288,7 @@ static void init_accel(struct psa2 *b)
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {
             .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
-        ads1282_init(&b->adc[i], &cfg, &io, b->base.sched,
-                     rng_stream(b->base.cfg.seed, b->base.cfg.serial, adc_noise[i]));
+        ads1282_init(&b->adc[i], &cfg, &io, b->base.sched, board_noise(&b->base, adc_noise[i]));
     }
 }
 
@@ -302,7 +301,7 @@ static void init_temp(struct psa2 *b)
                                     .gain_error = b->base.cfg.temp_adc_gain_error,
                                     .strict_timing = true};
     const struct ads1256_io io = {.ctx = b, .ain_v = psa2_temp_ain_v, .drdy = temp_drdy};
-    ads1256_init(&b->tadc, &cfg, &io, b->base.sched, rng_stream(b->base.cfg.seed, b->base.cfg.serial, "adc.t"));
+    ads1256_init(&b->tadc, &cfg, &io, b->base.sched, board_noise(&b->base, "adc.t"));
 }
 
 static void res_up(void *ctx, int64_t t_ns)

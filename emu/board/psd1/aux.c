@@ -163,21 +163,21 @@ uint16_t psd1_aux_service(const struct psd1 *b, int64_t t_ns)
 static void draw_gyro(const struct psd1 *b, struct psd1_gyro *g, const char *of, const char *noise)
 {
     const struct psd1_profile *p = &b->profile;
-    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, of);
+    struct rng r = board_noise(&b->base, of);
     const double step_h = 1e-9 * WALK_POINTS * p->gyro_grid_ns / 3600.0;
     g->bias_radps = rng_gauss(&r) * p->gyro_bias_sd_degph * RAD_PER_DEG / 3600.0;
     g->scale = 1.0 + 1e-6 * rng_gauss(&r) * p->gyro_scale_sd_ppm;
     g->rate_offset_radps = rng_gauss(&r) * p->rate_offset_sd_dps * RAD_PER_DEG;
     g->rate_scale = 1.0 + 1e-6 * rng_gauss(&r) * p->rate_scale_sd_ppm;
     g->arw_rad = b->base.cfg.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(step_h);
-    g->noise = rng_stream(b->base.cfg.seed, b->base.cfg.serial, noise);
+    g->noise = board_noise(&b->base, noise);
 }
 
 void psd1_aux_init(struct psd1 *b)
 {
     static const char *const of[] = {"psd1.gyro.x", "psd1.gyro.y", "psd1.gyro.z"};
     static const char *const noise[] = {"psd1.gyro.noise.x", "psd1.gyro.noise.y", "psd1.gyro.noise.z"};
-    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, "psd1.service");
+    struct rng r = board_noise(&b->base, "psd1.service");
     for (unsigned i = 0; i < 3; i++) draw_gyro(b, &b->gyros.axis[i], of[i], noise[i]);
     for (unsigned i = 0; i < 4; i++) b->temp_offset_k[i] = rng_gauss(&r) * b->profile.temp_offset_sd_k;
     b->supply_v = b->profile.supply_v + rng_gauss(&r) * b->profile.supply_sd_v;

@@ -189,7 +189,7 @@ static struct ad7712_cfg adc_cfg(const struct psd1 *b, unsigned axis)
     static const char *const of[] = {"psd1.adc.x", "psd1.adc.y", "psd1.adc.z"};
     static const enum ad7712_part part[] = {AD7712_PART_7712, AD7712_PART_7710, AD7712_PART_7711};
     const struct psd1_profile *p = &b->profile;
-    struct rng r = rng_stream(b->base.cfg.seed, b->base.cfg.serial, of[axis]);
+    struct rng r = board_noise(&b->base, of[axis]);
     struct ad7712_cfg c = {.part = part[p->part],
                            .clkin_hz = p->adc_clkin_hz,
                            .vref_v = p->adc_vref_v,
@@ -208,7 +208,7 @@ static struct ad7712_cfg adc_cfg(const struct psd1 *b, unsigned axis)
 static void init_adc(struct psd1 *b)
 {
     static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
-    struct rng vref = rng_stream(b->base.cfg.seed, b->base.cfg.serial, "psd1.vref");
+    struct rng vref = board_noise(&b->base, "psd1.vref");
     b->vref_error = 1e-6 * rng_gauss(&vref) * b->profile.vref_sd_ppm;
     b->vref_tc_per_k = 1e-6 * rng_gauss(&vref) * b->profile.vref_tc_sd_ppm_per_k;
     for (unsigned i = 0; i < 3; i++) {
@@ -216,8 +216,7 @@ static void init_adc(struct psd1 *b)
         b->port[i] = (struct psd1_port){b, i};
         const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
         const struct ad7712_io io = {.ctx = &b->port[i], .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
-        ad7712_init(&b->adc[i], &cfg, &io, b->base.sched,
-                    rng_stream(b->base.cfg.seed, b->base.cfg.serial, adc_noise[i]));
+        ad7712_init(&b->adc[i], &cfg, &io, b->base.sched, board_noise(&b->base, adc_noise[i]));
         b->drdy[i] = true;
     }
 }
