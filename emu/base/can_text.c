@@ -1,22 +1,19 @@
 #include "base/can_text.h"
 
+#include "base/hex.h"
+
 #include <string.h>
 
 #define ERROR_ID 0x20000000u /* CAN_ERR_FLAG of linux/can.h */
 
 /* ---- writing ---- */
 
-static char *put_hex(char *at, uint32_t v, unsigned digits)
-{
-    static const char hex[] = "0123456789ABCDEF";
-    for (unsigned i = digits; i-- > 0;) *at++ = hex[v >> (4 * i) & 15];
-    return at;
-}
-
 size_t can_text_put(const struct can_msg *m, char out[CAN_TEXT_MAX])
 {
     const bool error = (m->flags & CAN_ERROR) != 0;
-    char *at = put_hex(out, error ? m->id | ERROR_ID : m->id, error || m->flags & CAN_EXT ? 8 : 3);
+    const size_t id_digits = error || m->flags & CAN_EXT ? 8 : 3;
+    char *at = out + id_digits;
+    hex_put(out, error ? m->id | ERROR_ID : m->id, id_digits);
     *at++ = '#';
     if (m->flags & CAN_FD) {
         *at++ = '#';
@@ -26,7 +23,7 @@ size_t can_text_put(const struct can_msg *m, char out[CAN_TEXT_MAX])
         *at++ = 'R';
         *at++ = (char)('0' + m->len);
     } else {
-        for (unsigned i = 0; i < m->len; i++) at = put_hex(at, m->data[i], 2);
+        for (unsigned i = 0; i < m->len; i++, at += 2) hex_put(at, m->data[i], 2);
     }
     *at = '\0';
     return (size_t)(at - out);

@@ -1,6 +1,6 @@
 /* Hexadecimal digits of the text protocols. Pure. */
-#ifndef PSABENCH_LINK_HEX_H
-#define PSABENCH_LINK_HEX_H
+#ifndef PSABENCH_BASE_HEX_H
+#define PSABENCH_BASE_HEX_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -47,6 +47,12 @@ void sched_cancel(struct sched *s, struct sched_ev *e);
  * run reaches that far, time moves on to t_ns and the function may go on there itself. False: arm the event. */
 bool sched_go_on(struct sched *s, int64_t t_ns);
 
+/* Seconds from one instant to another; 0 if that comes before. */
+static inline double sched_since_s(int64_t from_ns, int64_t t_ns)
+{
+    return t_ns > from_ns ? (double)(t_ns - from_ns) / (double)NS_PER_S : 0.0;
+}
+
 /* Due time of the next event, SCHED_NEVER when there is none. */
 int64_t sched_next_ns(const struct sched *s);
 

@@ -73,14 +73,9 @@ static double element_after(const struct chamber_body *b, const struct piece *p,
 
 /* ---- the air */
 
-static double since_s(const struct chamber *c, int64_t t_ns)
-{
-    return t_ns > c->from_ns ? (double)(t_ns - c->from_ns) / (double)NS_PER_S : 0.0;
-}
-
 double chamber_air_degc(const struct chamber *c, int64_t t_ns)
 {
-    const double t_s = since_s(c, t_ns);
+    const double t_s = sched_since_s(c->from_ns, t_ns);
     return t_s >= c->duration_s ? c->set_degc : c->from_degc + c->slope_kps * t_s;
 }
 
@@ -118,7 +113,7 @@ static struct piece hold_of(const struct chamber *c, const struct chamber_body *
 
 double chamber_case_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns)
 {
-    const double t_s = since_s(c, t_ns);
+    const double t_s = sched_since_s(c->from_ns, t_ns);
     const bool ramp = t_s < c->duration_s;
     const struct piece p = ramp ? ramp_of(c, b) : hold_of(c, b);
     return case_after(b, &p, ramp ? t_s : t_s - c->duration_s);
@@ -126,7 +121,7 @@ double chamber_case_degc(const struct chamber *c, const struct chamber_body *b, 
 
 double chamber_element_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns)
 {
-    const double t_s = since_s(c, t_ns);
+    const double t_s = sched_since_s(c->from_ns, t_ns);
     const bool ramp = t_s < c->duration_s;
     const struct piece p = ramp ? ramp_of(c, b) : hold_of(c, b);
     return element_after(b, &p, ramp ? t_s : t_s - c->duration_s);

@@ -125,7 +125,7 @@ static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
 
 static void take_step(struct line_faults *l, const struct trace_step *step)
 {
-    l->level = (l->level & ~step->lines) | (step->level & step->lines);
+    l->level = trace_after(l->level, step);
     for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) watch_step(s, step);
 }
 

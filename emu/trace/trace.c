@@ -128,7 +128,7 @@ uint64_t trace_known(const struct trace *t, int64_t t_ns)
     uint64_t level = t->level;
     for (const struct trace_step *s = t->pending + t->first, *end = s + t->pending_count; s < end && s->t_ns <= t_ns;
          s++)
-        level = (level & ~s->lines) | (s->level & s->lines);
+        level = trace_after(level, s);
     return level;
 }
 

@@ -28,6 +28,11 @@ struct trace_step {
     uint64_t lines, level;
 };
 
+static inline uint64_t trace_after(uint64_t level, const struct trace_step *s)
+{
+    return (level & ~s->lines) | (s->level & s->lines);
+}
+
 /* Steps in a row whose `lines` are just what changes, provided that all these lines are low before; they are after. */
 struct trace_run {
     uint64_t at; /* number of the first, counted since trace_init() */

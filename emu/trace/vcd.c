@@ -137,16 +137,11 @@ static void begin_edges(struct vcd *v)
     v->sink.advance = on_advance;
 }
 
-static uint64_t levels_after(uint64_t level, const struct trace_step *s)
-{
-    return (level & ~s->lines) | (s->level & s->lines);
-}
-
 static void steps_before(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->before = v->level = levels_after(v->level, s);
-    for (; n > 0 && s->t_ns == v->from_ns; n--, s++) v->level = levels_after(v->level, s);
+    for (; n > 0 && s->t_ns < v->from_ns; n--, s++) v->before = v->level = trace_after(v->level, s);
+    for (; n > 0 && s->t_ns == v->from_ns; n--, s++) v->level = trace_after(v->level, s);
     if (n == 0) return;
     begin_edges(v);
     on_steps(v, s, n);

@@ -1,7 +1,7 @@
 /* Bytes to lines in pieces of any size, against a reader of the whole; hexadecimal digits there and back. */
 #include "fuzz.h"
 
-#include "link/hex.h"
+#include "base/hex.h"
 #include "link/lines.h"
 
 #include <string.h>

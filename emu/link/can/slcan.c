@@ -1,7 +1,7 @@
 #include "link/can/slcan.h"
 
 #include "base/canbits.h"
-#include "link/hex.h"
+#include "base/hex.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 #include "link/can/slcan_pty.h"
 
+#include "base/hex.h"
 #include "link/can/slcan.h"
-#include "link/hex.h"
 
 #include <stdio.h>
 #include <string.h>

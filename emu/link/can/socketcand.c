@@ -1,6 +1,6 @@
 #include "link/can/socketcand.h"
 
-#include "link/hex.h"
+#include "base/hex.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 #include "link/line/bus_text.h"
 
-#include "link/hex.h"
+#include "base/hex.h"
 
 #include <inttypes.h>
 #include <stdio.h>

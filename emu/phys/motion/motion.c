@@ -46,7 +46,7 @@ static const struct motion_plan *plan_at(const struct motion *m, int64_t t_ns)
 struct motion_state motion_at(const struct motion *m, int64_t t_ns)
 {
     const struct motion_plan *p = plan_at(m, t_ns);
-    const double t_s = t_ns > p->start_ns ? (double)(t_ns - p->start_ns) / (double)NS_PER_S : 0.0;
+    const double t_s = sched_since_s(p->start_ns, t_ns);
     unsigned i = p->count - 1;
     while (i > 0 && p->piece[i].t_s > t_s) i--;
     const struct motion_piece *piece = &p->piece[i];

@@ -143,9 +143,7 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
         .rate_dps = s.rate_radps / RAD_PER_DEG,
         .mode = motion_mode(m),
         .at_rest = t_ns >= rest_ns,
-        .rest_in_s = rest_ns == INT64_MAX ? -1.0
-                     : rest_ns > t_ns     ? (double)(rest_ns - t_ns) / (double)NS_PER_S
-                                          : 0.0,
+        .rest_in_s = rest_ns == INT64_MAX ? -1.0 : sched_since_s(t_ns, rest_ns),
     };
 }
 

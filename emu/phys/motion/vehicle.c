@@ -9,11 +9,6 @@
 
 #define LATITUDE_MAX_RAD (VEHICLE_LATITUDE_MAX_DEG * RAD_PER_DEG)
 
-static double since_s(int64_t from_ns, int64_t t_ns)
-{
-    return t_ns > from_ns ? (double)(t_ns - from_ns) / (double)NS_PER_S : 0.0;
-}
-
 /* ---- ramps and sines */
 
 struct value {
@@ -27,7 +22,7 @@ static double ramp_s(const struct vehicle_ramp *r)
 
 static struct value ramp_at(const struct vehicle_ramp *r, int64_t t_ns)
 {
-    const double s = since_s(r->from_ns, t_ns);
+    const double s = sched_since_s(r->from_ns, t_ns);
     if (s >= ramp_s(r)) return (struct value){r->to, 0.0};
     return (struct value){r->from + r->rate * s, r->rate};
 }
@@ -41,7 +36,7 @@ static struct vehicle_ramp make_ramp(double from, double to, double rate, int64_
 static struct value sine_at(const struct vehicle_sine *s, int64_t t_ns)
 {
     if (s->amplitude == 0.0 || s->rate_radps == 0.0) return (struct value){0.0, 0.0};
-    const double phase_rad = fmod(s->rate_radps * since_s(s->from_ns, t_ns), TURN_RAD);
+    const double phase_rad = fmod(s->rate_radps * sched_since_s(s->from_ns, t_ns), TURN_RAD);
     return (struct value){s->amplitude * det_sin(phase_rad), s->amplitude * s->rate_radps * det_cos(phase_rad)};
 }
 
@@ -95,7 +90,7 @@ static double latitude_rad(const struct vehicle_plan *p, int64_t t_ns)
         if (to_ns <= from_ns) continue;
         const struct value v = ramp_at(&p->speed_mps, from_ns);
         const struct value h = ramp_at(&p->heading_rad, from_ns);
-        north_m += northwards_m(v.at, v.rate, h.at, h.rate, since_s(from_ns, to_ns));
+        north_m += northwards_m(v.at, v.rate, h.at, h.rate, sched_since_s(from_ns, to_ns));
         from_ns = to_ns;
     }
     const double lat = p->latitude_rad + north_m / EARTH_RADIUS_M;
@@ -268,7 +263,7 @@ static bool has_sway(const struct vehicle_plan *p)
 
 static bool ramp_over(const struct vehicle_ramp *r, int64_t t_ns)
 {
-    return t_ns >= r->from_ns && since_s(r->from_ns, t_ns) >= ramp_s(r);
+    return t_ns >= r->from_ns && sched_since_s(r->from_ns, t_ns) >= ramp_s(r);
 }
 
 bool vehicle_steady(const struct vehicle *v, int64_t t_ns)
