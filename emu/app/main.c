@@ -115,7 +115,7 @@ int main(int argc, char *argv[])
     struct options o;
     char why[1024];
     if (!options_parse(argc, argv, &o, why, sizeof why)) return print_error(SERVICE_INPUT, why);
-    if (o.action == OPTIONS_HELP) return fputs(options_help(), stdout) < 0;
+    if (o.action == OPTIONS_HELP) return !options_print_help(stdout);
     if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);

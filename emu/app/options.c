@@ -11,64 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char help[] =
-    "psa-emu [options] [SCENARIO]: a bench of accelerometer converter boards on a CAN bus, in software\n"
-    "\n"
-    "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n"
-    "\n"
-    "  --can [BUS=]KIND         CAN adapter on bus BUS (default: the first); may be given several times. KIND:\n"
-    "        socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0: any free port); without\n"
-    "                           BUS= it serves every bus by name\n"
-    "        slcan[:LINK]       slcan on a pseudo-terminal; LINK becomes a symbolic link to it\n"
-    "        socketcan:IFACE    kernel interface such as vcan0 or can0\n"
-    "        log:FILE           record every frame to FILE (candump -L format)\n"
-    "        none               no adapter\n"
-    "  --pace wall|step|free    time: real (default), only by commands of the control\n"
-    "                           socket, or as fast as possible\n"
-    "  --for TIME               simulated time to run: 300ms, 10s, 2min; without a unit, seconds\n"
-    "  --until-eof              exit on end-of-file on standard input\n"
-    "  --wait-client            start the time when the first CAN client connects\n"
-    "  --seed N                 random seed; overrides the scenario\n"
-    "  --start                  start the units without an NMT command\n"
-    "  --bitrate HZ             bit rate of every bus; overrides the scenario; 0: frames take no time\n"
-    "  --data-bitrate HZ        data bit rate of FD frames; overrides the scenario; 0: no FD\n"
-    "  --epoch SECONDS          offset of the time stamps that clients receive\n"
-    "  --scpi WHAT[:PORT]       SCPI instrument on 127.0.0.1: head, table, chamber, supply, or all of the scenario\n"
-    "                           (default port: any free one); may be given several times\n"
-    "  --scpi WHAT:pty[:LINK]   the same on a pseudo-terminal\n"
-    "  --control PATH           Unix socket for commands, one JSON object per line\n"
-    "  --truth PATH             Unix socket with the true parameters, for programs that compare results\n"
-    "  --restore FILE           continue from a snapshot, instead of a SCENARIO\n"
-    "  --truth-log FILE         record the true state of every unit as lines of JSON\n"
-    "  --truth-every TIME       interval between records of --truth-log (default 10ms)\n"
-    "  --unit NAME              unit whose lines --vcd and --line show (default: the first)\n"
-    "  --vcd FILE               record the lines as VCD\n"
-    "  --vcd-unit NS            time unit of the VCD (default 10)\n"
-    "  --line LINK              line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
-    "                           pseudo-terminal; LINK becomes a symbolic link to it; -: no link\n"
-    "  --line-hz HZ             sample rate of the line port (default 8000000)\n"
-    "  --bus-port [UNIT:]LINK   bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
-    "                           (default: the first unit that has one); LINK as above; may be given several times\n"
-    "  --quiet                  no counters on stderr at exit\n"
-    "  --dump                   print the scenario with every key as JSON (itself a scenario) and exit\n"
-    "  --resolved FILE          write the scenario with every key to FILE and run\n"
-    "  --list-scenarios         names for SCENARIO\n"
-    "  --list-profiles          board profiles with clocks and frame\n"
-    "  --list-keys              keys of a scenario with unit, range and default\n"
-    "  --list-commands          commands of the control socket and the truth port\n"
-    "  --list-scpi              SCPI headers of the instruments\n"
-    "  --list-faults            kinds of faults and their points\n"
-    "  --help, --version\n"
-    "\n"
-    "On stdout: one line `ready key=value ...` for each endpoint, then `ready all`. Exit status: 0 success, 2 bad "
-    "input,\n"
-    "3 system error (port, interface, file), 130 interrupted by Ctrl-C.\n";
-
-const char *options_help(void)
-{
-    return help;
-}
-
 static bool parse_u64(const char *text, uint64_t max, uint64_t *v)
 {
     char *end;
@@ -107,11 +49,13 @@ struct target {
     const struct row *row;
 };
 
+/* An option, and its entry in --help; in the order of both. */
 struct row {
     const char *name; /* with its dashes */
+    const char *form; /* of its argument, with what is between; NULL: it has none */
     bool (*set)(const struct target *t, const char *arg);
-    size_t offset;              /* in struct options: of set_path(), set_flag(), set_rate() */
-    enum options_action action; /* of set_action() */
+    size_t where; /* an offset in struct options: of set_path(), set_flag(), set_rate(); the action of set_action() */
+    const char *text; /* more lines of it follow as they are; NULL: it is with another */
 };
 
 #define expected(t, got, ...) why_expected((t)->why, (t)->cap, (t)->row->name, WHY_TEXT(got), __VA_ARGS__)
@@ -206,7 +150,7 @@ static bool set_seed(const struct target *t, const char *arg)
 
 static bool set_rate(const struct target *t, const char *arg)
 {
-    struct options_rate *r = (struct options_rate *)((char *)t->o + t->row->offset);
+    struct options_rate *r = (struct options_rate *)((char *)t->o + t->row->where);
     uint64_t v;
     r->given = parse_u64(arg, 8000000, &v) && (v == 0 || v >= 10000);
     if (!r->given) return expected(t, arg, "0 or 10000 to 8000000 bit/s");
@@ -264,20 +208,20 @@ static bool set_bus_port(const struct target *t, const char *arg)
 static bool set_path(const struct target *t, const char *arg)
 {
     if (!*arg) return expected(t, arg, "a path");
-    *(const char **)((char *)t->o + t->row->offset) = arg;
+    *(const char **)((char *)t->o + t->row->where) = arg;
     return true;
 }
 
 static bool set_flag(const struct target *t, const char *arg)
 {
     (void)arg;
-    return *(bool *)((char *)t->o + t->row->offset) = true;
+    return *(bool *)((char *)t->o + t->row->where) = true;
 }
 
 static bool set_action(const struct target *t, const char *arg)
 {
     (void)arg;
-    t->o->action = t->row->action;
+    t->o->action = (enum options_action)t->row->where;
     return true;
 }
 
@@ -290,36 +234,74 @@ static bool set_scenario(const struct target *t, const char *arg)
 #define IN(member) offsetof(struct options, member)
 
 // clang-format off
-static const struct row can_row = {"--can", .set = set_can}, scenario_row = {"SCENARIO", set_scenario, .offset = IN(scenario)};
+static const struct row scenario_row = {"SCENARIO", NULL, set_scenario, IN(scenario), NULL};
 static const struct row rows[] = {
-    {"--can", .set = set_can},                         {"--pace", .set = set_pace},
-    {"--for", .set = set_for},                         {"--seed", .set = set_seed},
-    {"--bitrate", set_rate, .offset = IN(bitrate)},    {"--data-bitrate", set_rate, .offset = IN(data_bitrate)},
-    {"--epoch", .set = set_epoch},                     {"--scpi", .set = set_scpi},
-    {"--bus-port", .set = set_bus_port},               {"--truth-every", .set = set_truth_every},
-    {"--vcd-unit", .set = set_vcd_unit},               {"--line-hz", .set = set_line_hz},
-    {"--control", set_path, .offset = IN(control)},       {"--truth", set_path, .offset = IN(truth)},
-    {"--unit", set_path, .offset = IN(unit)},             {"--vcd", set_path, .offset = IN(vcd)},
-    {"--line", set_path, .offset = IN(line)},             {"--restore", set_path, .offset = IN(restore)},
-    {"--truth-log", set_path, .offset = IN(truth_log)},   {"--resolved", set_path, .offset = IN(resolved)},
-    {"--until-eof", set_flag, .offset = IN(until_eof)},   {"--wait-client", set_flag, .offset = IN(wait_client)},
-    {"--start", set_flag, .offset = IN(start)},           {"--quiet", set_flag, .offset = IN(quiet)},
-    {"--help", set_action, .action = OPTIONS_HELP},
-    {"--version", set_action, .action = OPTIONS_VERSION},
-    {"--dump", set_action, .action = OPTIONS_DUMP},
-    {"--list-profiles", set_action, .action = OPTIONS_LIST_PROFILES},
-    {"--list-scenarios", set_action, .action = OPTIONS_LIST_SCENARIOS},
-    {"--list-keys", set_action, .action = OPTIONS_LIST_KEYS},
-    {"--list-commands", set_action, .action = OPTIONS_LIST_COMMANDS},
-    {"--list-scpi", set_action, .action = OPTIONS_LIST_SCPI},
-    {"--list-faults", set_action, .action = OPTIONS_LIST_FAULTS},
+    {"--can", " [BUS=]KIND", set_can, 0, "CAN adapter on bus BUS (default: the first); may be given several times. KIND:\n"
+     "        socketcand[:PORT]  socketcand protocol on 127.0.0.1 (default, port 29536; 0: any free port); without\n"
+     "                           BUS= it serves every bus by name\n"
+     "        slcan[:LINK]       slcan on a pseudo-terminal; LINK becomes a symbolic link to it\n"
+     "        socketcan:IFACE    kernel interface such as vcan0 or can0\n"
+     "        log:FILE           record every frame to FILE (candump -L format)\n"
+     "        none               no adapter"},
+    {"--pace", " wall|step|free", set_pace, 0, "time: real (default), only by commands of the control\n"
+     "                           socket, or as fast as possible"},
+    {"--for", " TIME", set_for, 0, "simulated time to run: 300ms, 10s, 2min; without a unit, seconds"},
+    {"--until-eof", NULL, set_flag, IN(until_eof), "exit on end-of-file on standard input"},
+    {"--wait-client", NULL, set_flag, IN(wait_client), "start the time when the first CAN client connects"},
+    {"--seed", " N", set_seed, 0, "random seed; overrides the scenario"},
+    {"--start", NULL, set_flag, IN(start), "start the units without an NMT command"},
+    {"--bitrate", " HZ", set_rate, IN(bitrate), "bit rate of every bus; overrides the scenario; 0: frames take no time"},
+    {"--data-bitrate", " HZ", set_rate, IN(data_bitrate), "data bit rate of FD frames; overrides the scenario; 0: no FD"},
+    {"--epoch", " SECONDS", set_epoch, 0, "offset of the time stamps that clients receive"},
+    {"--scpi", " WHAT[:PORT]", set_scpi, 0, "SCPI instrument on 127.0.0.1: head, table, chamber, supply, or all of the scenario\n"
+     "                           (default port: any free one); may be given several times\n"
+     "  --scpi WHAT:pty[:LINK]   the same on a pseudo-terminal"},
+    {"--control", " PATH", set_path, IN(control), "Unix socket for commands, one JSON object per line"},
+    {"--truth", " PATH", set_path, IN(truth), "Unix socket with the true parameters, for programs that compare results"},
+    {"--restore", " FILE", set_path, IN(restore), "continue from a snapshot, instead of a SCENARIO"},
+    {"--truth-log", " FILE", set_path, IN(truth_log), "record the true state of every unit as lines of JSON"},
+    {"--truth-every", " TIME", set_truth_every, 0, "interval between records of --truth-log (default 10ms)"},
+    {"--unit", " NAME", set_path, IN(unit), "unit whose lines --vcd and --line show (default: the first)"},
+    {"--vcd", " FILE", set_path, IN(vcd), "record the lines as VCD"},
+    {"--vcd-unit", " NS", set_vcd_unit, 0, "time unit of the VCD (default 10)"},
+    {"--line", " LINK", set_path, IN(line), "line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
+     "                           pseudo-terminal; LINK becomes a symbolic link to it; -: no link"},
+    {"--line-hz", " HZ", set_line_hz, 0, "sample rate of the line port (default 8000000)"},
+    {"--bus-port", " [UNIT:]LINK", set_bus_port, 0, "bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
+     "                           (default: the first unit that has one); LINK as above; may be given several times"},
+    {"--quiet", NULL, set_flag, IN(quiet), "no counters on stderr at exit"},
+    {"--dump", NULL, set_action, OPTIONS_DUMP, "print the scenario with every key as JSON (itself a scenario) and exit"},
+    {"--resolved", " FILE", set_path, IN(resolved), "write the scenario with every key to FILE and run"},
+    {"--list-scenarios", NULL, set_action, OPTIONS_LIST_SCENARIOS, "names for SCENARIO"},
+    {"--list-profiles", NULL, set_action, OPTIONS_LIST_PROFILES, "board profiles with clocks and frame"},
+    {"--list-keys", NULL, set_action, OPTIONS_LIST_KEYS, "keys of a scenario with unit, range and default"},
+    {"--list-commands", NULL, set_action, OPTIONS_LIST_COMMANDS, "commands of the control socket and the truth port"},
+    {"--list-scpi", NULL, set_action, OPTIONS_LIST_SCPI, "SCPI headers of the instruments"},
+    {"--list-faults", NULL, set_action, OPTIONS_LIST_FAULTS, "kinds of faults and their points"},
+    {"--help", NULL, set_action, OPTIONS_HELP, NULL},
+    {"--version", NULL, set_action, OPTIONS_VERSION, NULL},
 };
 // clang-format on
 #define ROWS (sizeof rows / sizeof *rows)
 
+bool options_print_help(FILE *out)
+{
+    char option[32];
+    fprintf(out, "psa-emu [options] [SCENARIO]: a bench of accelerometer converter boards on a CAN bus, in software\n\n"
+                 "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n\n");
+    for (unsigned i = 0; i < ROWS && rows[i].text; i++) {
+        snprintf(option, sizeof option, "%s%s", rows[i].name, rows[i].form ? rows[i].form : "");
+        fprintf(out, "  %-24s %s\n", option, rows[i].text);
+    }
+    return fprintf(out, "  --help, --version\n\n"
+                        "On stdout: one line `ready key=value ...` for each endpoint, then `ready all`. Exit status: 0 "
+                        "success, 2 bad input,\n"
+                        "3 system error (port, interface, file), 130 interrupted by Ctrl-C.\n") >= 0;
+}
+
 bool options_cans(struct options *o, char *text, char *why, size_t cap)
 {
-    const struct target t = {o, why, cap, &can_row};
+    const struct target t = {o, why, cap, &rows[0]};
     char *rest = NULL;
     o->can_count = 0;
     for (const char *one = strtok_r(text, " ", &rest); one; one = strtok_r(NULL, " ", &rest)) {
@@ -338,8 +320,7 @@ static bool parse_all(struct target *t, int argc, char *const argv[])
 {
     struct option longs[ROWS + 1] = {{0}};
     for (unsigned i = 0; i < ROWS; i++) {
-        const bool alone = rows[i].set == set_flag || rows[i].set == set_action;
-        longs[i] = (struct option){.name = rows[i].name + 2, .has_arg = !alone, .val = 256 + (int)i};
+        longs[i] = (struct option){.name = rows[i].name + 2, .has_arg = rows[i].form != NULL, .val = 256 + (int)i};
     }
     optind = 0;
     for (int c; (c = getopt_long(argc, argv, "-:", longs, NULL)) != -1;) {

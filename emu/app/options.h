@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #define OPTIONS_CAN_MAX  8u
 #define OPTIONS_SCPI_MAX 8u
@@ -93,8 +94,8 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
  * is cut up and stays the caller's. False with one line in why. */
 bool options_cans(struct options *o, char *text, char *why, size_t cap);
 
-/* The text of --help. */
-const char *options_help(void);
+/* The text of --help. False: it cannot be written. */
+bool options_print_help(FILE *out);
 
 /* "300ms", "10s", "2.5min", "1h", plain seconds. False when it is no such time or outside 0 ... 1e6 s. */
 bool options_duration(const char *text, int64_t *ns);
