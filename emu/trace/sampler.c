@@ -71,7 +71,7 @@ bool sampler_start(struct sampler *s, struct trace *t, const char *const *names,
         s->sig[i] = (uint8_t)sig;
         mask |= TRACE_BIT(sig);
     }
-    s->first = s->next = clk_count_at(&own, t->done_ns);
+    s->next = clk_count_at(&own, t->done_ns);
     s->sink = (struct trace_sink){.mask = mask, .steps = on_steps, .advance = on_advance, .ctx = s};
     trace_attach(t, &s->sink);
     return true;
@@ -80,11 +80,6 @@ bool sampler_start(struct sampler *s, struct trace *t, const char *const *names,
 void sampler_stop(struct sampler *s)
 {
     trace_detach(s->trace, &s->sink);
-}
-
-int64_t sampler_t0_ns(const struct sampler *s)
-{
-    return clk_edge_ns(&s->clock, s->first);
 }
 
 size_t sampler_take(struct sampler *s, uint8_t *buf, size_t cap)
@@ -96,9 +91,4 @@ size_t sampler_take(struct sampler *s, uint8_t *buf, size_t cap)
     s->head = (s->head + n) % SAMPLER_RING;
     s->len -= n;
     return n;
-}
-
-int64_t sampler_full_ns(const struct sampler *s)
-{
-    return clk_edge_ns(&s->clock, s->next + (int64_t)(SAMPLER_RING - s->len));
 }

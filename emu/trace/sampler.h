@@ -27,7 +27,6 @@ struct sampler { /* read-only outside sampler.c */
     uint8_t sig[SAMPLER_LINES]; /* their numbers in the trace */
     uint8_t level;              /* now */
     uint8_t gap;                /* SAMPLER_GAP: mark the next byte */
-    int64_t first;              /* count of the clock at the first sample */
     int64_t next;               /* count of the first sample not yet made */
     uint64_t dropped;           /* samples that found the ring full */
     size_t head, len;           /* oldest byte, bytes waiting */
@@ -42,14 +41,7 @@ bool sampler_start(struct sampler *s, struct trace *t, const char *const *names,
 /* Detaches; what waits can still be taken. */
 void sampler_stop(struct sampler *s);
 
-/* Instant of the first sample since sampler_start(): byte n of an unbroken stream is the level at this count + n. */
-int64_t sampler_t0_ns(const struct sampler *s);
-
 /* Moves up to cap of the oldest bytes to buf; returns how many. */
 size_t sampler_take(struct sampler *s, uint8_t *buf, size_t cap);
-
-/* Up to where the trace may be advanced with nothing dropped: a loop that is not bound to real time waits for its reader
- * there. */
-int64_t sampler_full_ns(const struct sampler *s);
 
 #endif
