@@ -30,11 +30,18 @@ def collected_in_python(source: str) -> set[str]:
     return names
 
 
-IDS_FROM = {"proves": 0, "active": 0, "check": 1}  # the first of a mark's arguments that is an id
+# Which of a mark's arguments are ids.
+IDS_OF = {
+    "proves": slice(None),
+    "active": slice(None),
+    "dialogue": slice(None),
+    "check": slice(1, None),
+    "checks": slice(1),
+}
 
 
 def proved_in_python(source: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Functions marked @proves(ID, ...), @active(ID, ...) or @check(STIMULUS, ID, ...), and their ids.
+    """Functions marked @proves(ID, ...), @check(STIMULUS, ID, ...) and the like, and their ids.
 
     Raises ValueError where an id is no literal text.
     """
@@ -43,9 +50,9 @@ def proved_in_python(source: str) -> Iterator[tuple[str, tuple[str, ...]]]:
             continue
         for mark in node.decorator_list:
             kind = ast.unparse(mark.func).rpartition(".")[2] if isinstance(mark, ast.Call) else ""
-            if not isinstance(mark, ast.Call) or kind not in IDS_FROM:
+            if not isinstance(mark, ast.Call) or kind not in IDS_OF:
                 continue
-            args = mark.args[IDS_FROM[kind] :]
+            args = mark.args[IDS_OF[kind]]
             ids = [a.value for a in args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
             if len(ids) != len(args) or (kind == "proves" and mark.keywords):
                 raise ValueError(f"line {mark.lineno}: @{kind} of {node.name} wants literal ids")

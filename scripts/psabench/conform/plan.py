@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
+from inspect import unwrap
 from typing import TYPE_CHECKING, Any
 
 from psabench.conform.capture.intervals import wires_needed
@@ -118,7 +119,7 @@ def _planned(
     test: Test, ids: tuple[str, ...], plan: Plan, before: Prepare | None = None, after: Prepare | None = None
 ) -> Test:
     """The test with its plan, of what it looks at alone: where it wants the row that it proves, it gets that."""
-    planned, wants_row = test, test.__code__.co_argcount > 1
+    planned, wants_row = test, unwrap(test).__code__.co_argcount > 1
     if wants_row or before or after:
 
         @wraps(test)

@@ -16,7 +16,7 @@ from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import active
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.can_host import Message
 
@@ -307,7 +307,7 @@ class Talk:
         return self.fence()
 
 
-Dialogue = Callable[[Talk], str]
+Dialogue = Callable[..., str]  # of a Talk, and of the row that it proves where it takes a second argument
 
 
 @contextmanager
@@ -329,16 +329,18 @@ def talk(s: Dut, *, reset: bool = False, take: Take | None = None) -> Iterator[T
             s.host.send(t.nmt_id, bytes([Nmt.PREOP, t.node]))
 
 
-def dialogue(*, needs: Iterable[str] = ("can",), reset: bool = False) -> Callable[[Dialogue], Callable[[Dut], str]]:
+def dialogue(
+    *ids: str, needs: Iterable[str] = ("can",), reset: bool = False
+) -> Callable[[Dialogue], Callable[[Dut], str]]:
     """An active test that is a conversation: it gets a Talk, which ends with it as `talk` says."""
 
     def register(test: Dialogue) -> Callable[[Dut], str]:
         @wraps(test)
-        def converse(s: Dut) -> str:
+        def converse(s: Dut, *row: Requirement) -> str:
             with talk(s, reset=reset) as t:
-                return test(t)
+                return test(t, *row)
 
-        return active(needs=needs)(converse)
+        return active(*ids, needs=needs)(converse)
 
     return register
 

@@ -8,9 +8,8 @@ import re
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, Strobes, harmless, quiet, registers, say, strobes
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, Talk, dialogue, read, words
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive
 
 DONE = re.compile(r"([RW]) ([0-9A-F]{2})h ([0-9A-F]{4}) t=(0|[1-9][0-9]*)")
@@ -48,8 +47,7 @@ def _refusal(answer: str, code: str, letter: str, address: str) -> None:
         raise Failed(repr(answer), f"E {code} {letter} {address} t=NS")
 
 
-@proves("BUS-PORT-01")
-@active(needs={"bus"})
+@active("BUS-PORT-01", needs={"bus"})
 def each_line_has_its_answer_in_turn(s: Dut) -> str:
     """A hundred lines at once, reads, questions and nonsense."""
     address = quiet(s)
@@ -73,8 +71,7 @@ def _time_ns(answer: str) -> int:
     return int(m[1])
 
 
-@proves("BUS-PORT-02")
-@active(needs={"bus"})
+@active("BUS-PORT-02", needs={"bus"})
 def a_read_cycle_and_its_answer(s: Dut) -> str:
     """R at an address that can always be read."""
     answer = say(s, f"R {quiet(s):X}")[0]
@@ -82,8 +79,7 @@ def a_read_cycle_and_its_answer(s: Dut) -> str:
     return answer
 
 
-@proves("BUS-PORT-03")
-@active(needs={"bus"})
+@active("BUS-PORT-03", needs={"bus"})
 def a_write_cycle_and_its_answer(s: Dut) -> str:
     """W of what a register has."""
     address, word = harmless(s)
@@ -94,8 +90,7 @@ def a_write_cycle_and_its_answer(s: Dut) -> str:
     return answer
 
 
-@proves("BUS-PORT-04")
-@active(needs={"bus"})
+@active("BUS-PORT-04", needs={"bus"})
 def refused_lines_say_why(s: Dut) -> str:
     """Lines that are none, numbers that are none, addresses that no one has, rights."""
     of = registers(s)
@@ -124,8 +119,7 @@ def refused_lines_say_why(s: Dut) -> str:
     return f"{len(wanted)} lines refused, each with its code"
 
 
-@proves("BUS-PORT-05")
-@active(needs={"bus"})
+@active("BUS-PORT-05", needs={"bus"})
 def it_says_who_is_there(s: Dut) -> str:
     """The line ?"""
     answer = say(s, "?")[0]
@@ -139,11 +133,10 @@ def it_says_who_is_there(s: Dut) -> str:
     return answer
 
 
-@proves("BUS-PORT-06")
-@active(needs={"bus"})
-def a_long_line_is_refused(s: Dut) -> str:
+@active("BUS-PORT-06", needs={"bus"})
+def a_long_line_is_refused(s: Dut, row: Requirement) -> str:
     """A good line made as long as a line may be by blanks, and one longer."""
-    most = int(requirements().rows["BUS-PORT-06"].limit("line_max_chars"))
+    most = int(row.limit("line_max_chars"))
     good = f"R {quiet(s):X}"
     answers = say(s, good.ljust(most), good.ljust(most + 1), good)
     _cycle(answers[0], "R", quiet(s))
@@ -153,8 +146,7 @@ def a_long_line_is_refused(s: Dut) -> str:
     return f"{most} characters taken; {answers[1]}"
 
 
-@proves("BUS-PORT-07")
-@active(needs={"bus"})
+@active("BUS-PORT-07", needs={"bus"})
 def spelling_makes_no_difference(s: Dut) -> str:
     """The same line in either case, with h, two digits, blanks, a CR."""
     a = quiet(s)
@@ -167,8 +159,7 @@ def spelling_makes_no_difference(s: Dut) -> str:
     return f"{len(lines)} spellings of one line"
 
 
-@proves("BUS-PORT-08")
-@active(needs={"bus"})
+@active("BUS-PORT-08", needs={"bus"})
 def times_go_on_by_the_strobe(s: Dut) -> str:
     """Three cycles at once with a strobe of 1 ms each: their times."""
     strobe_ns = STROBE_MS * 1_000_000
@@ -190,8 +181,7 @@ def _strobed(s: Dut, strobe_ns: int) -> tuple[int, Strobes]:
     return t_ns, strobes(take.lines).at(quiet(s))
 
 
-@proves("BUS-PORT-08")
-@active(needs={"bus", "pins", "exact"})
+@active("BUS-PORT-08", needs={"bus", "pins", "exact"})
 def times_are_those_of_cs(s: Dut) -> str:
     """A cycle: its time beside the rise of CS."""
     t_ns, found = _strobed(s, STROBE_NS)
@@ -203,21 +193,19 @@ def times_are_those_of_cs(s: Dut) -> str:
     return f"t={t_ns}, the rise of CS"
 
 
-@proves("BUS-PORT-10")
-@active(needs={"bus", "pins"})
-def a_strobe_is_as_long_as_it_is_told(s: Dut) -> str:
+@active("BUS-PORT-10", needs={"bus", "pins"})
+def a_strobe_is_as_long_as_it_is_told(s: Dut, row: Requirement) -> str:
     """A cycle with a strobe of so many ns, in decimal: how long is CS low?"""
     _, found = _strobed(s, STROBE_NS)
     low_ns = (found.rise_ns - found.fall_ns).tolist()
-    slack_ns = requirements().rows["BUS-PORT-10"].limit("tolerance_ns")
+    slack_ns = row.limit("tolerance_ns")
     if len(low_ns) != 1 or abs(low_ns[0] - STROBE_NS) > slack_ns:
         at_ns = int(found.fall_ns[0]) if low_ns else None
         raise Failed(f"CS low for {low_ns} ns", f"once, {STROBE_NS} +- {slack_ns:g} ns", at_ns=at_ns, lines=LINES)
     return f"CS low for {low_ns[0]} ns"
 
 
-@proves("BUS-PORT-09")
-@dialogue(needs={"bus", "can"}, reset=True)
+@dialogue("BUS-PORT-09", needs={"bus", "can"}, reset=True)
 def the_port_reads_what_can_reads(t: Talk) -> str:
     """Each readable register over CAN, by the port, over CAN again; those that stood still."""
     same = []

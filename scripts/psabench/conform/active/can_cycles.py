@@ -7,19 +7,14 @@ from psabench.boards.unit import REFUSAL, STROBE_NS
 from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, Nmt, Talk, dialogue, read, words, write
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
 DONE, REFUSED = "Bus cycles", "Bus cycles refused"
 LONG_NS, LONGEST_NS = 10_000_000, 100_000_000
 ADDRESSES = 16  # of the bus: AB0..AB3
 SOON_S = 0.002
-
-
-def _limit(row: str, name: str) -> float:
-    return requirements().rows[row].limit(name)
 
 
 def _strobe(t: Talk, length_ns: int) -> None:
@@ -30,8 +25,7 @@ def _read(address: int) -> bytes:
     return read(BUS, address + 1)
 
 
-@proves("BUS-CYC-01")
-@dialogue(needs={"can", "pins"}, reset=True)
+@dialogue("BUS-CYC-01", needs={"can", "pins"}, reset=True)
 def an_object_is_a_cycle(t: Talk) -> str:
     """Upload every readable register of 2002h and write one; look at the lines of the bus."""
     told = 0
@@ -64,14 +58,13 @@ def an_object_is_a_cycle(t: Talk) -> str:
     return f"{told} reads and a write, each a strobe with its address and word"
 
 
-@proves("BUS-CYC-02")
-@dialogue(needs={"can", "pins", "exact"}, reset=True)
+@dialogue("BUS-CYC-02", needs={"can", "pins", "exact"}, reset=True)
 def a_strobe_is_as_long_as_it_is_set(t: Talk) -> str:
     """Cycles with 2051h at 0, 200, 1234 ns and 1 ms: CS low."""
     told = []
     t.s.wait_ready()
     address = quiet(t.s)
-    for length_ns in (0, int(_limit("BUS-CYC-05", "strobe_min_ns")), 1234, 1_000_000):
+    for length_ns in (0, int(requirements()["BUS-CYC-05"].limit("strobe_min_ns")), 1234, 1_000_000):
         _strobe(t, length_ns)
         with t.s.take() as take:
             t.upload(BUS, address + 1)
@@ -87,8 +80,7 @@ def a_strobe_is_as_long_as_it_is_set(t: Talk) -> str:
     return "; ".join(told)
 
 
-@proves("BUS-CYC-02", "BUS-CYC-03")
-@dialogue(needs={"can", "stamps"}, reset=True)
+@dialogue("BUS-CYC-02", "BUS-CYC-03", needs={"can", "stamps"}, reset=True)
 def the_answer_waits_for_the_strobe(t: Talk) -> str:
     """A strobe of 10 ms: the time from the answer before to that of the cycle."""
     t.s.wait_ready()
@@ -100,8 +92,7 @@ def the_answer_waits_for_the_strobe(t: Talk) -> str:
     return f"answered {took_s * 1e3:.3f} ms after the strobe was set to {LONG_NS * 1e-6:g} ms"
 
 
-@proves("BUS-CYC-03")
-@dialogue(needs={"can", "pins", "lockstep", "stamps"}, reset=True)
+@dialogue("BUS-CYC-03", needs={"can", "pins", "lockstep", "stamps"}, reset=True)
 def cs_rises_before_the_answer(t: Talk) -> str:
     """A strobe of 1 ms: the rise of CS beside the answer."""
     t.s.wait_ready()
@@ -117,11 +108,9 @@ def cs_rises_before_the_answer(t: Talk) -> str:
     return f"CS rises {answer.t_s * 1e6 - found.rise_ns[0] * 1e-3:.1f} us before the end of the answer"
 
 
-@proves("BUS-CYC-04")
-@dialogue(reset=True)
-def refusals_have_their_codes(t: Talk) -> str:
+@dialogue("BUS-CYC-04", reset=True)
+def refusals_have_their_codes(t: Talk, row: Requirement) -> str:
     """Cycles at no address, writes to what is read-only, reads of what is write-only: code, counter, text."""
-    row = requirements().rows["BUS-CYC-04"]
     of = registers(t.s)
     read_only = next(a for a, access in of.values() if access == "ro")
     write_only = next((a for a, access in of.values() if access == "wo"), None)
@@ -141,22 +130,19 @@ def refusals_have_their_codes(t: Talk) -> str:
     return f"{len(wrong)} kinds of refusal, each with its code, counted and explained"
 
 
-@proves("BUS-CYC-04")
-@dialogue(needs={"can", "lockstep"}, reset=True)
-def a_word_that_does_not_wait_is_refused(t: Talk) -> str:
+@dialogue("BUS-CYC-04", needs={"can", "lockstep"}, reset=True)
+def a_word_that_does_not_wait_is_refused(t: Talk, row: Requirement) -> str:
     """Reset node, and the word at address 0 before there is one; no host but one in lockstep is sure to ask so soon."""
-    row = requirements().rows["BUS-CYC-04"]
     t.s.wait_ready()
     t.reset(Nmt.RESET)
     t.refused(_read(0), row.limit("state_code"), "a word before the first reading")
     return f"refused with {int(row.limit('state_code')):08X}h"
 
 
-@proves("BUS-CYC-05")
-@dialogue(reset=True)
-def a_short_strobe_is_refused(t: Talk) -> str:
+@dialogue("BUS-CYC-05", reset=True)
+def a_short_strobe_is_refused(t: Talk, row: Requirement) -> str:
     """2051h one less than the least, a cycle; the least, a cycle."""
-    least, code = int(_limit("BUS-CYC-05", "strobe_min_ns")), _limit("BUS-CYC-05", "abort_code")
+    least, code = int(row.limit("strobe_min_ns")), row.limit("abort_code")
     t.s.wait_ready()
     done = t.counter(DONE)
     _strobe(t, least - 1)
@@ -168,22 +154,20 @@ def a_short_strobe_is_refused(t: Talk) -> str:
     return f"{least - 1} ns refused, {least} ns taken"
 
 
-@proves("BUS-CYC-05")
-@active(needs={"bus"})
-def a_short_strobe_is_refused_by_the_port(s: Dut) -> str:
+@active("BUS-CYC-05", needs={"bus"})
+def a_short_strobe_is_refused_by_the_port(s: Dut, row: Requirement) -> str:
     """R with a strobe one less than the least, and with the least."""
-    least = int(_limit("BUS-CYC-05", "strobe_min_ns"))
+    least = int(row.limit("strobe_min_ns"))
     answers = say(s, f"R {quiet(s):X} {least - 1}", f"R {quiet(s):X} {least}")
     if not answers[0].startswith("E too-short R") or not answers[1].startswith("R "):
         raise Failed(f"{answers}", "E too-short, then the word")
     return "; ".join(answers)
 
 
-@proves("BUS-CYC-06")
-@dialogue(needs={"can", "bus"}, reset=True)
-def a_second_cycle_is_refused(t: Talk) -> str:
+@dialogue("BUS-CYC-06", needs={"can", "bus"}, reset=True)
+def a_second_cycle_is_refused(t: Talk, row: Requirement) -> str:
     """A long cycle over CAN, another by the bus port meanwhile; then the other way round."""
-    code = int(_limit("BUS-CYC-06", "abort_code"))
+    code = int(row.limit("abort_code"))
     t.s.wait_ready()
     address = quiet(t.s)
     _strobe(t, LONGEST_NS)
@@ -212,8 +196,7 @@ def _while_the_port_is_busy(t: Talk, address: int) -> int | None:
     return t.abort_of(_read(address))
 
 
-@proves("BUS-CYC-07")
-@dialogue(needs={"can", "bus"}, reset=True)
+@dialogue("BUS-CYC-07", needs={"can", "bus"}, reset=True)
 def a_reset_cuts_a_cycle(t: Talk) -> str:
     """NMT 81h in a strobe of 100 ms of the bus port: the answer, and a cycle after it."""
     t.s.wait_ready()
@@ -230,8 +213,7 @@ def a_reset_cuts_a_cycle(t: Talk) -> str:
     return f"{answer}; cycles go on"
 
 
-@proves("BUS-CYC-07")
-@dialogue(needs={"can", "pins"}, reset=True)
+@dialogue("BUS-CYC-07", needs={"can", "pins"}, reset=True)
 def a_cut_cycle_leaves_the_lines_at_rest(t: Talk) -> str:
     """NMT 81h in a strobe of 100 ms: CS."""
     t.s.wait_ready()
@@ -248,8 +230,7 @@ def a_cut_cycle_leaves_the_lines_at_rest(t: Talk) -> str:
     return f"CS rises {(low.rise_ns[-1] - low.fall_ns[-1]) * 1e-6:.3f} ms after its fall"
 
 
-@proves("BUS-CYC-08")
-@dialogue(reset=True)
+@dialogue("BUS-CYC-08", reset=True)
 def other_lengths_are_no_cycle(t: Talk) -> str:
     """1, 3 and 4 bytes to a register that takes a word."""
     row = requirements().rows["BUS-SDO-11"]
@@ -263,8 +244,7 @@ def other_lengths_are_no_cycle(t: Talk) -> str:
     return "1, 3 and 4 bytes are refused, and no cycle runs"
 
 
-@proves("BUS-CYC-09")
-@dialogue(reset=True)
+@dialogue("BUS-CYC-09", reset=True)
 def cycles_are_counted(t: Talk) -> str:
     """Five reads and three writes."""
     t.s.wait_ready()
@@ -280,11 +260,9 @@ def cycles_are_counted(t: Talk) -> str:
     return "8 of 8"
 
 
-@proves("BUS-CYC-10")
-@dialogue(reset=True)
-def a_strobe_that_is_too_long_is_refused(t: Talk) -> str:
+@dialogue("BUS-CYC-10", reset=True)
+def a_strobe_that_is_too_long_is_refused(t: Talk, row: Requirement) -> str:
     """2051h one more than the most, and the most."""
-    row = requirements().rows["BUS-CYC-10"]
     most = int(row.limit("strobe_max_ns"))
     over = write(STROBE_NS, 0, (most + 1).to_bytes(4, "little"))
     t.refused(over, row.limit("abort_code"), f"{most + 1} ns")
@@ -292,11 +270,10 @@ def a_strobe_that_is_too_long_is_refused(t: Talk) -> str:
     return f"{most} ns taken, {most + 1} ns refused"
 
 
-@proves("BUS-CYC-11")
-@dialogue(reset=True)
+@dialogue("BUS-CYC-11", reset=True)
 def who_gives_up_finds_the_bus_busy(t: Talk) -> str:
     """Abort a cycle of 100 ms, ask for another at once, and again until the bus is free."""
-    code = int(_limit("BUS-CYC-06", "abort_code"))
+    code = int(requirements()["BUS-CYC-06"].limit("abort_code"))
     t.s.wait_ready()
     address = quiet(t.s)
     _strobe(t, LONGEST_NS)

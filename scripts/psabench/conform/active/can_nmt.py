@@ -8,18 +8,13 @@ from psabench.boards.board import Setting
 from psabench.boards.objects import BusObjects, Common
 from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Dut
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import Nmt, State, Talk, dialogue, ids, read, segment, write
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed
 
 BEAT_MS, NEW_BEAT_MS = 20, 100
 SETTLE_S = 0.05  # in which a PDO would come, were there one
 REQUESTS = 5
-
-
-def _limit(row: str, name: str) -> int:
-    return int(requirements().rows[row].limit(name))
 
 
 def _is(state: int, due: int, what: str) -> None:
@@ -39,8 +34,7 @@ def _no_pdo(t: Talk, dwell_s: float, what: str) -> None:
         raise Failed(f"{len(came)} PDOs {what}: {ids(came)}", "none", frames=came)
 
 
-@proves("BUS-ID-02")
-@dialogue()
+@dialogue("BUS-ID-02")
 def it_listens_at_the_identifiers_of_its_node(t: Talk) -> str:
     """Send NMT, SYNC and an SDO request where a unit of this node takes them."""
     before = t.counter("SYNCs")
@@ -56,8 +50,7 @@ def it_listens_at_the_identifiers_of_its_node(t: Talk) -> str:
     return f"requests at {t.sdo_rx:03X}h answered, SYNC at {t.sync_id:03X}h counted, NMT at {t.nmt_id:03X}h obeyed"
 
 
-@proves("BUS-ID-03")
-@dialogue()
+@dialogue("BUS-ID-03")
 def requests_to_another_node_stay_unanswered(t: Talk) -> str:
     """Send SDO requests to the identifiers of other nodes, those that differ in one bit among them."""
     before = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
@@ -72,8 +65,7 @@ def requests_to_another_node_stay_unanswered(t: Talk) -> str:
     return f"silence after requests at {', '.join(f'{i:03X}h' for i in others)}"
 
 
-@proves("BUS-ID-04")
-@dialogue(needs={"can", "rtr"})
+@dialogue("BUS-ID-04", needs={"can", "rtr"})
 def remote_frames_stay_unanswered(t: Talk) -> str:
     """Ask for its PDO and its heartbeat by remote frames."""
     asked = [*t.pdos.values(), t.heartbeat]
@@ -85,14 +77,13 @@ def remote_frames_stay_unanswered(t: Talk) -> str:
     return f"no answer to remote frames {', '.join(f'{i:03X}h' for i in asked)}"
 
 
-@proves("BUS-BOOT-01")
-@dialogue(reset=True)
-def boot_up_is_the_first_frame(t: Talk) -> str:
+@dialogue("BUS-BOOT-01", reset=True)
+def boot_up_is_the_first_frame(t: Talk, row: Requirement) -> str:
     """Reset node and reset communication: what comes first."""
     for command in (Nmt.RESET, Nmt.RESET_COMMUNICATION):
         t.fence()
         came = [f for f in t.reset(command) if _mine(t, f.can_id)]
-        boots = [f for f in came if f.can_id == t.heartbeat and f.data == bytes([_limit("BUS-BOOT-01", "state_code")])]
+        boots = [f for f in came if f.can_id == t.heartbeat and f.data == bytes([int(row.limit("state_code"))])]
         if len(boots) != 1 or came[0] is not boots[0]:
             first = f"{came[0].can_id:03X}h" if came else "nothing"
             raise Failed(
@@ -107,9 +98,8 @@ def _mine(t: Talk, can_id: int) -> bool:
     return can_id in {t.heartbeat, t.emcy, t.sdo_tx, *t.pdos.values()}
 
 
-@proves("BUS-BOOT-01")
-@dialogue(needs={"can", "supply"})
-def boot_up_is_the_first_frame_after_power(t: Talk) -> str:
+@dialogue("BUS-BOOT-01", needs={"can", "supply"})
+def boot_up_is_the_first_frame_after_power(t: Talk, row: Requirement) -> str:
     """Switch the supply off and on: what comes first."""
     t.s.bench.supply.output(False)
     t.s.run_for(1.0)
@@ -118,7 +108,7 @@ def boot_up_is_the_first_frame_after_power(t: Talk) -> str:
     t.s.bench.supply.output(True)
     t.until(lambda: any(_mine(t, f.can_id) for f in t.heard[at:]), 5.0)
     first = next((f for f in t.heard[at:] if _mine(t, f.can_id)), None)
-    if first is None or (first.can_id, first.data) != (t.heartbeat, bytes([_limit("BUS-BOOT-01", "state_code")])):
+    if first is None or (first.can_id, first.data) != (t.heartbeat, bytes([int(row.limit("state_code"))])):
         raise Failed(
             f"{ids([first]) if first else 'nothing'} after power-on", "the boot-up message", frames=t.heard[at:]
         )
@@ -129,23 +119,20 @@ def boot_up_is_the_first_frame_after_power(t: Talk) -> str:
     return "one boot-up message, before anything else"
 
 
-@proves("BUS-BOOT-02")
-@dialogue(reset=True)
-def it_waits_pre_operational(t: Talk) -> str:
+@dialogue("BUS-BOOT-02", reset=True)
+def it_waits_pre_operational(t: Talk, row: Requirement) -> str:
     """After a reset look at its heartbeat, and for PDOs, until it is set up and longer."""
     t.reset()
     t.beat(BEAT_MS)
-    _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "after boot-up")
+    _is(t.state(), int(row.limit("state_code")), "after boot-up")
     _no_pdo(t, 0.3, "before NMT start")
-    _is(t.state(), _limit("BUS-BOOT-02", "state_code"), "0.3 s later")
+    _is(t.state(), int(row.limit("state_code")), "0.3 s later")
     return "pre-operational, no PDO in 0.3 s"
 
 
-@proves("BUS-NMT-01")
-@dialogue(needs={"can", "stream"}, reset=True)
-def start_makes_it_operational(t: Talk) -> str:
+@dialogue("BUS-NMT-01", needs={"can", "stream"}, reset=True)
+def start_makes_it_operational(t: Talk, row: Requirement) -> str:
     """NMT start: the heartbeat and the PDOs."""
-    row = requirements().rows["BUS-NMT-01"]
     t.beat(BEAT_MS)
     t.nmt(int(row.limit("command_code")))
     _obeyed(t, int(row.limit("state_code")), "after NMT start")
@@ -153,11 +140,9 @@ def start_makes_it_operational(t: Talk) -> str:
     return f"operational, PDOs {', '.join(f'{i:03X}h' for i in counts)}"
 
 
-@proves("BUS-NMT-02")
-@dialogue(reset=True)
-def stop_stops_it(t: Talk) -> str:
+@dialogue("BUS-NMT-02", reset=True)
+def stop_stops_it(t: Talk, row: Requirement) -> str:
     """NMT stop: the heartbeat."""
-    row = requirements().rows["BUS-NMT-02"]
     t.beat(BEAT_MS)
     t.nmt(Nmt.START)
     _obeyed(t, State.OPERATIONAL, "after NMT start")
@@ -166,11 +151,9 @@ def stop_stops_it(t: Talk) -> str:
     return "stopped"
 
 
-@proves("BUS-NMT-03")
-@dialogue(needs={"can", "stream"}, reset=True)
-def pre_operational_ends_its_pdos(t: Talk) -> str:
+@dialogue("BUS-NMT-03", needs={"can", "stream"}, reset=True)
+def pre_operational_ends_its_pdos(t: Talk, row: Requirement) -> str:
     """NMT start, PDOs, NMT 80h: no PDO after it was obeyed."""
-    row = requirements().rows["BUS-NMT-03"]
     t.beat(BEAT_MS)
     t.s.wait_ready()
     t.stream()
@@ -200,13 +183,12 @@ def _own_settings(s: Dut) -> dict[tuple[int, int], bytes]:
     return {(own.index, own.sub): own.value} if own else {}
 
 
-@proves("BUS-NMT-04")
-@dialogue(reset=True)
-def reset_node_restores_the_defaults(t: Talk) -> str:
+@dialogue("BUS-NMT-04", reset=True)
+def reset_node_restores_the_defaults(t: Talk, row: Requirement) -> str:
     """Write settings, NMT 81h, read them again; count readings before and after."""
     settings = _settings(t) | _own_settings(t.s)
     _write(t, settings)
-    t.reset(_limit("BUS-NMT-04", "command_code"))
+    t.reset(int(row.limit("command_code")))
     _are_defaults(t, settings, "NMT 81h")
     _is(t.state(), State.PRE_OPERATIONAL, "after NMT 81h")
     return f"{len(settings)} settings have their defaults again"
@@ -231,15 +213,14 @@ def _are_defaults(t: Talk, settings: Settings, what: str) -> None:
             raise Failed(f"{at[0]:04X}h:{at[1]} is {t.number(*at)} after {what}", f"{due}")
 
 
-@proves("BUS-NMT-05")
-@dialogue(reset=True)
-def reset_communication_leaves_the_board_alone(t: Talk) -> str:
+@dialogue("BUS-NMT-05", reset=True)
+def reset_communication_leaves_the_board_alone(t: Talk, row: Requirement) -> str:
     """Write settings of communication and of the board, NMT 82h, read both again; readings go on being counted."""
     t.s.wait_ready()
     own = _own_settings(t.s)
     _write(t, _settings(t) | own)
     count = t.number(Common.COUNTERS, 1)
-    t.reset(_limit("BUS-NMT-05", "command_code"))
+    t.reset(int(row.limit("command_code")))
     _are_defaults(t, _settings(t), "NMT 82h")
     for (index, sub), written in own.items():
         if t.upload(index, sub) != written:
@@ -250,8 +231,7 @@ def reset_communication_leaves_the_board_alone(t: Talk) -> str:
     return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
 
 
-@proves("BUS-NMT-06")
-@dialogue(reset=True)
+@dialogue("BUS-NMT-06", reset=True)
 def node_0_is_everybody(t: Talk) -> str:
     """NMT commands to node 0 and to another node."""
     t.beat(BEAT_MS)
@@ -270,8 +250,7 @@ def node_0_is_everybody(t: Talk) -> str:
     return f"obeys node 0 and itself, not node {other}"
 
 
-@proves("BUS-NMT-07")
-@dialogue(reset=True)
+@dialogue("BUS-NMT-07", reset=True)
 def unknown_commands_change_nothing(t: Talk) -> str:
     """NMT commands 00h, 03h, 7Fh and FFh, operational and pre-operational."""
     commands = (0x00, 0x03, 0x7F, 0xFF)
@@ -286,8 +265,7 @@ def unknown_commands_change_nothing(t: Talk) -> str:
     return "the state stays through each of them"
 
 
-@proves("BUS-NMT-08")
-@dialogue(reset=True)
+@dialogue("BUS-NMT-08", reset=True)
 def stopped_it_only_beats(t: Talk) -> str:
     """Stopped: SDO requests, SYNCs; then what it says, and what it counted."""
     t.s.wait_ready()
@@ -315,11 +293,10 @@ def stopped_it_only_beats(t: Talk) -> str:
     return "heartbeats alone; no SYNC counted"
 
 
-@proves("BUS-NMT-09")
-@dialogue(reset=True)
-def a_stop_ends_a_transfer(t: Talk) -> str:
+@dialogue("BUS-NMT-09", reset=True)
+def a_stop_ends_a_transfer(t: Talk, row: Requirement) -> str:
     """Begin a segmented upload, stop, go pre-operational, ask for the next segment."""
-    code = _limit("BUS-NMT-09", "abort_code")
+    code = int(row.limit("abort_code"))
     t.ask(read(Common.DEVICE_NAME))
     t.nmt(Nmt.STOP)
     t.nmt(Nmt.PREOP)
@@ -330,8 +307,7 @@ def a_stop_ends_a_transfer(t: Talk) -> str:
     return f"abort {code:08X}h"
 
 
-@proves("BUS-NMT-10")
-@dialogue()
+@dialogue("BUS-NMT-10")
 def requests_are_answered_in_both_states(t: Talk) -> str:
     """Upload 1000h pre-operational and operational."""
     for nmt in (Nmt.PREOP, Nmt.START):
@@ -342,11 +318,9 @@ def requests_are_answered_in_both_states(t: Talk) -> str:
     return f"{REQUESTS} answers in each state"
 
 
-@proves("BUS-HB-02")
-@dialogue(reset=True)
-def no_heartbeat_where_the_period_is_0(t: Talk) -> str:
+@dialogue("BUS-HB-02", reset=True)
+def no_heartbeat_where_the_period_is_0(t: Talk, row: Requirement) -> str:
     """1017h = 0, then look for heartbeats."""
-    row = requirements().rows["BUS-HB-02"]
     t.beat(0)
     came = [f for f in t.during(row.limit("quiet_s")) if f.can_id == t.heartbeat]
     if came:
@@ -354,11 +328,10 @@ def no_heartbeat_where_the_period_is_0(t: Talk) -> str:
     return f"none in {row.limit('quiet_s'):g} s"
 
 
-@proves("BUS-HB-03")
-@dialogue(needs={"can", "stamps"}, reset=True)
-def a_new_period_holds_at_once(t: Talk) -> str:
+@dialogue("BUS-HB-03", needs={"can", "stamps"}, reset=True)
+def a_new_period_holds_at_once(t: Talk, row: Requirement) -> str:
     """Write 100 ms to 1017h and take the time of the next heartbeats."""
-    late_s = requirements().rows["BUS-HB-03"].limit("jitter_max_ms") * 1e-3
+    late_s = row.limit("jitter_max_ms") * 1e-3
     period_s = NEW_BEAT_MS * 1e-3
     written = t.answer_to(write(Common.HEARTBEAT_MS, 0, NEW_BEAT_MS.to_bytes(2, "little")))
     beats = [t.next(t.heartbeat), t.next(t.heartbeat)]

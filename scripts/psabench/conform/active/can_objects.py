@@ -7,9 +7,8 @@ from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import LEAST, Nmt, Talk, dialogue, read, talk, words
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.canopen_host import Described
 from psabench.link.protocol_files import message
@@ -44,8 +43,7 @@ def _common(o: Described) -> bool:
     )
 
 
-@proves("BUS-OD-01")
-@dialogue(reset=True)
+@dialogue("BUS-OD-01", reset=True)
 def the_common_objects_are_there(t: Talk) -> str:
     """After a reset upload every communication object: its length, its default."""
     seen = 0
@@ -71,19 +69,17 @@ def _due(o: Described) -> bytes | None:
     return int(o.default).to_bytes(o.data_bytes, "little")
 
 
-@proves("BUS-OD-02")
-@dialogue()
-def device_type(t: Talk) -> str:
+@dialogue("BUS-OD-02")
+def device_type(t: Talk, row: Requirement) -> str:
     """Upload 1000h."""
-    due = int(requirements().rows["BUS-OD-02"].limit("device_type"))
+    due = int(row.limit("device_type"))
     found = t.upload(Common.DEVICE_TYPE)
     if found != due.to_bytes(4, "little"):
         raise Failed(words(found), f"{due:X}h in 4 bytes")
     return f"{due:X}h"
 
 
-@proves("BUS-OD-03")
-@dialogue(reset=True)
+@dialogue("BUS-OD-03", reset=True)
 def serial_number(t: Talk) -> str:
     """Upload 1018h sub 4 before and after a reset."""
     before = t.upload(Common.IDENTITY, SERIAL)
@@ -94,8 +90,7 @@ def serial_number(t: Talk) -> str:
     return f"serial number {int.from_bytes(before, 'little')}"
 
 
-@proves("BUS-OD-04")
-@dialogue(needs={"can", "stream"}, reset=True)
+@dialogue("BUS-OD-04", needs={"can", "stream"}, reset=True)
 def constants_name_the_node(t: Talk) -> str:
     """Upload the objects that name an identifier, and see that it is the one in use."""
     t.reset()
@@ -115,8 +110,7 @@ def constants_name_the_node(t: Talk) -> str:
     return f"{len(due)} objects name the identifiers of node {t.s.node}"
 
 
-@proves("BUS-OD-05")
-@dialogue(reset=True)
+@dialogue("BUS-OD-05", reset=True)
 def the_remark_outlives_a_reset(t: Talk) -> str:
     """Write 2040h, NMT 81h, read it."""
     put(t, Common.REMARK, b"kept over Res")
@@ -128,8 +122,7 @@ def the_remark_outlives_a_reset(t: Talk) -> str:
     return "kept"
 
 
-@proves("BUS-OD-05")
-@dialogue(needs={"can", "supply"})
+@dialogue("BUS-OD-05", needs={"can", "supply"})
 def the_remark_goes_with_the_power(t: Talk) -> str:
     """Write 2040h, switch the supply off and on, read it."""
     put(t, Common.REMARK, b"gone with the power")
@@ -151,8 +144,7 @@ def power_cycle(t: Talk) -> None:
         raise Inconclusive("no boot-up message within 5 s of power-on")
 
 
-@proves("BUS-OD-06")
-@dialogue(reset=True)
+@dialogue("BUS-OD-06", reset=True)
 def mappings_lay_out_the_messages(t: Talk) -> str:
     """Upload each mapping and lay it beside the DBC; try to write it."""
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
@@ -191,8 +183,7 @@ def _bounds(name: str, entries: list[int]) -> None:
         at += entry & 0xFF
 
 
-@proves("BUS-OD-07", "BUS-ID-07")
-@dialogue(needs={"can", "stream"}, reset=True)
+@dialogue("BUS-OD-07", "BUS-ID-07", needs={"can", "stream"}, reset=True)
 def mapped_objects_read_as_the_frames(t: Talk) -> str:
     """While PDOs come upload all that they map; find each value in a frame that came just before or after."""
     compared = 0
@@ -230,8 +221,7 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
         )
 
 
-@proves("BUS-CNT-01")
-@dialogue(reset=True)
+@dialogue("BUS-CNT-01", reset=True)
 def counters_outlive_a_reset(t: Talk) -> str:
     """Refusals and SYNCs, NMT 81h, the counters again; the readings, which go on, are not less."""
     names = ("Requests refused", "Malformed requests", "SYNCs")
@@ -250,33 +240,29 @@ def counters_outlive_a_reset(t: Talk) -> str:
     return f"{', '.join(names)}: {before}, after NMT 81h {after}"
 
 
-@proves("BUS-ERR-02")
-@dialogue()
-def errors_on_the_wire_read_0(t: Talk) -> str:
+@dialogue("BUS-ERR-02")
+def errors_on_the_wire_read_0(t: Talk, row: Requirement) -> str:
     """Upload the error counters of the CAN controller."""
-    due = int(requirements().rows["BUS-ERR-02"].limit("count"))
+    due = int(row.limit("count"))
     found = {name: t.counter(name) for name in ERRORS_OF_CAN}
     if any(v != due for v in found.values()):
         raise Failed(f"{found}", f"{due}")
     return f"{', '.join(found)} are {due}"
 
 
-@proves("BUS-ERR-01")
-@dialogue(needs={"can", "errors"})
-def errors_on_the_wire_are_counted(t: Talk) -> str:
+@dialogue("BUS-ERR-01", needs={"can", "errors"})
+def errors_on_the_wire_are_counted(t: Talk, row: Requirement) -> str:
     """Upload the error counters of the CAN controller while frames are destroyed."""
-    most = int(requirements().rows["BUS-ERR-01"].limit("count_max"))
+    most = int(row.limit("count_max"))
     found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
     if not any(found.values()) or max(found.values()) > most:
         raise Failed(f"{found}", f"1 to {most} in one of them")
     return f"{found}"
 
 
-@proves("BUS-LOAD-01")
-@active(needs={"can", "stamps", "lockstep", "stream"})
-def the_load_is_the_share_of_the_bus(s: Dut) -> str:
+@active("BUS-LOAD-01", needs={"can", "stamps", "lockstep", "stream"})
+def the_load_is_the_share_of_the_bus(s: Dut, row: Requirement) -> str:
     """Stream for a second between two reads of the load, and count the bits of all frames meanwhile."""
-    row = requirements().rows["BUS-LOAD-01"]
     with s.take(lines=False) as take, talk(s, reset=True, take=take) as t:
         s.wait_ready()
         t.stream(1)
@@ -293,11 +279,9 @@ def the_load_is_the_share_of_the_bus(s: Dut) -> str:
     return f"{found:.1f} %, {due:.2f} % by the bits of {len(frames)} frames"
 
 
-@proves("BUS-ID-08")
-@dialogue(needs={"can", "stamps", "exact"}, reset=True)
-def an_answer_waits_for_the_interframe_space(t: Talk) -> str:
+@dialogue("BUS-ID-08", needs={"can", "stamps", "exact"}, reset=True)
+def an_answer_waits_for_the_interframe_space(t: Talk, row: Requirement) -> str:
     """Take the time from a request on a quiet bus to the end of its answer, and take off the bits of both."""
-    row = requirements().rows["BUS-ID-08"]
     bit_s, least = 1.0 / row.limit("bit_hz"), row.limit("interframe_bits")
     found: list[float] = []
     t.beat(0)

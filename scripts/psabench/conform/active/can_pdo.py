@@ -11,9 +11,8 @@ from psabench.boards.objects import Common
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 
 READINGS, TIMEOUT_S = 1, 5.0  # sub-index of 2030h
@@ -24,10 +23,6 @@ EVENT, SYNC_NEW = 254, 0
 INHIBIT_S = 0.05
 HISTORY, OVERLOADS = Common.ERROR_HISTORY, 9
 FLOOD_S, CALM_S = 0.3, 1.3
-
-
-def _limit(row: str, name: str) -> float:
-    return requirements().rows[row].limit(name)
 
 
 def _first(t: Talk) -> tuple[int, int]:
@@ -64,8 +59,7 @@ def _begin(t: Talk, kind: int) -> tuple[int, int]:
     return index, can_id
 
 
-@proves("BUS-SYNC-01")
-@dialogue()
+@dialogue("BUS-SYNC-01")
 def syncs_are_counted(t: Talk) -> str:
     """SYNCs without a byte and with a counter of 0, 7 and 255; one of two bytes."""
     before = t.counter("SYNCs")
@@ -77,8 +71,7 @@ def syncs_are_counted(t: Talk) -> str:
     return "4 of 4 counted, whatever their counter"
 
 
-@proves("BUS-SYNC-02")
-@active(needs={"can", "stream"})
+@active("BUS-SYNC-02", needs={"can", "stream"})
 def event_types_send_each_reading(s: Dut) -> str:
     """Transmission types 254 and 255: frames and readings of the same while."""
     told = []
@@ -95,8 +88,7 @@ def event_types_send_each_reading(s: Dut) -> str:
     return "; ".join(told)
 
 
-@proves("BUS-SYNC-03")
-@dialogue(needs={"can", "stream"}, reset=True)
+@dialogue("BUS-SYNC-03", needs={"can", "stream"}, reset=True)
 def type_0_sends_new_readings_at_sync(t: Talk) -> str:
     """Transmission type 0: no SYNC; one SYNC after a reading; a burst of SYNCs."""
     _, can_id = _begin(t, SYNC_NEW)
@@ -127,8 +119,7 @@ def _silent(t: Talk, can_id: int) -> None:
         raise Failed(f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
 
 
-@proves("BUS-SYNC-04")
-@dialogue(needs={"can", "stream"}, reset=True)
+@dialogue("BUS-SYNC-04", needs={"can", "stream"}, reset=True)
 def type_n_sends_at_every_nth_sync(t: Talk) -> str:
     """Transmission types 1, 3 and 240: frames at 6, 9 and 480 SYNCs."""
     told = []
@@ -145,11 +136,9 @@ def type_n_sends_at_every_nth_sync(t: Talk) -> str:
     return "; ".join(told)
 
 
-@proves("BUS-SYNC-05")
-@dialogue()
-def reserved_types_are_refused(t: Talk) -> str:
+@dialogue("BUS-SYNC-05")
+def reserved_types_are_refused(t: Talk, row: Requirement) -> str:
     """Write the transmission types 241 to 253."""
-    row = requirements().rows["BUS-SYNC-05"]
     low, high = int(row.limit("type_min")), int(row.limit("type_max"))
     index, _ = _first(t)
     for kind in range(low, high + 1):
@@ -157,11 +146,10 @@ def reserved_types_are_refused(t: Talk) -> str:
     return f"{low} to {high} are refused"
 
 
-@proves("BUS-PDO-01")
-@dialogue(needs={"can", "stream"}, reset=True)
-def a_tpdo_that_is_off_is_not_sent(t: Talk) -> str:
+@dialogue("BUS-PDO-01", needs={"can", "stream"}, reset=True)
+def a_tpdo_that_is_off_is_not_sent(t: Talk, row: Requirement) -> str:
     """Set bit 31 of 18xxh sub 1 while readings are made, and clear it."""
-    off = int(_limit("BUS-PDO-01", "off_mask"))
+    off = int(row.limit("off_mask"))
     index, can_id = _begin(t, EVENT)
     t.readings(1, can_id)
     cob = t.number(index, 1)
@@ -173,11 +161,10 @@ def a_tpdo_that_is_off_is_not_sent(t: Talk) -> str:
     return f"{can_id:03X}h: none with bit 31, and again without"
 
 
-@proves("BUS-PDO-02")
-@dialogue(needs={"can", "stream"}, reset=True)
-def the_identifier_of_a_tpdo(t: Talk) -> str:
+@dialogue("BUS-PDO-02", needs={"can", "stream"}, reset=True)
+def the_identifier_of_a_tpdo(t: Talk, row: Requirement) -> str:
     """Another identifier while it is valid; services, more than 11 bits, RTR; another one while it is off."""
-    code = _limit("BUS-PDO-02", "abort_code")
+    code = row.limit("abort_code")
     index, can_id = _begin(t, EVENT)
     cob = t.number(index, 1) & ~0x7FF
     t.refused(write(index, 1, (cob | FREE_ID).to_bytes(4, "little")), code, f"{FREE_ID:03X}h while valid")
@@ -198,11 +185,9 @@ def the_identifier_of_a_tpdo(t: Talk) -> str:
     return f"{can_id:03X}h became {FREE_ID:03X}h; services are refused, and any while it is valid"
 
 
-@proves("BUS-PDO-03")
-@dialogue(needs={"can", "stamps", "stream"}, reset=True)
-def the_inhibit_time_keeps_tpdos_apart(t: Talk) -> str:
+@dialogue("BUS-PDO-03", needs={"can", "stamps", "stream"}, reset=True)
+def the_inhibit_time_keeps_tpdos_apart(t: Talk, row: Requirement) -> str:
     """An inhibit time of 50 ms: the time between frames, and the count of those left out."""
-    row = requirements().rows["BUS-PDO-03"]
     unit_s, late_s = row.limit("unit_us") * 1e-6, row.limit("jitter_max_ms") * 1e-3
     index, can_id = _begin(t, EVENT)
     t.download(index, 3, round(INHIBIT_S / unit_s).to_bytes(2, "little"))
@@ -223,8 +208,7 @@ def the_inhibit_time_keeps_tpdos_apart(t: Talk) -> str:
     return f"{min(apart_s):.6f} s and more apart; of {most} readings {left_out} left out"
 
 
-@proves("BUS-EMCY-04")
-@dialogue(needs={"can", "stream"}, reset=True)
+@dialogue("BUS-EMCY-04", needs={"can", "stream"}, reset=True)
 def the_history_of_errors(t: Talk) -> str:
     """An overload; 1003h beside the emergency; empty it."""
     told = _overload(t)
@@ -238,11 +222,10 @@ def the_history_of_errors(t: Talk) -> str:
     return f"{count}, the latest {words(latest)}; none after the write"
 
 
-@proves("BUS-EMCY-04")
-@dialogue(needs={"can", "lockstep", "stream"}, reset=True)
-def the_history_holds_eight(t: Talk) -> str:
+@dialogue("BUS-EMCY-04", needs={"can", "lockstep", "stream"}, reset=True)
+def the_history_holds_eight(t: Talk, row: Requirement) -> str:
     """Nine overloads, one after the other."""
-    most = int(_limit("BUS-EMCY-04", "history_count"))
+    most = int(row.limit("history_count"))
     for k in range(OVERLOADS):
         _overload(t)
         if t.number(HISTORY) != min(k + 1, most):
@@ -255,7 +238,7 @@ def the_history_holds_eight(t: Talk) -> str:
 
 def _overload(t: Talk) -> CanFrame:
     """Samples lost, and the calm after it. Raises Inconclusive where the bus could not be filled."""
-    code = int(_limit("BUS-EMCY-06", "emcy_code"))
+    code = int(requirements()["BUS-EMCY-06"].limit("emcy_code"))
     t.s.wait_ready()
     t.nmt(Nmt.START)
     t.fence()

@@ -6,9 +6,8 @@ import random
 import struct
 
 from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
-from psabench.conform.proves import proves
 from psabench.conform.raw_can import ABORT, FINE, UPLOAD, Talk, dialogue, long_write, read, segment, words, write
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed
 from psabench.link.canopen_host import Described
 
@@ -31,8 +30,7 @@ def put(t: Talk, index: int, text: bytes) -> None:
         toggle ^= 0x10
 
 
-@proves("BUS-SDO-01")
-@dialogue()
+@dialogue("BUS-SDO-01")
 def short_values_come_expedited(t: Talk) -> str:
     """Upload an object of each length of 1 to 4 bytes."""
     seen = {}
@@ -51,11 +49,10 @@ def short_values_come_expedited(t: Talk) -> str:
     return ", ".join(f"{index:04X}h: {size} bytes" for size, index in sorted(seen.items()))
 
 
-@proves("BUS-SDO-02")
-@dialogue()
-def a_write_is_confirmed(t: Talk) -> str:
+@dialogue("BUS-SDO-02")
+def a_write_is_confirmed(t: Talk, row: Requirement) -> str:
     """Write 1017h."""
-    code = int(requirements()["BUS-SDO-02"].limit("answer_code"))
+    code = int(row.limit("answer_code"))
     request = write(Common.HEARTBEAT_MS, 0, t.upload(Common.HEARTBEAT_MS)[:2].ljust(2, b"\0"))
     answer = t.ask(request)
     due = bytes([code]) + request[1:4]
@@ -64,11 +61,10 @@ def a_write_is_confirmed(t: Talk) -> str:
     return words(answer)
 
 
-@proves("BUS-SDO-03")
-@dialogue()
-def long_values_come_in_segments(t: Talk) -> str:
+@dialogue("BUS-SDO-03")
+def long_values_come_in_segments(t: Talk, row: Requirement) -> str:
     """Upload 1008h, and a remark of 64 characters, segment by segment."""
-    most = int(requirements()["BUS-SDO-03"].limit("segment_bytes"))
+    most = int(row.limit("segment_bytes"))
     text = bytes(range(0x30, 0x30 + 64))
     put(t, Common.REMARK, text)
     for index, due in ((Common.DEVICE_NAME, t.s.unit.title.encode()), (Common.REMARK, text)):
@@ -93,11 +89,10 @@ def _take_segments(t: Talk, due: bytes, most: int) -> None:
         toggle ^= 0x10
 
 
-@proves("BUS-SDO-04")
-@dialogue()
-def strings_go_down_and_up(t: Talk) -> str:
+@dialogue("BUS-SDO-04")
+def strings_go_down_and_up(t: Talk, row: Requirement) -> str:
     """Write remarks of several lengths and read them back."""
-    longest = int(requirements()["BUS-SDO-04"].limit("remark_chars"))
+    longest = int(row.limit("remark_chars"))
     sizes = (1, 7, 8, longest - 1, longest)
     for n in sizes:
         text = bytes(0x21 + (n + 3 * k) % 90 for k in range(n))
@@ -108,11 +103,10 @@ def strings_go_down_and_up(t: Talk) -> str:
     return f"{', '.join(map(str, sizes))} characters"
 
 
-@proves("BUS-SDO-05")
-@dialogue()
-def a_wrong_toggle_bit_is_refused(t: Talk) -> str:
+@dialogue("BUS-SDO-05")
+def a_wrong_toggle_bit_is_refused(t: Talk, row: Requirement) -> str:
     """Begin with toggle 1; take a segment, and ask for it again; the same of a download."""
-    code = requirements()["BUS-SDO-05"].limit("abort_code")
+    code = row.limit("abort_code")
     begin = read(Common.REMARK)
     put(t, Common.REMARK, b"0123456789")
     for toggles in ((0x10,), (0, 0)):
@@ -134,11 +128,9 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
         raise Failed(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
 
 
-@proves("BUS-SDO-06")
-@dialogue(needs={"can", "stamps"})
-def a_silent_client_is_given_up(t: Talk) -> str:
+@dialogue("BUS-SDO-06", needs={"can", "stamps"})
+def a_silent_client_is_given_up(t: Talk, row: Requirement) -> str:
     """Begin an upload and a download in segments and ask nothing more."""
-    row = requirements()["BUS-SDO-06"]
     due_s, late_s = row.limit("timeout_s"), row.limit("jitter_max_ms") * 1e-3
     waited = []
     put(t, Common.REMARK, b"0123456789")
@@ -157,11 +149,10 @@ def a_silent_client_is_given_up(t: Talk) -> str:
     return f"given up after {', '.join(f'{w:.6f}' for w in waited)} s"
 
 
-@proves("BUS-SDO-07")
-@dialogue()
-def unknown_commands_are_refused(t: Talk) -> str:
+@dialogue("BUS-SDO-07")
+def unknown_commands_are_refused(t: Talk, row: Requirement) -> str:
     """Block transfers, a command that no one has defined, a segment of no transfer."""
-    code = requirements()["BUS-SDO-07"].limit("abort_code")
+    code = row.limit("abort_code")
     commands = (0xA0, 0xC0, 0xE0, 0x60, 0x00)
     for command in commands:
         t.upload(Common.DEVICE_TYPE)  # nothing is under way
@@ -175,11 +166,10 @@ def unknown_commands_are_refused(t: Talk) -> str:
     return f"abort {int(code):08X}h to {', '.join(f'{c:02X}h' for c in commands)}"
 
 
-@proves("BUS-SDO-08")
-@dialogue()
-def no_such_object(t: Talk) -> str:
+@dialogue("BUS-SDO-08")
+def no_such_object(t: Talk, row: Requirement) -> str:
     """Upload and write objects that there are not."""
-    code = requirements()["BUS-SDO-08"].limit("abort_code")
+    code = row.limit("abort_code")
     known = {o.index for o in t.s.unit.node.objects()}
     strangers = [
         i
@@ -192,11 +182,10 @@ def no_such_object(t: Talk) -> str:
     return f"abort {int(code):08X}h for {', '.join(f'{i:04X}h' for i in strangers)}"
 
 
-@proves("BUS-SDO-09")
-@dialogue()
-def no_such_sub_index(t: Talk) -> str:
+@dialogue("BUS-SDO-09")
+def no_such_sub_index(t: Talk, row: Requirement) -> str:
     """Upload sub-indices that objects have not: one more than the last, FFh, 1 of a variable."""
-    code = requirements()["BUS-SDO-09"].limit("abort_code")
+    code = row.limit("abort_code")
     asked = [
         (Common.IDENTITY, 5),
         (Common.IDENTITY, 0xFF),
@@ -211,11 +200,9 @@ def no_such_sub_index(t: Talk) -> str:
     return f"abort {int(code):08X}h for {len(asked)} sub-indices"
 
 
-@proves("BUS-SDO-10")
-@dialogue()
-def rights_are_kept(t: Talk) -> str:
+@dialogue("BUS-SDO-10")
+def rights_are_kept(t: Talk, row: Requirement) -> str:
     """Write everything that is read-only or constant, read everything that is write-only."""
-    row = requirements()["BUS-SDO-10"]
     locked = [o for o in t.s.unit.node.objects() if o.access in ("const", "ro") and o.index not in REGISTERS]
     hidden = [o for o in t.s.unit.node.objects() if o.access == "wo" and o.index not in REGISTERS]
     for o in locked:
@@ -235,11 +222,9 @@ REGISTERS = (
 )  # of chips and buses: their own rows
 
 
-@proves("BUS-SDO-11")
-@dialogue()
-def the_wrong_length_is_refused(t: Talk) -> str:
+@dialogue("BUS-SDO-11")
+def the_wrong_length_is_refused(t: Talk, row: Requirement) -> str:
     """Write 4, 3 and 1 bytes to 1017h, and 4 to 1800h sub 2."""
-    row = requirements()["BUS-SDO-11"]
     before = t.upload(Common.HEARTBEAT_MS)
     for index, sub, n, code in (
         (Common.HEARTBEAT_MS, 0, 4, "long_code"),
@@ -254,11 +239,10 @@ def the_wrong_length_is_refused(t: Talk) -> str:
     return "too long and too short are distinguished"
 
 
-@proves("BUS-SDO-12")
-@dialogue()
-def other_than_announced_is_refused(t: Talk) -> str:
+@dialogue("BUS-SDO-12")
+def other_than_announced_is_refused(t: Talk, row: Requirement) -> str:
     """Announce 10 bytes for 2040h and send 8, and announce 8 and send 10."""
-    code = requirements()["BUS-SDO-12"].limit("abort_code")
+    code = row.limit("abort_code")
     put(t, Common.REMARK, b"kept")
     for announced, sent in ((10, 8), (8, 10)):
         t.ask(long_write(Common.REMARK, 0, announced))
@@ -270,11 +254,10 @@ def other_than_announced_is_refused(t: Talk) -> str:
     return f"abort {int(code):08X}h"
 
 
-@proves("BUS-SDO-13")
-@dialogue()
-def limits_are_kept(t: Talk) -> str:
+@dialogue("BUS-SDO-13")
+def limits_are_kept(t: Talk, row: Requirement) -> str:
     """Write to each object with limits one less than the lowest and one more than the highest."""
-    code = requirements()["BUS-SDO-13"].limit("abort_code")
+    code = row.limit("abort_code")
     tried = 0
     for o in t.s.unit.node.objects():
         for beyond in (o.low - 1 if o.low is not None else None, o.high + 1 if o.high is not None else None):
@@ -293,11 +276,10 @@ def _fits(value: float, o: Described) -> bool:
     return o.data_bytes in (1, 2, 4) and (o.real or 0 <= value < 1 << 8 * o.data_bytes)
 
 
-@proves("BUS-SDO-14")
-@dialogue()
-def requests_of_the_wrong_length_are_counted(t: Talk) -> str:
+@dialogue("BUS-SDO-14")
+def requests_of_the_wrong_length_are_counted(t: Talk, row: Requirement) -> str:
     """Requests of 0 to 7 bytes."""
-    size = int(requirements()["BUS-SDO-14"].limit("request_bytes"))
+    size = int(row.limit("request_bytes"))
     before = t.counter("Malformed requests")
     came = [
         f for f in t.after(*((t.sdo_rx, read(Common.DEVICE_TYPE)[:n]) for n in range(size))) if f.can_id == t.sdo_tx
@@ -308,8 +290,7 @@ def requests_of_the_wrong_length_are_counted(t: Talk) -> str:
     return f"{size} requests, no answer, all counted"
 
 
-@proves("BUS-SDO-15")
-@dialogue()
+@dialogue("BUS-SDO-15")
 def each_request_has_one_answer(t: Talk) -> str:
     """A hundred requests of several kinds, good and bad, one after the other and all at once."""
     kinds = [
@@ -332,8 +313,7 @@ def each_request_has_one_answer(t: Talk) -> str:
     return f"{HUNDRED} requests, {HUNDRED} answers in their order"
 
 
-@proves("BUS-SDO-16")
-@dialogue()
+@dialogue("BUS-SDO-16")
 def a_refusal_changes_nothing(t: Talk) -> str:
     """Refused writes to 1017h and 1800h: their values before and after."""
     for index, sub, data in (
@@ -351,8 +331,7 @@ def a_refusal_changes_nothing(t: Talk) -> str:
     return "values stay, and the next request is served"
 
 
-@proves("BUS-SDO-17")
-@dialogue()
+@dialogue("BUS-SDO-17")
 def refusals_are_counted(t: Talk) -> str:
     """Refusals of each kind, and the counter before and after."""
     bad = [
@@ -375,8 +354,7 @@ def refusals_are_counted(t: Talk) -> str:
     return f"{len(bad)} refusals, {len(bad)} counted"
 
 
-@proves("BUS-SDO-18")
-@dialogue()
+@dialogue("BUS-SDO-18")
 def an_abort_of_the_client_ends_it(t: Talk) -> str:
     """Abort an upload of a long value, then ask for its next segment."""
     put(t, Common.REMARK, b"0123456789")
@@ -392,11 +370,10 @@ def an_abort_of_the_client_ends_it(t: Talk) -> str:
     return "silence; the next segment is refused"
 
 
-@proves("BUS-SDO-19")
-@dialogue(reset=True)
-def garbage_does_not_stop_it(t: Talk) -> str:
+@dialogue("BUS-SDO-19", reset=True)
+def garbage_does_not_stop_it(t: Talk, row: Requirement) -> str:
     """A thousand random requests, then good ones."""
-    count = int(requirements()["BUS-SDO-19"].limit("frames_count"))
+    count = int(row.limit("frames_count"))
     rng = random.Random(SEED)
     for _ in range(count // 50):
         t.drain()

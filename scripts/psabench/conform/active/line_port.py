@@ -10,8 +10,7 @@ from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.probes import PortProbe
-from psabench.conform.proves import proves
-from psabench.conform.requirements import requirements
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.sources.samples import line_log
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.lineport import SAMPLE_HZ, open_line
@@ -36,11 +35,10 @@ def _look(s: Dut, dwell_s: float) -> bytes:
     return _port(s).data
 
 
-@proves("LINE-GAP-01")
-@active(needs={"port"})
-def lost_samples_are_marked(s: Dut) -> str:
+@active("LINE-GAP-01", needs={"port"})
+def lost_samples_are_marked(s: Dut, row: Requirement) -> str:
     """In real time leave the port unread for long; in lockstep, where nothing is lost, look for marks."""
-    mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
+    mask = int(row.limit("gap_mask"))
     s.wait_ready()
     if s.lockstep:
         x = np.frombuffer(_look(s, LOOK_S), np.uint8)
@@ -58,8 +56,7 @@ def lost_samples_are_marked(s: Dut) -> str:
     return f"{marks} marks in {len(data)} bytes"
 
 
-@proves("LINE-GAP-02")
-@active(needs={"port", "lockstep"})
+@active("LINE-GAP-02", needs={"port", "lockstep"})
 def a_slow_reader_loses_nothing(s: Dut) -> str:
     """Read slowly while time is to pass."""
     mask = int(requirements().rows["LINE-GAP-01"].limit("gap_mask"))
@@ -89,8 +86,7 @@ def a_slow_reader_loses_nothing(s: Dut) -> str:
     return f"{len(data)} samples, no hole"
 
 
-@proves("LINE-OPEN-01")
-@active(needs={"port"})
+@active("LINE-OPEN-01", needs={"port"})
 def the_port_opens_again(s: Dut) -> str:
     """Open, read, close; open again: frames from the second fall of Int on."""
     s.wait_ready()

@@ -13,8 +13,8 @@ from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame, Capture
 from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
-from psabench.conform.proves import proves, row_for
-from psabench.conform.requirements import requirements
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.protocol_files import database, dbc_node, message
 from psabench.link.signals import unwrap
@@ -66,8 +66,7 @@ def _mine(e: Capture) -> tuple[CanFrame, ...]:
     return found
 
 
-@proves("BUS-ID-01")
-@check("services", needs={"can", "stream"})
+@check("services", "BUS-ID-01", needs={"can", "stream"})
 def frames_have_the_identifiers_of_the_node(e: Capture) -> str:
     """Look at the identifiers of all frames that belong to the node."""
     mine = {f.can_id for f in _mine(e)}
@@ -92,8 +91,7 @@ def _is_stray(e: Capture, f: CanFrame) -> bool:
     return f.can_id not in known | {request} and f.can_id > 0x7F
 
 
-@proves("BUS-ID-04")
-@check("services", needs={"can", "rtr"})
+@check("services", "BUS-ID-04", needs={"can", "rtr"})
 def no_remote_frames(e: Capture) -> str:
     """Look for remote frames of the unit."""
     bad = [f for f in _mine(e) if f.remote]
@@ -102,8 +100,7 @@ def no_remote_frames(e: Capture) -> str:
     return f"{len(_mine(e))} data frames"
 
 
-@proves("BUS-ID-05")
-@check("services")
+@check("services", "BUS-ID-05")
 def identifiers_have_11_bits(e: Capture) -> str:
     """Look for frames with identifiers of 29 bits."""
     bad = [f for f in e.can.frames if f.extended and not f.error and not f.sent]
@@ -112,8 +109,7 @@ def identifiers_have_11_bits(e: Capture) -> str:
     return f"{len(_mine(e))} frames of the unit with 11 bits"
 
 
-@proves("BUS-ID-06")
-@check("services", needs={"can", "fd"})
+@check("services", "BUS-ID-06", needs={"can", "fd"})
 def services_are_classic(e: Capture) -> str:
     """Look at the form of boot-up, heartbeat, emergencies and SDO answers."""
     ids = {_id(e, n) for n in ("emcy", "sdo_tx", "heartbeat")}
@@ -124,11 +120,10 @@ def services_are_classic(e: Capture) -> str:
     return f"{len(mine)} classic frames"
 
 
-@proves("BUS-BOOT-01")
-@check("services")
-def state_0_is_said_once(e: Capture) -> str:
+@check("services", "BUS-BOOT-01")
+def state_0_is_said_once(e: Capture, row: Requirement) -> str:
     """Count boot-up messages, and look at what came before."""
-    state = bytes([int(row_for(e, "BUS-BOOT-01").limit("state_code"))])
+    state = bytes([int(row.limit("state_code"))])
     beats = [f for f in _mine(e) if f.can_id == _id(e, "heartbeat")]
     boots = [f for f in beats if f.data == state]
     if any(len(f.data) != 1 for f in beats):
@@ -140,11 +135,9 @@ def state_0_is_said_once(e: Capture) -> str:
     return f"{len(boots)} boot-up messages of one byte"
 
 
-@proves("BUS-HB-01")
-@check("services", needs={"can", "stamps"})
-def heartbeats_keep_their_period(e: Capture) -> str:
+@check("services", "BUS-HB-01", needs={"can", "stamps"})
+def heartbeats_keep_their_period(e: Capture, row: Requirement) -> str:
     """Measure the intervals between heartbeats, until somebody writes 1017h."""
-    row = row_for(e, "BUS-HB-01")
     due_s, late_s = row.limit("default_ms") * 1e-3, row.limit("jitter_max_ms") * 1e-3
     beats: list[CanFrame] = []
     for f in e.can.frames:
@@ -164,8 +157,7 @@ def heartbeats_keep_their_period(e: Capture) -> str:
     return f"{len(apart_s)} intervals of {apart_s.min():.6f} to {apart_s.max():.6f} s"
 
 
-@proves("BUS-SDO-15")
-@check("services")
+@check("services", "BUS-SDO-15")
 def requests_and_answers_take_turns(e: Capture) -> str:
     """Pair each SDO request of the log with the answer that follows it."""
     request_id = int(requirements().rows["BUS-ID-02"].limit("sdo_rx_id")) + e.node
@@ -218,8 +210,7 @@ def stamp_s(e: Capture, f: CanFrame) -> float:
     return float(int.from_bytes(f.data[4:8], "little") * row_for(e, "BUS-EMCY-01").limit("unit_us") * 1e-6)
 
 
-@proves("BUS-EMCY-01")
-@check("overload", needs={"can", "stream"})
+@check("overload", "BUS-EMCY-01", needs={"can", "stream"})
 def emergencies_have_their_form(e: Capture) -> str:
     """Look at length, error register and time of each emergency."""
     told = _told(e)
@@ -235,8 +226,7 @@ def emergencies_have_their_form(e: Capture) -> str:
     return f"{len(told)} emergencies, {max(t_s) - min(t_s):.3f} s between their times and those of the log"
 
 
-@proves("BUS-EMCY-02")
-@check("overload", needs={"can", "stream"})
+@check("overload", "BUS-EMCY-02", needs={"can", "stream"})
 def a_condition_is_told_once(e: Capture) -> str:
     """Count the emergencies of each condition."""
     lasting: set[int] = set()
@@ -249,12 +239,11 @@ def a_condition_is_told_once(e: Capture) -> str:
     return f"{', '.join(f'{code_of(f):04X}h' for f in told)}"
 
 
-@proves("BUS-EMCY-03")
-@check("overload", needs={"can", "stream"})
-def the_end_is_told_once(e: Capture) -> str:
+@check("overload", "BUS-EMCY-03", needs={"can", "stream"})
+def the_end_is_told_once(e: Capture, row: Requirement) -> str:
     """Look at the emergency that ends the last condition."""
     told = _told(e)
-    due = int(row_for(e, "BUS-EMCY-03").limit("emcy_code"))
+    due = int(row.limit("emcy_code"))
     ends = [k for k, f in enumerate(told) if code_of(f) == due]
     if any(k == 0 or code_of(told[k - 1]) == due for k in ends):
         raise Failed("0000h without a condition before it", "once, after the last one has ended", frames=told)
@@ -265,8 +254,7 @@ def the_end_is_told_once(e: Capture) -> str:
     return f"{len(ends)} times 0000h, register 00h"
 
 
-@proves("BUS-EMCY-05")
-@check("overload", needs={"can", "stream"})
+@check("overload", "BUS-EMCY-05", needs={"can", "stream"})
 def codes_are_of_the_table(e: Capture) -> str:
     """Look each emergency up in the table of codes."""
     table, told = emergencies(e.variant.family), _told(e)
@@ -290,11 +278,9 @@ def _any(bits: Any) -> int:
     return found
 
 
-@proves("BUS-EMCY-06")
-@check("overload", needs={"can", "stream"})
-def lost_samples_are_told(e: Capture) -> str:
+@check("overload", "BUS-EMCY-06", needs={"can", "stream"})
+def lost_samples_are_told(e: Capture, row: Requirement) -> str:
     """Compare what is missing in the numbers of the readings with the counter, and the emergencies with both."""
-    row = row_for(e, "BUS-EMCY-06")
     if "dropped" not in e.facts:
         raise Inconclusive("the counter was not read")
     missing = int((np.diff(_numbers(e)) - 1).sum())
@@ -328,8 +314,7 @@ def _numbers(e: Capture) -> np.ndarray:
     return unwrap(raw, message(name).get_signal_by_name(counter).length)
 
 
-@proves("BUS-PDO-04")
-@check("overload", needs={"can", "stream"})
+@check("overload", "BUS-PDO-04", needs={"can", "stream"})
 def frames_of_a_sample_keep_their_order(e: Capture) -> str:
     """Look at the order of the frames of each sample, before, while and after others fill the bus."""
     order = [i + e.node for i in pdos(e.variant.family).values()]
@@ -344,13 +329,12 @@ def frames_of_a_sample_keep_their_order(e: Capture) -> str:
     return f"{len(came)} frames in the order {', '.join(f'{i:03X}h' for i in used)}"
 
 
-@proves("BUS-LOAD-02")
-@check("overload", needs={"can", "lockstep", "stream"})
-def no_more_than_its_queue_waits(e: Capture) -> str:
+@check("overload", "BUS-LOAD-02", needs={"can", "lockstep", "stream"})
+def no_more_than_its_queue_waits(e: Capture, row: Requirement) -> str:
     """Count the readings that were kept when the bus was filled: those that come before the gap in the numbers."""
     if "flood" not in e.marks:
         raise Inconclusive("no node filled the bus")
-    most = int(row_for(e, "BUS-LOAD-02").limit("queue_frames"))
+    most = int(row.limit("queue_frames"))
     order = {i + e.node for i in pdos(e.variant.family).values()}
     at = int(e.marks["flood"])
     used = len({f.can_id for f in e.can.frames if f.can_id in order})
@@ -368,11 +352,10 @@ def no_more_than_its_queue_waits(e: Capture) -> str:
 # ---- the CAN controller, where frames were destroyed
 
 
-@proves("BUS-EMCY-07")
-@check("errors", needs={"can", "errors"})
-def error_passive_is_told(e: Capture) -> str:
+@check("errors", "BUS-EMCY-07", needs={"can", "errors"})
+def error_passive_is_told(e: Capture, row: Requirement) -> str:
     """Look for the emergency after enough error frames, and for its end."""
-    row, told = row_for(e, "BUS-EMCY-07"), list(e.can.of_id(_id(e, "emcy")).frames)
+    told = list(e.can.of_id(_id(e, "emcy")).frames)
     code = int(row.limit("emcy_code"))
     begin = next((f for f in told if code_of(f) == code), None)
     errors = [f for f in e.can.frames if f.error]
@@ -390,8 +373,7 @@ def error_passive_is_told(e: Capture) -> str:
     return f"{code:04X}h after {len(first)} error frames, and 0000h"
 
 
-@proves("BUS-EMCY-08", "BUS-EMCY-09")
-@check("errors", needs={"can", "errors"})
+@check("errors", "BUS-EMCY-08", "BUS-EMCY-09", needs={"can", "errors"})
 def coming_back_to_the_bus_is_told(e: Capture) -> str:
     """Look for the emergency of a unit that comes back, how long it was away, and that it ends at once."""
     told, code = _told(e), int(row_for(e, "BUS-EMCY-08").limit("emcy_code"))
@@ -412,11 +394,10 @@ def coming_back_to_the_bus_is_told(e: Capture) -> str:
     return f"back after {away_bits:.0f} bits; {code:04X}h, then 0000h"
 
 
-@proves("BUS-EMCY-10")
-@check("slow_bus", needs={"can", "slow"})
-def a_stream_that_does_not_fit_stands(e: Capture) -> str:
+@check("slow_bus", "BUS-EMCY-10", needs={"can", "slow"})
+def a_stream_that_does_not_fit_stands(e: Capture, row: Requirement) -> str:
     """Look for PDOs between the emergency of a stream that does not fit and its end."""
-    told, code = _told(e), int(row_for(e, "BUS-EMCY-10").limit("emcy_code"))
+    told, code = _told(e), int(row.limit("emcy_code"))
     begin = next((f for f in told if code_of(f) == code), None)
     if begin is None:
         raise Inconclusive(f"no {code:04X}h in the log")

@@ -8,7 +8,8 @@ import numpy as np
 
 from psabench.conform.capture.log import Capture, LineLog
 from psabench.conform.plan import check
-from psabench.conform.proves import proves, row_for
+from psabench.conform.proves import row_for
+from psabench.conform.requirements import Requirement
 from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.link.signals import Ints
@@ -32,11 +33,10 @@ def _port(e: Capture) -> LineLog:
     return found
 
 
-@proves("LINE-BYTE-01")
-@check("line_port", needs={"port"})
-def bits_of_a_psa2(e: Capture) -> str:
+@check("line_port", "LINE-BYTE-01", needs={"port"})
+def bits_of_a_psa2(e: Capture, row: Requirement) -> str:
     """Look for frames in bits 0 and 2 of the bytes, for data in bit 1, for nothing in bits 3 to 6."""
-    x, row = _bytes(e), row_for(e, "LINE-BYTE-01")
+    x = _bytes(e)
     stray = np.flatnonzero(x & int(row.limit("zero_mask")))
     if len(stray):
         raise Failed(f"byte {x[stray[0]]:02X}h", "bits 3 to 6 zero")
@@ -93,8 +93,7 @@ def _agrees(port: LineLog, pins: LineLog, name: str, t0_ns: float, step_ns: floa
     return bool(np.array_equal(pins[name].at(np.floor(here).astype(np.int64)), level))
 
 
-@proves("LINE-BYTE-02")
-@check("line_port", needs={"port", "pins", "stream", "exact"})
+@check("line_port", "LINE-BYTE-02", needs={"port", "pins", "stream", "exact"})
 def bits_of_the_other_boards(e: Capture) -> str:
     """Lay each bit beside the line of the table as the pins show it."""
     _t0_ns(e)
@@ -103,11 +102,10 @@ def bits_of_the_other_boards(e: Capture) -> str:
     return f"{', '.join(names)} as at the pins; {', '.join(moved)} moved"
 
 
-@proves("LINE-RATE-01")
-@check("line_port", needs={"port", "pins", "stream", "exact"})
-def samples_come_at_their_rate(e: Capture) -> str:
+@check("line_port", "LINE-RATE-01", needs={"port", "pins", "stream", "exact"})
+def samples_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Compare the samples between the first and the last edge of the port with their time at the pins."""
-    rate_hz, t0_ns = row_for(e, "LINE-RATE-01").limit("sample_hz"), _t0_ns(e)
+    rate_hz, t0_ns = row.limit("sample_hz"), _t0_ns(e)
     name = max(PORT_LINES[e.variant.family], key=lambda n: len(_port(e)[n].t_ns))
     port, pin = _port(e)[name].t_ns[1:], e.wires[name].t_ns[1:]
     at = np.searchsorted(pin, port[[0, -1]] + t0_ns, "right") - 1 if len(port) > 1 else np.array([-1])
@@ -115,19 +113,18 @@ def samples_come_at_their_rate(e: Capture) -> str:
         raise Inconclusive("fewer than two edges")
     samples = (port[-1] - port[0]) * rate_hz / NS
     took_s = (pin[at[1]] - pin[at[0]]) / NS
-    if abs(samples - took_s * rate_hz) > row_for(e, "LINE-RATE-01").limit("tolerance_samples"):
+    if abs(samples - took_s * rate_hz) > row.limit("tolerance_samples"):
         raise Failed(f"{samples:.0f} samples in {took_s:.9f} s", f"{took_s * rate_hz:.1f}", lines=[name])
     return f"{samples:.0f} samples in {took_s:.9f} s"
 
 
-@proves("LINE-RATE-02")
-@check("line_port", needs={"port", "pins", "stream", "exact"})
-def samples_are_the_levels_of_their_instants(e: Capture) -> str:
+@check("line_port", "LINE-RATE-02", needs={"port", "pins", "stream", "exact"})
+def samples_are_the_levels_of_their_instants(e: Capture, row: Requirement) -> str:
     """Look up the level of the pin at each sample before and at an edge of the port."""
     t0_ns, port = _t0_ns(e), _port(e)
     edges = sum(len(port[n].t_ns) - 1 for n in PORT_LINES[e.variant.family])
     step_ns = NS / row_for(e, "LINE-RATE-01").limit("sample_hz")
     off = t0_ns % step_ns
-    if min(off, step_ns - off) > row_for(e, "LINE-RATE-02").limit("tolerance_ns"):
+    if min(off, step_ns - off) > row.limit("tolerance_ns"):
         raise Failed(f"sample 0 {off:.0f} ns after an edge of the sample clock", "at an edge")
     return f"{edges} edges, each between the sample before and its own; sample 0 at {t0_ns:.0f} ns"

@@ -1,7 +1,6 @@
 """What a case left behind, and the tests that check it.
 
-    @proves("HOST-CAN-02")
-    @checks("torn")
+    @checks("HOST-CAN-02", "torn")
     def a_half_is_told_as_torn(e: HostCapture) -> str: ...
 
 A test is a pure function of the capture of its case, as the device suite's are; it raises `Failed`, `Inconclusive`, or
@@ -170,27 +169,19 @@ class CaseCheck:
     ids: tuple[str, ...]
 
 
-_cases: dict[HostCheck, tuple[str, ...]] = {}
 _case_checks: list[CaseCheck] = []
 
 
-def checks(*cases: str) -> Callable[[Test], Test]:
-    """The cases whose capture a test wants; it checks each by itself."""
+def checks(requirement: str, *cases: str) -> Callable[[Test], Test]:
+    """What a test proves, and the cases whose capture it wants; it checks each by itself.
+
+    Raises ValueError for an unknown id.
+    """
+    if requirement not in requirements().rows:
+        raise ValueError(expected("the id of a requirement", requirement, "checks"))
 
     def register(test: Test) -> Test:
-        _cases[test] = cases
-        return test
-
-    return register
-
-
-def proves(*ids: str) -> Callable[[Test], Test]:
-    """As `psabench.conform.proves.proves`, for tests of hosts. Raises ValueError for an unknown id."""
-    if unknown := [i for i in ids if i not in requirements().rows]:
-        raise ValueError(expected("ids of requirements", ", ".join(unknown), "proves"))
-
-    def register(test: Test) -> Test:
-        _case_checks.extend(CaseCheck(test, case, ids) for case in _cases[test])
+        _case_checks.extend(CaseCheck(test, case, (requirement,)) for case in cases)
         return test
 
     return register

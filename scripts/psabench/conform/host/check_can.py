@@ -9,7 +9,7 @@ import numpy as np
 from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
-from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.verdict import Failed, Unseen
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
@@ -25,15 +25,13 @@ ENDS = ("line_good", *(name for name, case in UNIT_CASES.items() if case.ends)) 
 IDENTITY = (Common.DEVICE_TYPE, Common.DEVICE_NAME, Common.IDENTITY)  # any of them says who is there
 
 
-@proves("HOST-RES-01")
-@checks("good")
+@checks("HOST-RES-01", "good")
 def every_sample_is_told_once_and_in_order(e: HostCapture) -> str:
     """The numbers of the samples told, against those on the bus."""
     return f"{len(e.samples().pairs)} samples"
 
 
-@proves("HOST-RES-02")
-@checks("good")
+@checks("HOST-RES-02", "good")
 def nothing_is_told_that_was_not_played(e: HostCapture) -> str:
     """Everything told of ten seconds of a good board."""
     e.nothing_but()
@@ -42,8 +40,7 @@ def nothing_is_told_that_was_not_played(e: HostCapture) -> str:
     return f"{len(e.told.samples)} samples and no fault"
 
 
-@proves("HOST-RES-03")
-@checks("good", *ENDS)
+@checks("HOST-RES-03", "good", *ENDS)
 def the_end_is_told(e: HostCapture) -> str:
     """The link ends: the last word, and the exit status."""
     if e.told.of("end") != [True] or e.told.events[-1].name != "end" or e.told.events[-1].at != e.told.count:
@@ -53,8 +50,7 @@ def the_end_is_told(e: HostCapture) -> str:
     return "end told, exit status 0"
 
 
-@proves("HOST-RES-04")
-@checks("good", *ENDS)
+@checks("HOST-RES-04", "good", *ENDS)
 def every_line_is_of_the_results_channel(e: HostCapture) -> str:
     """The lines told, against the words of the results channel."""
     enough(e.told.count or e.told.events or e.told.bad_lines, "a line")
@@ -63,8 +59,7 @@ def every_line_is_of_the_results_channel(e: HostCapture) -> str:
     return f"{e.told.count + len(e.told.events)} lines"
 
 
-@proves("HOST-CAN-11")
-@checks("good")
+@checks("HOST-CAN-11", "good")
 def codes_are_those_that_were_sent(e: HostCapture) -> str:
     """Codes of X, Y, Z and T and the channel of T, each of another size and sign."""
     enough(e.match.pairs, "a sample")
@@ -74,8 +69,7 @@ def codes_are_those_that_were_sent(e: HostCapture) -> str:
     return f"{len(e.match.pairs)} samples, the last {e.match.pairs[-1][0].codes}"
 
 
-@proves("HOST-CAN-03")
-@checks("good")
+@checks("HOST-CAN-03", "good")
 def wraps_are_no_loss_and_no_jump(e: HostCapture) -> str:
     """SEQ goes from 65535 to 0, TSTAMP every 0.262144 s: what is lost, and the times, about them."""
     row = limits("HOST-CAN-03")
@@ -86,8 +80,7 @@ def wraps_are_no_loss_and_no_jump(e: HostCapture) -> str:
     return f"{len(m.pairs)} samples, none lost, times {_steady(e)}"
 
 
-@proves("HOST-TIME-01")
-@checks("delayed")
+@checks("HOST-TIME-01", "delayed")
 def times_are_those_of_the_conversions(e: HostCapture) -> str:
     """Frames come 30 ms late: the times told of their samples against the instants on the board."""
     m = e.samples()
@@ -109,8 +102,7 @@ def _steady(e: HostCapture) -> str:
     return f"right to {worst_us:.0f} us"
 
 
-@proves("HOST-VALUE-01")
-@checks("good")
+@checks("HOST-VALUE-01", "good")
 def volts_are_codes_times_the_scale(e: HostCapture) -> str:
     """Volts told beside the codes."""
     row = limits("HOST-VALUE-01")
@@ -128,8 +120,7 @@ def volts_are_codes_times_the_scale(e: HostCapture) -> str:
 # ---- asking the board
 
 
-@proves("HOST-SETUP-02")
-@checks("power_on")
+@checks("HOST-SETUP-02", "power_on")
 def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
     """Requests from power-on: the board rejects registers with 08000022h until its set-up is done."""
     refused = [f for f in e.bus.of(SDO_TX) if f.data[0] == ABORT]
@@ -142,8 +133,7 @@ def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
     return f"{len(refused)} refusals, all registers read, {len(e.bus.samples)} samples"
 
 
-@proves("HOST-SETUP-03")
-@checks("power_on")
+@checks("HOST-SETUP-03", "power_on")
 def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
     """The order of the host's requests and of its NMT start."""
     if not e.bus.starts:
@@ -157,8 +147,7 @@ def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
     return f"identity and {len(REGISTERS)} registers, then NMT start at {start_s:.3f} s"
 
 
-@proves("HOST-CAN-10")
-@checks("slow")
+@checks("HOST-CAN-10", "slow")
 def nothing_is_asked_again_before_its_time(e: HostCapture) -> str:
     """Two answers come after 0.6 s: requests meanwhile."""
     timeout_s = float(limits("HOST-CAN-10").limit("timeout_s"))
@@ -198,8 +187,7 @@ def _all_are_read(e: HostCapture, before_s: float = float("inf")) -> None:
             raise Failed(f"{index:04X}h:{sub} was not read", "it is, before the stream is started")
 
 
-@proves("HOST-SETUP-01")
-@checks("setup_order", "config0_x", "config0_z")
+@checks("HOST-SETUP-01", "setup_order", "config0_x", "config0_z")
 def a_wrong_set_up_is_told(e: HostCapture) -> str:
     """The set-up was carried out backwards, or a bit of CONFIG0 is wrong, in one converter alone."""
     if not e.told.of("wrong_setup"):
@@ -212,8 +200,7 @@ def a_wrong_set_up_is_told(e: HostCapture) -> str:
 # ---- what goes wrong with frames
 
 
-@proves("HOST-LOST-01")
-@checks("lost")
+@checks("HOST-LOST-01", "lost")
 def lost_samples_are_counted(e: HostCapture) -> str:
     """1, 2 and 1000 samples do not come: the numbers told, each before the sample that follows the gap."""
     m = e.samples()
@@ -230,8 +217,7 @@ def _gaps(found: dict[int, int]) -> str:
     return ", ".join(f"{n} after {at} samples" for at, n in found.items()) or "none"
 
 
-@proves("HOST-CAN-02")
-@checks("torn")
+@checks("HOST-CAN-02", "torn")
 def a_half_without_the_other_is_torn(e: HostCapture) -> str:
     """Two second halves and a first one are lost."""
     e.samples()
@@ -240,8 +226,7 @@ def a_half_without_the_other_is_torn(e: HostCapture) -> str:
     return "torn: 3"
 
 
-@proves("HOST-CAN-01")
-@checks("mixed", "order")
+@checks("HOST-CAN-01", "mixed", "order")
 def halves_of_two_samples_are_not_one(e: HostCapture) -> str:
     """Halves are missing so that what is left looks like a pair; or they come in another order."""
     e.samples()
@@ -249,8 +234,7 @@ def halves_of_two_samples_are_not_one(e: HostCapture) -> str:
     return f"{len(e.match.pairs)} samples of halves that are their own, torn: {e.told.sum('torn')}"
 
 
-@proves("HOST-CAN-01")
-@checks("corrupt")
+@checks("HOST-CAN-01", "corrupt")
 def a_wrong_bit_does_not_end_it(e: HostCapture) -> str:
     """A bit of four frames is wrong: the samples of the others."""
     hit = 4
@@ -263,8 +247,7 @@ def a_wrong_bit_does_not_end_it(e: HostCapture) -> str:
     return f"{len(m.pairs)} of {len(e.bus.samples)} samples"
 
 
-@proves("HOST-CAN-08")
-@checks("twice")
+@checks("HOST-CAN-08", "twice")
 def what_comes_twice_is_one_sample(e: HostCapture) -> str:
     """Halves of four samples come twice."""
     e.samples()
@@ -273,8 +256,7 @@ def what_comes_twice_is_one_sample(e: HostCapture) -> str:
     return f"{len(e.match.pairs)} samples, each once"
 
 
-@proves("HOST-CAN-05")
-@checks("length")
+@checks("HOST-CAN-05", "length")
 def a_message_of_the_wrong_length_is_torn(e: HostCapture) -> str:
     """A PSA2_XY of 7 bytes between two samples, twice."""
     e.samples()
@@ -283,8 +265,7 @@ def a_message_of_the_wrong_length_is_torn(e: HostCapture) -> str:
     return "torn: 2"
 
 
-@proves("HOST-CAN-04")
-@checks("others")
+@checks("HOST-CAN-04", "others")
 def other_nodes_and_error_frames_are_let_by(e: HostCapture) -> str:
     """Frames of node 6 between the halves of ours, two error frames, 1.4 ms off the bus."""
     e.samples()
@@ -292,8 +273,7 @@ def other_nodes_and_error_frames_are_let_by(e: HostCapture) -> str:
     return f"{len(e.match.pairs)} samples"
 
 
-@proves("HOST-RANGE-01")
-@checks("over_range")
+@checks("HOST-RANGE-01", "over_range")
 def each_axis_is_told_as_over_range(e: HostCapture) -> str:
     """X, Y, Z, up and down, at 9.9 V and beyond the range: what is reported, against the codes at their limits."""
     m = e.samples()
@@ -317,8 +297,7 @@ def _word(words: list[tuple[str, str]], k: int) -> str:
     return " of ".join(words[k]) if k < len(words) else "nothing"
 
 
-@proves("HOST-RST-01")
-@checks("restart")
+@checks("HOST-RST-01", "restart")
 def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
     """A brown-out and a reset node by somebody else: boot-up messages, numbers from 0."""
     restarts = len([t for t in e.bus.boots if e.bus.starts and t > e.bus.starts[0]])
@@ -335,8 +314,7 @@ def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
     return f"{restarts} restarts, samples after each"
 
 
-@proves("HOST-SETTLE-01")
-@checks("flags")
+@checks("HOST-SETTLE-01", "flags")
 def samples_that_have_not_settled_are_not_told(e: HostCapture) -> str:
     """CONFIG1 is written: 63 words whose SETTLED is 0."""
     m = e.samples()
@@ -346,8 +324,7 @@ def samples_that_have_not_settled_are_not_told(e: HostCapture) -> str:
     return f"none of {sum(not p.settled for p in e.bus.samples)}"
 
 
-@proves("HOST-OVER-01")
-@checks("flags")
+@checks("HOST-OVER-01", "flags")
 def conversions_that_the_board_lost_are_told(e: HostCapture) -> str:
     """Samples with OVERRUN."""
     due = sum(p.overrun for p in e.bus.samples)
@@ -356,8 +333,7 @@ def conversions_that_the_board_lost_are_told(e: HostCapture) -> str:
     return f"overrun: {due}"
 
 
-@proves("HOST-STALE-01")
-@checks("silence")
+@checks("HOST-STALE-01", "silence")
 def silence_is_told_and_its_end(e: HostCapture) -> str:
     """40 ms without a frame, then 0.5 s."""
     e.samples()
@@ -373,8 +349,7 @@ def silence_is_told_and_its_end(e: HostCapture) -> str:
     return f"stale after {at} samples, fresh with the next"
 
 
-@proves("HOST-STALE-02")
-@checks("frozen")
+@checks("HOST-STALE-02", "frozen")
 def codes_that_stand_still_are_told(e: HostCapture) -> str:
     """The controller sends the same codes for two seconds."""
     e.samples()
@@ -394,8 +369,7 @@ def codes_that_stand_still_are_told(e: HostCapture) -> str:
     return f"frozen after {after} samples of the same codes"
 
 
-@proves("HOST-RATE-01")
-@checks("rate")
+@checks("HOST-RATE-01", "rate")
 def a_data_rate_that_is_off_is_told(e: HostCapture) -> str:
     """The converters' clock 100 ppm off for a second, then 2000 ppm."""
     row = limits("HOST-RATE-01")
@@ -410,8 +384,7 @@ def a_data_rate_that_is_off_is_told(e: HostCapture) -> str:
     return f"{told[-1]} ppm"
 
 
-@proves("HOST-CAN-06")
-@checks("emcy")
+@checks("HOST-CAN-06", "emcy")
 def an_emergency_is_told_and_its_end(e: HostCapture) -> str:
     """Data-ready of X sticks for 0.4 s."""
     due = [number(f.data[0:2]) for f in e.bus.frames if f.can_id == 0x080 + e.bus.node and len(f.data) == 8]
@@ -422,8 +395,7 @@ def an_emergency_is_told_and_its_end(e: HostCapture) -> str:
     return ", ".join(f"{c:04X}h" for c in due)
 
 
-@proves("HOST-CAN-07")
-@checks("off")
+@checks("HOST-CAN-07", "off")
 def a_unit_without_heartbeat_is_gone(e: HostCapture) -> str:
     """The supply is switched off; four heartbeats do not come."""
     e.samples()
@@ -432,8 +404,7 @@ def a_unit_without_heartbeat_is_gone(e: HostCapture) -> str:
     return "gone"
 
 
-@proves("HOST-CAN-09")
-@checks("fast")
+@checks("HOST-CAN-09", "fast")
 def a_missing_toggle_is_a_lost_frame(e: HostCapture) -> str:
     """Frame form 1, which the host asks for: three frames do not come, each told by TOG alone."""
     words = [number(f.data) for f in e.bus.frames if f.can_id == FAST + e.bus.node and len(f.data) == 8]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.conform.host.cases_line import LINE_CASES, due, falls_us
-from psabench.conform.host.check import HostCapture, checks, limits, proves
+from psabench.conform.host.check import HostCapture, checks, limits
 from psabench.conform.host.line_waves import LineFrame, form_of
 from psabench.conform.host.results import Sample
 from psabench.conform.verdict import Failed, Unseen
@@ -51,37 +51,32 @@ def _torn(e: HostCapture) -> str:
     return f"torn: {n}, {len(e.told.samples)} others whole"
 
 
-@proves("HOST-LINE-01")
-@checks("line_good")
+@checks("HOST-LINE-01", "line_good")
 def a_transfer_is_from_fall_to_rise_of_int(e: HostCapture) -> str:
     """Number and instants of frames, against those that were sent."""
     return f"{len(_pairs(e, NO_BITS))} frames, {_instants(e)}"
 
 
-@proves("HOST-LINE-02")
-@checks("line_narrow")
+@checks("HOST-LINE-02", "line_narrow")
 def bits_are_taken_at_the_rise_of_clk(e: HostCapture) -> str:
     """DATA is wrong but for a quarter of a period on either side of the rise."""
     return f"{len(_pairs(e))} frames"
 
 
-@proves("HOST-LINE-03")
-@checks("line_good")
+@checks("HOST-LINE-03", "line_good")
 def words_begin_with_the_least_bit_and_address(e: HostCapture) -> str:
     """Words 1 and 80000000h among others, four different ones in a frame: their low bits."""
     return f"{len(_pairs(e, LOW_BITS))} frames, low bits alone"
 
 
-@proves("HOST-LINE-04")
-@checks("line_good")
+@checks("HOST-LINE-04", "line_good")
 def words_have_their_sign(e: HostCapture) -> str:
     """Codes -1 and both limits."""
     negative = sum(f.codes[1] < 0 for _, _, f in _pairs(e))
     return f"{negative} words that are negative"
 
 
-@proves("HOST-LINE-05")
-@checks("line_good")
+@checks("HOST-LINE-05", "line_good")
 def word_t_has_three_parts(e: HostCapture) -> str:
     """Code, channel and status of word T."""
     _status(e)
@@ -91,8 +86,7 @@ def word_t_has_three_parts(e: HostCapture) -> str:
     return "code, channel and status of each"
 
 
-@proves("HOST-LINE-06")
-@checks("line_fast", "line_slow")
+@checks("HOST-LINE-06", "line_fast", "line_slow")
 def a_clock_that_is_off_is_no_fault(e: HostCapture) -> str:
     """1.5 s with a clock that is 100 ppm fast, or slow."""
     assert abs(LINE_CASES[e.case].ppm) == limits("HOST-LINE-06").limit("clock_error_ppm")
@@ -115,8 +109,7 @@ def _instants(e: HostCapture) -> str:
     return f"instants right to {worst_us:.3f} us"
 
 
-@proves("HOST-LINE-07")
-@checks("line_under_way")
+@checks("HOST-LINE-07", "line_under_way")
 def a_frame_under_way_is_not_told(e: HostCapture) -> str:
     """The samples begin in the middle of a frame."""
     _pairs(e)
@@ -124,36 +117,31 @@ def a_frame_under_way_is_not_told(e: HostCapture) -> str:
     return f"{len(e.told.samples)} frames after it"
 
 
-@proves("HOST-TORN-01")
-@checks("line_missing")
+@checks("HOST-TORN-01", "line_missing")
 def a_pulse_too_few_is_torn(e: HostCapture) -> str:
     """One pulse of CLK is missing: the first, the last, and some between."""
     return _torn(e)
 
 
-@proves("HOST-TORN-02")
-@checks("line_extra")
+@checks("HOST-TORN-02", "line_extra")
 def a_pulse_too_many_is_torn(e: HostCapture) -> str:
     """One pulse of CLK too many: after the first, the last, and some between."""
     return _torn(e)
 
 
-@proves("HOST-TORN-03")
-@checks("line_pauses")
+@checks("HOST-TORN-03", "line_pauses")
 def other_pauses_are_torn(e: HostCapture) -> str:
     """128 bits with a pause of 3 or 5 periods."""
     return _torn(e)
 
 
-@proves("HOST-TORN-04")
-@checks("line_cut")
+@checks("HOST-TORN-04", "line_cut")
 def int_without_a_frame_is_torn(e: HostCapture) -> str:
     """INT low for 74 us without a bit; frames that are cut off."""
     return _torn(e)
 
 
-@proves("HOST-TORN-05")
-@checks("line_glitch")
+@checks("HOST-TORN-05", "line_glitch")
 def a_glitch_is_no_frame(e: HostCapture) -> str:
     """INT low for 125 ns, 250 ns and 1 us."""
     _pairs(e)
@@ -161,8 +149,7 @@ def a_glitch_is_no_frame(e: HostCapture) -> str:
     return f"{len(e.told.samples)} frames, no more"
 
 
-@proves("HOST-LOST-01")
-@checks("line_lost")
+@checks("HOST-LOST-01", "line_lost")
 def frames_that_do_not_come_are_counted(e: HostCapture) -> str:
     """1, 2 and 5 frames are missing, by the time between two falls of INT."""
     _pairs(e)
@@ -173,8 +160,7 @@ def frames_that_do_not_come_are_counted(e: HostCapture) -> str:
     return ", ".join(map(str, want.values()))
 
 
-@proves("HOST-STALE-01")
-@checks("line_silence")
+@checks("HOST-STALE-01", "line_silence")
 def silence_on_the_line_is_told_and_its_end(e: HostCapture) -> str:
     """40 ms without a frame, then half a second."""
     _pairs(e)
@@ -186,8 +172,7 @@ def silence_on_the_line_is_told_and_its_end(e: HostCapture) -> str:
     return f"stale after {at} samples, fresh with the next"
 
 
-@proves("HOST-STALE-01")
-@checks("line_stuck")
+@checks("HOST-STALE-01", "line_stuck")
 def a_line_that_is_stuck_is_told(e: HostCapture) -> str:
     """INT stays low for 0.6 s while CLK goes on."""
     _pairs(e)
@@ -197,8 +182,7 @@ def a_line_that_is_stuck_is_told(e: HostCapture) -> str:
     return f"stale after {e.told.places('stale')[0]} samples"
 
 
-@proves("HOST-STALE-02")
-@checks("line_frozen")
+@checks("HOST-STALE-02", "line_frozen")
 def words_that_stand_still_are_told(e: HostCapture) -> str:
     """The same words for 1.5 s."""
     _pairs(e)
@@ -208,8 +192,7 @@ def words_that_stand_still_are_told(e: HostCapture) -> str:
     return f"frozen after {e.told.places('frozen')[0] - 20} samples of the same codes"
 
 
-@proves("HOST-RANGE-01")
-@checks("line_over")
+@checks("HOST-RANGE-01", "line_over")
 def each_axis_at_its_limit_is_told(e: HostCapture) -> str:
     """X, Y and Z at their positive and at their negative limit."""
     _pairs(e)
@@ -221,16 +204,14 @@ def each_axis_at_its_limit_is_told(e: HostCapture) -> str:
     return f"{len(want) // 2} times over the range and back"
 
 
-@proves("HOST-SETTLE-01")
-@checks("line_status")
+@checks("HOST-SETTLE-01", "line_status")
 def words_that_have_not_settled_are_not_told(e: HostCapture) -> str:
     """Two frames whose status does not say settled."""
     _status(e)
     return f"none of 2, {len(_pairs(e))} others"
 
 
-@proves("HOST-OVER-01")
-@checks("line_status")
+@checks("HOST-OVER-01", "line_status")
 def a_conversion_that_was_lost_is_told(e: HostCapture) -> str:
     """A frame whose status says that a conversion was lost before it."""
     _status(e)
@@ -238,15 +219,13 @@ def a_conversion_that_was_lost_is_told(e: HostCapture) -> str:
     return "overrun: 1"
 
 
-@proves("HOST-RES-01")
-@checks("line_good")
+@checks("HOST-RES-01", "line_good")
 def each_frame_is_told_once_and_in_order(e: HostCapture) -> str:
     """The frames told, against those that were sent."""
     return f"{len(_pairs(e))} frames"
 
 
-@proves("HOST-RES-02")
-@checks("line_slow")
+@checks("HOST-RES-02", "line_slow")
 def nothing_is_told_that_was_not_on_the_line(e: HostCapture) -> str:
     """Everything told of 1.5 s of a good board."""
     e.nothing_but()

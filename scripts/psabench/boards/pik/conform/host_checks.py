@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, Frame, signed
-from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.units import FIRST, SECOND, THIRD, after_start, readings_told
 from psabench.conform.verdict import Failed
 
@@ -47,8 +47,7 @@ def pulses(bus: Bus) -> list[Pulses]:
 SUM_WRAP = 1 << 32  # of PIK's totals
 
 
-@proves("HOST-PIK-01")
-@checks("pik_lost")
+@checks("HOST-PIK-01", "pik_lost")
 def increments_that_are_lost_come_back(e: HostCapture) -> str:
     """PIK_COUNTS of 1, 2 and 30 readings do not come: sums of pulses against the totals."""
     sent = pulses(e.bus)
@@ -56,8 +55,7 @@ def increments_that_are_lost_come_back(e: HostCapture) -> str:
     return _sums(e, sent)
 
 
-@proves("HOST-PIK-02")
-@checks("pik_bus")
+@checks("HOST-PIK-02", "pik_bus")
 def counters_are_taken_over_their_wraps(e: HostCapture) -> str:
     """A minute at 9 V and -9 V by the registers of 16 bits: sums of pulses against the totals on CAN."""
     sent = pulses(e.bus)
@@ -86,8 +84,7 @@ def _sums(e: HostCapture, sent: Sequence[Pulses]) -> str:
     return f"{len(told)} readings, {round(told[-1].values[0] - told[0].values[0])} pulses of x"
 
 
-@proves("HOST-PIK-03")
-@checks("pik_over")
+@checks("HOST-PIK-03", "pik_over")
 def a_channel_that_cannot_keep_up_is_told(e: HostCapture) -> str:
     """Each channel beyond its range, up and down: what is reported against SAT."""
     readings_told(e)

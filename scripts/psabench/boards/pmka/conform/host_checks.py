@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from psabench.boards.objects import PmkaObjects as OD
 from psabench.conform.host.capture import SDO_RX, SDO_TX, Bus, number
 from psabench.conform.host.cases_units import INPUT_V
-from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.results import Reading
 from psabench.conform.host.units import SECOND, frames_of, readings_told
 from psabench.conform.profile import variant
@@ -58,15 +58,13 @@ INDEX, DATA = (OD.BUS, 14), (OD.BUS, 15)  # what its ROM is read by
 ROM_WORDS = 6 + 1  # head and sum, at least
 
 
-@proves("HOST-PMKA-01")
-@checks("pmka_warm")
+@checks("HOST-PMKA-01", "pmka_warm")
 def a_minute_of_rotation_is_right(e: HostCapture) -> str:
     """Integrals of steady inputs over a minute in which integrators are calibrated in turn."""
     return _integrals(e, 1.0)
 
 
-@proves("HOST-PMKA-02")
-@checks("pmka_cold")
+@checks("HOST-PMKA-02", "pmka_cold")
 def corrections_of_the_rom_are_used(e: HostCapture) -> str:
     """The ROM is read, and a minute at -10 °C with inputs of the other sign is right."""
     asked = [f for f in e.bus.of(SDO_TX) if f.data[0] & 0xE0 == 0x40 and (number(f.data[1:3]), f.data[3]) == DATA]
@@ -108,8 +106,7 @@ def _numbered(told: Sequence[Reading], sent: Sequence[State]) -> list[tuple[Read
     return found
 
 
-@proves("HOST-PMKA-03")
-@checks("pmka_lost")
+@checks("HOST-PMKA-03", "pmka_lost")
 def what_is_lost_is_told_and_not_made_up(e: HostCapture) -> str:
     """One reading is lost, then three; input X is beyond the range for half a second."""
     if not e.streamed:

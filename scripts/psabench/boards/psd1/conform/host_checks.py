@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psabench.conform.host.capture import Bus, number
-from psabench.conform.host.check import HostCapture, checks, enough, limits, proves
+from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.results import Reading
 from psabench.conform.host.units import FIRST, frames_of, readings_told
 from psabench.conform.verdict import Failed
@@ -53,8 +53,7 @@ def _same(told: Sequence[Reading], due: Sequence[Cycle]) -> None:
             )
 
 
-@proves("HOST-PSD1-04")
-@checks("psd1_good")
+@checks("HOST-PSD1-04", "psd1_good")
 def each_cycle_is_told_once(e: HostCapture) -> str:
     """Words and CNT of a second of cycles."""
     sent = cycles(e.bus)
@@ -63,8 +62,7 @@ def each_cycle_is_told_once(e: HostCapture) -> str:
     return f"{len(e.told.readings)} cycles"
 
 
-@proves("HOST-PSD1-05")
-@checks("psd1_lost")
+@checks("HOST-PSD1-05", "psd1_lost")
 def cycles_that_do_not_come_are_counted(e: HostCapture) -> str:
     """1, 2 and 100 of them: the numbers told, each before the cycle that follows the gap."""
     sent = [c for c in cycles(e.bus) if not c.mixed]
@@ -81,8 +79,7 @@ def cycles_that_do_not_come_are_counted(e: HostCapture) -> str:
     return ", ".join(map(str, gaps.values()))
 
 
-@proves("HOST-PSD1-03")
-@checks("psd1_flags")
+@checks("HOST-PSD1-03", "psd1_flags")
 def flags_of_cycles_are_told(e: HostCapture) -> str:
     """Words were read late, after the next conversion, and not at all for a while."""
     sent = cycles(e.bus)
@@ -94,8 +91,7 @@ def flags_of_cycles_are_told(e: HostCapture) -> str:
     return ", ".join(f"{name} {n}" for name, n in due.items())
 
 
-@proves("HOST-PSD1-01")
-@checks("psd1_bus")
+@checks("HOST-PSD1-01", "psd1_bus")
 def each_word_is_read_at_its_address(e: HostCapture) -> str:
     """The host's cycles on the bus: each word once, X, Y, Z in order, and nothing rejected but for no word yet."""
     odd = [c for c in e.cycles if c.code not in ("", "not-ready")]
@@ -113,8 +109,7 @@ def each_word_is_read_at_its_address(e: HostCapture) -> str:
     return f"{len(told)} cycles, {len(order)} words"
 
 
-@proves("HOST-PSD1-02")
-@checks("psd1_bus")
+@checks("HOST-PSD1-02", "psd1_bus")
 def strobes_are_in_time(e: HostCapture) -> str:
     """LATE and MIXED of the cycles that the host made."""
     sent = cycles(e.bus)
