@@ -9,7 +9,7 @@ from psabench.boards.objects import Area, BusObjects, Common
 from psabench.conform.bus_host import refused
 from psabench.conform.dut import Dut
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 from psabench.link.canopen_host import Described
 
 OWN, BUS, READ_ONLY = (
@@ -51,9 +51,7 @@ def identity(s: Dut, requirement: str, name: str) -> str:
     """Device name (1008h) and product code (1018h sub 2) against a requirement's limit; raises Failed."""
     saw, code = s.unit.node.read(Common.DEVICE_NAME), int(s.unit.node.read(Common.IDENTITY, 2))
     due = int(requirements()[requirement].limit("product_code"))
-    if (saw, code) != (name, due):
-        raise Failed(f"{saw}, {code:08X}h", f"{name}, {due:08X}h")
-    return f"{saw}, {code:08X}h"
+    return expect((saw, code) == (name, due), f"{saw}, {code:08X}h", f"{name}, {due:08X}h")
 
 
 def _default(o: Described) -> bytes | None:

@@ -17,7 +17,7 @@ from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.can_host import Message
 
 UPLOAD, EXPEDITED, ABORT, FINE = 0x40, 0x23, 0x80, 0x60
@@ -127,8 +127,7 @@ class Talk:
         answer = self._after(at, self.sdo_tx, timeout_s)
         if answer is None:
             raise Failed(f"no answer to the SDO request {words(request)}", "an answer")
-        if len(answer.data) != 8:
-            raise Failed(f"an SDO answer of {len(answer.data)} bytes", "8 bytes", frames=[answer])
+        expect(len(answer.data) == 8, f"an SDO answer of {len(answer.data)} bytes", "8 bytes", frames=[answer])
         return answer
 
     def ask(self, request: bytes) -> bytes:
@@ -144,8 +143,7 @@ class Talk:
         """Raises Failed unless it is rejected with this code, in an answer that names its object."""
         answer = self.answer_to(request)
         due = bytes([ABORT]) + request[1:4] + int(code).to_bytes(4, "little")
-        if answer.data != due:
-            raise Failed(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
+        expect(answer.data == due, f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
 
     def upload(self, index: int, sub: int = 0) -> bytes:
         """Value of an object, expedited or in segments. Raises Failed."""

@@ -9,7 +9,7 @@ from typing import Any
 from psabench.conform.bus_host import line, line_refused, port
 from psabench.conform.dut import Dut
 from psabench.conform.profile import proto_yaml
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import expect
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)
 ADDRESSES = 16
@@ -29,8 +29,7 @@ def names_and_rights(s: Dut, board: str, *, never: Mapping[str, int], writes: Ma
     rows = table(board)
     who = port(s).who()
     due = {k: str(row["name"]) for k, row in enumerate(rows)}
-    if dict(who.names) != due:
-        raise Failed(f"names {dict(who.names)}", f"{due}")
+    expect(dict(who.names) == due, f"names {dict(who.names)}", f"{due}")
     for address, row in enumerate(rows):
         _rights(s, address, row, never, writes)
     for address in (*range(len(rows), ADDRESSES), 0x20):

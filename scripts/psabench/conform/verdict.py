@@ -1,8 +1,8 @@
 """What a test came to, and how a test says so.
 
 A test returns in words what it saw. It raises `Failed` where that is not what was due, `Inconclusive` where what it got
-does not suffice to say either, and `Unseen` where there is nothing to look at. Only `decide` turns this into a verdict:
-for a board, a recording and a host.
+does not suffice to say either, and `Unseen` where there is nothing to look at; `expect` and `conclusive` raise the
+first two where a condition does not hold. Only `decide` turns this into a verdict: for a board, a recording and a host.
 """
 
 from __future__ import annotations
@@ -52,6 +52,27 @@ class Inconclusive(Exception):
 
 class Unseen(Exception):
     """Not observable in what was captured: the words say why."""
+
+
+def expect(
+    met: object,
+    saw: str,
+    due: str,
+    *,
+    at_ns: float | None = None,
+    lines: Sequence[str] = (),
+    frames: Sequence[CanFrame] = (),
+) -> str:
+    """Raises Failed with these words unless it is met; returns what was seen."""
+    if not met:
+        raise Failed(saw, due, at_ns=at_ns, lines=lines, frames=frames)
+    return saw
+
+
+def conclusive(enough: object, why: str) -> None:
+    """Raises Inconclusive unless there is enough to look at."""
+    if not enough:
+        raise Inconclusive(why)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

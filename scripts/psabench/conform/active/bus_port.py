@@ -10,7 +10,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import ABORT, Talk, dialogue, read, words
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 
 DONE = re.compile(r"([RW]) ([0-9A-F]{2})h ([0-9A-F]{4}) t=(0|[1-9][0-9]*)")
 REFUSED = re.compile(r"E ([a-z-]+) ([RW?-]) ([0-9A-F]{2}h|-) t=(0|[1-9][0-9]*)")
@@ -59,8 +59,7 @@ def each_line_has_its_answer_in_turn(s: Dut) -> str:
         if not answer.startswith(kinds[line]):
             raise Failed(f"{answer!r} to {line!r}", f"{kinds[line]}...")
         times.append(_time_ns(answer))
-    if times != sorted(times):
-        raise Failed("times that fall", "times in the order of the lines")
+    expect(times == sorted(times), "times that fall", "times in the order of the lines")
     return f"{MANY} lines, {MANY} answers in their order"
 
 
@@ -85,9 +84,7 @@ def a_write_cycle_and_its_answer(s: Dut) -> str:
     address, word = harmless(s)
     answer = say(s, f"W {address:X} {word:X}")[0]
     found, _ = _cycle(answer, "W", address)
-    if found != word:
-        raise Failed(answer, f"the word {word:04X}")
-    return answer
+    return expect(found == word, answer, f"the word {word:04X}")
 
 
 @active("BUS-PORT-04", needs={"bus"})
@@ -128,9 +125,7 @@ def it_says_who_is_there(s: Dut) -> str:
         raise Failed(repr(answer), "I BOARD AAh=NAME ... t=NS")
     found = {int(pair.split("h=")[0], 16): pair.split("h=")[1] for pair in m[2].split()}
     due = {address: name for name, (address, _) in registers(s).items()}
-    if m[1] != s.variant.family or found != due:
-        raise Failed(answer, f"{s.variant.family} and {due}")
-    return answer
+    return expect(m[1] == s.variant.family and found == due, answer, f"{s.variant.family} and {due}")
 
 
 @active("BUS-PORT-06", needs={"bus"})
@@ -213,8 +208,7 @@ def the_port_reads_what_can_reads(t: Talk) -> str:
     for name, (address, access) in registers(t.s).items():
         if access != "wo" and _read_alike(t, address):
             same.append(name)
-    if not same:
-        raise Inconclusive("no register stood still between two reads")
+    conclusive(same, "no register stood still between two reads")
     return f"{', '.join(same)}: the same"
 
 

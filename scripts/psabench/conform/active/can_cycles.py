@@ -9,7 +9,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import ABORT, Nmt, Talk, dialogue, read, words, write
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 
 DONE, REFUSED = "Bus cycles", "Bus cycles refused"
 LONG_NS, LONGEST_NS = 10_000_000, 100_000_000
@@ -125,8 +125,7 @@ def refusals_have_their_codes(t: Talk, row: Requirement) -> str:
         t.refused(request, row.limit(code), f"cycle {words(request[:4])}")
         if t.counter(REFUSED) - before != 1:
             raise Failed(f"{t.counter(REFUSED) - before} refused cycles counted after one", "1")
-        if not t.upload(REFUSAL):
-            raise Failed("2031h is empty after a refused cycle", "why")
+        expect(t.upload(REFUSAL), "2031h is empty after a refused cycle", "why")
     return f"{len(wrong)} kinds of refusal, each with its code, counted and explained"
 
 
@@ -147,8 +146,7 @@ def a_short_strobe_is_refused(t: Talk, row: Requirement) -> str:
     done = t.counter(DONE)
     _strobe(t, least - 1)
     t.refused(_read(quiet(t.s)), code, f"a strobe of {least - 1} ns")
-    if t.counter(DONE) != done:
-        raise Failed("a cycle was carried out", "none")
+    expect(t.counter(DONE) == done, "a cycle was carried out", "none")
     _strobe(t, least)
     t.upload(BUS, quiet(t.s) + 1)
     return f"{least - 1} ns refused, {least} ns taken"
@@ -177,8 +175,7 @@ def a_second_cycle_is_refused(t: Talk, row: Requirement) -> str:
     answer = say(t.s, f"R {address:X}")[0]
     if any(f.can_id == t.sdo_tx for f in t.heard[at:]):
         raise Inconclusive("the long cycle was over before the other one began")
-    if not answer.startswith("E busy R"):
-        raise Failed(answer, "E busy")
+    expect(answer.startswith("E busy R"), answer, "E busy")
     t.until(lambda: any(f.can_id == t.sdo_tx for f in t.heard[at:]))
     _strobe(t, 0)
     found = _while_the_port_is_busy(t, address)
@@ -206,8 +203,7 @@ def a_reset_cuts_a_cycle(t: Talk) -> str:
     t.s.run_for(SOON_S)
     t.reset(Nmt.RESET)
     answer = tell(t.s)
-    if not answer.startswith(f"E off R {address:02X}h"):
-        raise Failed(answer, f"E off R {address:02X}h")
+    expect(answer.startswith(f"E off R {address:02X}h"), answer, f"E off R {address:02X}h")
     t.s.wait_ready()
     t.upload(BUS, address + 1)
     return f"{answer}; cycles go on"
@@ -255,8 +251,7 @@ def cycles_are_counted(t: Talk) -> str:
     for _ in range(3):
         t.download(BUS, where + 1, word.to_bytes(2, "little"))
     counted = t.counter(DONE) - before
-    if counted != 8:
-        raise Failed(f"{counted} cycles counted after 8", "8")
+    expect(counted == 8, f"{counted} cycles counted after 8", "8")
     return "8 of 8"
 
 

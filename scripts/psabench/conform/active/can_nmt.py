@@ -10,7 +10,7 @@ from psabench.boards.registry import BOARDS
 from psabench.conform.dut import Dut
 from psabench.conform.raw_can import Nmt, State, Talk, dialogue, ids, read, segment, write
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 
 BEAT_MS, NEW_BEAT_MS = 20, 100
 SETTLE_S = 0.05  # in which a PDO would come, were there one
@@ -18,20 +18,17 @@ REQUESTS = 5
 
 
 def _is(state: int, due: int, what: str) -> None:
-    if state != due:
-        raise Failed(f"state {state:02X}h {what}", f"{due:02X}h")
+    expect(state == due, f"state {state:02X}h {what}", f"{due:02X}h")
 
 
 def _obeyed(t: Talk, state: int, what: str) -> None:
-    if not t.becomes(state):
-        raise Failed(f"no heartbeat with state {state:02X}h {what}", f"state {state:02X}h")
+    expect(t.becomes(state), f"no heartbeat with state {state:02X}h {what}", f"state {state:02X}h")
 
 
 def _no_pdo(t: Talk, dwell_s: float, what: str) -> None:
     known = set(t.pdos.values())
     came = [f for f in t.during(dwell_s) if f.can_id in known]
-    if came:
-        raise Failed(f"{len(came)} PDOs {what}: {ids(came)}", "none", frames=came)
+    expect(not came, f"{len(came)} PDOs {what}: {ids(came)}", "none", frames=came)
 
 
 @dialogue("BUS-ID-02")
@@ -40,8 +37,7 @@ def it_listens_at_the_identifiers_of_its_node(t: Talk) -> str:
     before = t.counter("SYNCs")
     t.send(t.sync_id, b"")
     syncs = t.counter("SYNCs") - before
-    if syncs != 1:
-        raise Failed(f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
+    expect(syncs == 1, f"{syncs} SYNCs counted after one at {t.sync_id:03X}h", "1")
     t.beat(BEAT_MS)
     t.nmt(Nmt.START)
     _obeyed(t, State.OPERATIONAL, f"after a start at {t.nmt_id:03X}h")
@@ -57,11 +53,9 @@ def requests_to_another_node_stay_unanswered(t: Talk) -> str:
     nodes = {1, 120, 127, *(t.s.node ^ 1 << bit for bit in range(7))} - {0, t.s.node}  # neighbours differ in one bit
     others = [t.sdo_rx - t.s.node + n for n in sorted(nodes)]
     came = [f for f in t.after(*((other, read(Common.DEVICE_TYPE)) for other in others)) if f.can_id == t.sdo_tx]
-    if came:
-        raise Failed(f"{len(came)} answers to requests to other nodes", "none", frames=came)
+    expect(not came, f"{len(came)} answers to requests to other nodes", "none", frames=came)
     moved = [t.counter(c) for c in ("Malformed requests", "Requests refused")]
-    if moved != before:
-        raise Failed(f"counters {before} became {moved}", "no change")
+    expect(moved == before, f"counters {before} became {moved}", "no change")
     return f"silence after requests at {', '.join(f'{i:03X}h' for i in others)}"
 
 
@@ -72,8 +66,7 @@ def remote_frames_stay_unanswered(t: Talk) -> str:
     t.beat(0)
     came = [f for f in t.after(*((i, b"") for i in asked), remote=True) if f.can_id in asked and not f.remote]
     t.beat(1000)
-    if came:
-        raise Failed(f"frames {ids(came)} after remote frames", "none", frames=came)
+    expect(not came, f"frames {ids(came)} after remote frames", "none", frames=came)
     return f"no answer to remote frames {', '.join(f'{i:03X}h' for i in asked)}"
 
 
@@ -114,8 +107,7 @@ def boot_up_is_the_first_frame_after_power(t: Talk, row: Requirement) -> str:
         )
     t.fence()
     boots = [f for f in t.heard[at:] if f.can_id == t.heartbeat and f.data == bytes([State.BOOT_UP])]
-    if len(boots) != 1:
-        raise Failed(f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
+    expect(len(boots) == 1, f"{len(boots)} boot-up messages after power-on", "one", frames=boots)
     return "one boot-up message, before anything else"
 
 
@@ -225,8 +217,7 @@ def reset_communication_leaves_the_board_alone(t: Talk, row: Requirement) -> str
     for (index, sub), written in own.items():
         if t.upload(index, sub) != written:
             raise Failed(f"{index:04X}h:{sub} is {t.number(index, sub)} after NMT 82h", "what was written")
-    if t.number(Common.COUNTERS, 1) < count:
-        raise Failed("the count of readings fell with NMT 82h", "that it goes on")
+    expect(t.number(Common.COUNTERS, 1) >= count, "the count of readings fell with NMT 82h", "that it goes on")
     kept = ", ".join(f"{index:04X}h:{sub} has what was written" for index, sub in own) or "the board has no settings"
     return f"{len(_settings(t))} communication parameters have their defaults, {kept}"
 
@@ -288,8 +279,7 @@ def stopped_it_only_beats(t: Talk) -> str:
     if came or answers:
         raise Failed(f"stopped, and it sent {ids([*came, *answers])}", "heartbeats alone", frames=[*came, *answers])
     counted = t.counter("SYNCs") - syncs
-    if counted:
-        raise Failed(f"{counted} SYNCs counted while stopped", "none")
+    expect(not counted, f"{counted} SYNCs counted while stopped", "none")
     return "heartbeats alone; no SYNC counted"
 
 
@@ -323,8 +313,7 @@ def no_heartbeat_where_the_period_is_0(t: Talk, row: Requirement) -> str:
     """1017h = 0, then look for heartbeats."""
     t.beat(0)
     came = [f for f in t.during(row.limit("quiet_s")) if f.can_id == t.heartbeat]
-    if came:
-        raise Failed(f"{len(came)} heartbeats with 1017h = 0", "none", frames=came)
+    expect(not came, f"{len(came)} heartbeats with 1017h = 0", "none", frames=came)
     return f"none in {row.limit('quiet_s'):g} s"
 
 
@@ -336,8 +325,7 @@ def a_new_period_holds_at_once(t: Talk, row: Requirement) -> str:
     written = t.answer_to(write(Common.HEARTBEAT_MS, 0, NEW_BEAT_MS.to_bytes(2, "little")))
     beats = [t.next(t.heartbeat), t.next(t.heartbeat)]
     came = [written, *(b for b in beats if b is not None)]
-    if len(came) < 3:
-        raise Failed(f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
+    expect(len(came) >= 3, f"{len(came) - 1} heartbeats with a period of {NEW_BEAT_MS} ms", "one in each")
     for a, b in itertools.pairwise(came):
         off_s = b.t_s - a.t_s - period_s
         if abs(off_s) > late_s + t.s.slack_s(period_s):

@@ -9,7 +9,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import LEAST, Nmt, Talk, dialogue, read, talk, words
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.canopen_host import Described
 from psabench.link.protocol_files import message
 
@@ -74,8 +74,7 @@ def device_type(t: Talk, row: Requirement) -> str:
     """Upload 1000h."""
     due = int(row.limit("device_type"))
     found = t.upload(Common.DEVICE_TYPE)
-    if found != due.to_bytes(4, "little"):
-        raise Failed(words(found), f"{due:X}h in 4 bytes")
+    expect(found == due.to_bytes(4, "little"), words(found), f"{due:X}h in 4 bytes")
     return f"{due:X}h"
 
 
@@ -85,8 +84,7 @@ def serial_number(t: Talk) -> str:
     before = t.upload(Common.IDENTITY, SERIAL)
     t.reset()
     after = t.upload(Common.IDENTITY, SERIAL)
-    if before != after or len(before) != 4:
-        raise Failed(f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
+    expect(before == after and len(before) == 4, f"{words(before)}, after a reset {words(after)}", "the same 4 bytes")
     return f"serial number {int.from_bytes(before, 'little')}"
 
 
@@ -102,8 +100,7 @@ def constants_name_the_node(t: Talk) -> str:
     due |= {(Common.TPDO + k - 1, 1): can_id for k, can_id in t.pdos.items()}
     for (index, sub), can_id in due.items():
         found = t.number(index, sub) & 0x7FF
-        if found != can_id:
-            raise Failed(f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
+        expect(found == can_id, f"{index:04X}h:{sub} names {found:03X}h", f"{can_id:03X}h")
     t.s.wait_ready()
     for can_id in t.pdos.values():
         t.stream(1, can_id)
@@ -117,8 +114,7 @@ def the_remark_outlives_a_reset(t: Talk) -> str:
     t.reset()
     found = t.upload(Common.REMARK)
     put(t, Common.REMARK, b"")
-    if found != b"kept over Res":
-        raise Failed(f"{found!r} after a reset", "what was written")
+    expect(found == b"kept over Res", f"{found!r} after a reset", "what was written")
     return "kept"
 
 
@@ -128,8 +124,7 @@ def the_remark_goes_with_the_power(t: Talk) -> str:
     put(t, Common.REMARK, b"gone with the power")
     power_cycle(t)
     found = t.upload(Common.REMARK)
-    if found:
-        raise Failed(f"{found!r} after power-on", "nothing")
+    expect(not found, f"{found!r} after power-on", "nothing")
     return "forgotten"
 
 
@@ -178,8 +173,7 @@ def _bounds(name: str, entries: list[int]) -> None:
     at = 0
     for entry in entries:
         inside = [x for x in spans if at in x and at != x.start]
-        if inside:
-            raise Failed(f"{name} maps {entry >> 16:04X}h at bit {at}", "at the begin of a signal")
+        expect(not inside, f"{name} maps {entry >> 16:04X}h at bit {at}", "at the begin of a signal")
         at += entry & 0xFF
 
 
@@ -200,8 +194,7 @@ def mapped_objects_read_as_the_frames(t: Talk) -> str:
             at += entry & 0xFF
             compared += 1
         t.hush()
-    if not compared:
-        raise Inconclusive("no PDO with a mapping")
+    conclusive(compared, "no PDO with a mapping")
     return f"{compared} mapped objects are what the frames carried"
 
 
@@ -245,8 +238,7 @@ def errors_on_the_wire_read_0(t: Talk, row: Requirement) -> str:
     """Upload the error counters of the CAN controller."""
     due = int(row.limit("count"))
     found = {name: t.counter(name) for name in ERRORS_OF_CAN}
-    if any(v != due for v in found.values()):
-        raise Failed(f"{found}", f"{due}")
+    expect(not any(v != due for v in found.values()), f"{found}", f"{due}")
     return f"{', '.join(found)} are {due}"
 
 

@@ -13,7 +13,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 
 READINGS, TIMEOUT_S = 1, 5.0  # sub-index of 2030h
 FEW = 4  # readings in which something should come, or nothing
@@ -66,8 +66,7 @@ def syncs_are_counted(t: Talk) -> str:
     for data in (b"", b"\0", b"\7", b"\xff"):
         t.send(t.sync_id, data)
     counted = t.counter("SYNCs") - before
-    if counted != 4:
-        raise Failed(f"{counted} of 4 SYNCs counted", "4")
+    expect(counted == 4, f"{counted} of 4 SYNCs counted", "4")
     return "4 of 4 counted, whatever their counter"
 
 
@@ -95,8 +94,7 @@ def type_0_sends_new_readings_at_sync(t: Talk) -> str:
     t.fence()
     _silent(t, can_id)
     came = _sent_by(t, can_id, t.after((t.sync_id, b"")))
-    if came != 1:
-        raise Failed(f"{came} frames at a SYNC after a reading", "1")
+    expect(came == 1, f"{came} frames at a SYNC after a reading", "1")
     begin = t.number(Common.COUNTERS, READINGS)
     came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
     count = t.number(Common.COUNTERS, READINGS) - begin
@@ -115,8 +113,7 @@ def _silent(t: Talk, can_id: int) -> None:
     """Raises Failed for a frame while readings are made."""
     count, at, end = _readings(t, FEW)
     came = _sent(t, at, can_id, end)
-    if came:
-        raise Failed(f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
+    expect(not came, f"{len(came)} frames {can_id:03X}h in {count} readings", "none", frames=came)
 
 
 @dialogue("BUS-SYNC-04", needs={"can", "stream"}, reset=True)
@@ -130,8 +127,7 @@ def type_n_sends_at_every_nth_sync(t: Talk) -> str:
         came = 0
         for k in range(0, syncs, 30):
             came += _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * min(30, syncs - k)))
-        if came != syncs // n:
-            raise Failed(f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
+        expect(came == syncs // n, f"{came} frames at {syncs} SYNCs with type {n}", f"{syncs // n}")
         told.append(f"{n}: {came} of {syncs}")
     return "; ".join(told)
 
@@ -180,8 +176,7 @@ def the_identifier_of_a_tpdo(t: Talk, row: Requirement) -> str:
     at = len(t.heard)
     t.readings(FEW, FREE_ID)
     left = _sent(t, at, can_id)
-    if left:
-        raise Failed(f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
+    expect(not left, f"frames {can_id:03X}h after it became {FREE_ID:03X}h", "none", frames=left)
     return f"{can_id:03X}h became {FREE_ID:03X}h; services are refused, and any while it is valid"
 
 
@@ -249,8 +244,7 @@ def _overload(t: Talk) -> CanFrame:
         t.s.run_for(0.05)
         dwell_s *= 2.0
     told = _told(t, at, code)
-    if not told:
-        raise Inconclusive(f"no emergency {code:04X}h on a bus that others fill")
+    conclusive(told, f"no emergency {code:04X}h on a bus that others fill")
     t.hush()
     t.s.run_for(CALM_S)
     return told[0]

@@ -8,7 +8,7 @@ import struct
 from psabench.boards.objects import Absent, Area, BusObjects, Common, Psa2Objects
 from psabench.conform.raw_can import ABORT, FINE, UPLOAD, Talk, dialogue, long_write, read, segment, words, write
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 from psabench.link.canopen_host import Described
 
 NOWHERE = Area.PROFILE - 1
@@ -56,9 +56,7 @@ def a_write_is_confirmed(t: Talk, row: Requirement) -> str:
     request = write(Common.HEARTBEAT_MS, 0, t.upload(Common.HEARTBEAT_MS)[:2].ljust(2, b"\0"))
     answer = t.ask(request)
     due = bytes([code]) + request[1:4]
-    if answer[:4] != due:
-        raise Failed(words(answer), words(due))
-    return words(answer)
+    return expect(answer[:4] == due, words(answer), words(due))
 
 
 @dialogue("BUS-SDO-03")
@@ -124,8 +122,7 @@ def _aborted(t: Talk, request: bytes, code: float, what: str, index: int) -> Non
     """As Talk.refused, of a segment, which does not name its object."""
     answer = t.answer_to(request)
     due = bytes([ABORT]) + index.to_bytes(2, "little") + b"\0" + int(code).to_bytes(4, "little")
-    if answer.data != due:
-        raise Failed(f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
+    expect(answer.data == due, f"{what} was answered by {words(answer.data)}", words(due), frames=[answer])
 
 
 @dialogue("BUS-SDO-06", needs={"can", "stamps"})
@@ -234,8 +231,7 @@ def the_wrong_length_is_refused(t: Talk, row: Requirement) -> str:
         (Common.TPDO, 3, 1, "short_code"),
     ):
         t.refused(write(index, sub, bytes([1] * n)), row.limit(code), f"{n} bytes to {index:04X}h:{sub}")
-    if t.upload(Common.HEARTBEAT_MS) != before:
-        raise Failed("1017h has changed", "what it was")
+    expect(t.upload(Common.HEARTBEAT_MS) == before, "1017h has changed", "what it was")
     return "too long and too short are distinguished"
 
 
@@ -266,8 +262,7 @@ def limits_are_kept(t: Talk, row: Requirement) -> str:
             data = struct.pack("<f", beyond) if o.real else int(beyond).to_bytes(o.data_bytes or 1, "little")
             t.refused(write(o.index, o.sub, data), code, f"{beyond:g} to {o.index:04X}h:{o.sub}")
             tried += 1
-    if not tried:
-        raise Failed("no object with limits", "1003h at least")
+    expect(tried, "no object with limits", "1003h at least")
     return f"abort {int(code):08X}h to {tried} values outside"
 
 
@@ -305,8 +300,7 @@ def each_request_has_one_answer(t: Talk) -> str:
     for k in range(0, HUNDRED, 20):
         came = t.after(*((t.sdo_rx, request) for request in asked[k : k + 20]))
         answers += [f for f in came if f.can_id == t.sdo_tx]
-    if len(answers) != HUNDRED:
-        raise Failed(f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
+    expect(len(answers) == HUNDRED, f"{len(answers)} answers to {HUNDRED} requests", f"{HUNDRED}", frames=answers)
     for request, answer in zip(asked, answers, strict=True):
         if len(answer.data) != 8 or answer.data[1:4] != request[1:4]:
             raise Failed(f"{words(answer.data)} to {words(request)}", "its index and sub-index", frames=[answer])
@@ -326,8 +320,7 @@ def a_refusal_changes_nothing(t: Talk) -> str:
         before = t.upload(index, sub)
         if t.abort_of(write(index, sub, data)) is None:
             raise Failed(f"{words(data)} to {index:04X}h:{sub} is taken", "a refusal")
-        if t.upload(index, sub) != before:
-            raise Failed(f"{index:04X}h:{sub} has changed with a refused write", words(before))
+        expect(t.upload(index, sub) == before, f"{index:04X}h:{sub} has changed with a refused write", words(before))
     return "values stay, and the next request is served"
 
 
@@ -349,8 +342,7 @@ def refusals_are_counted(t: Talk) -> str:
         if t.abort_of(request) is None:
             raise Failed(f"{words(request)} is not refused", "an abort")
         counted = t.counter("Requests refused") - before
-        if counted != k:
-            raise Failed(f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
+        expect(counted == k, f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
     return f"{len(bad)} refusals, {len(bad)} counted"
 
 
@@ -381,8 +373,7 @@ def garbage_does_not_stop_it(t: Talk, row: Requirement) -> str:
             t.send(t.sdo_rx, _harmless(rng.randbytes(rng.randrange(9))))
         t.s.run_for(0.02)
     t.fence()
-    if t.ask(read(Common.DEVICE_TYPE))[0] & 0xE0 != UPLOAD:
-        raise Failed("no good answer after random frames", "one")
+    expect(t.ask(read(Common.DEVICE_TYPE))[0] & 0xE0 == UPLOAD, "no good answer after random frames", "one")
     return f"{count} random frames; answers go on"
 
 

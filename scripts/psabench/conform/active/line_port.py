@@ -12,7 +12,7 @@ from psabench.conform.plan import active
 from psabench.conform.probes import PortProbe
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.sources.samples import line_log
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.lineport import SAMPLE_HZ, open_line
 
 WORDS = 4
@@ -51,8 +51,7 @@ def lost_samples_are_marked(s: Dut, row: Requirement) -> str:
         while len(data) < SAMPLE_HZ * PAUSE_S:
             data += port.read(1 << 16)
     marks = int((np.frombuffer(data, np.uint8) & mask).astype(bool).sum())
-    if not marks:
-        raise Failed(f"no bit 7 in {len(data)} bytes after {PAUSE_S:g} s unread", "a mark after the hole")
+    expect(marks, f"no bit 7 in {len(data)} bytes after {PAUSE_S:g} s unread", "a mark after the hole")
     return f"{marks} marks in {len(data)} bytes"
 
 
@@ -78,8 +77,7 @@ def a_slow_reader_loses_nothing(s: Dut) -> str:
     reader.start()
     ready.wait(MOST_S)
     s.run_for(LOOK_S)
-    if not enough.wait(MOST_S):
-        raise Failed(f"{len(data)} samples of {LOOK_S:g} s", f"{least:.0f} and more")
+    expect(enough.wait(MOST_S), f"{len(data)} samples of {LOOK_S:g} s", f"{least:.0f} and more")
     lost = (np.frombuffer(bytes(data), np.uint8) & mask).astype(bool)
     if lost.any():
         raise Failed(f"{int(lost.sum())} holes", "none")

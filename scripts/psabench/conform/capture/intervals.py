@@ -9,15 +9,14 @@ import numpy.typing as npt
 
 from psabench.conform.capture.log import Bools, Capture
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive
 from psabench.link.signals import Ints
 
 
 def wires_needed(e: Capture, *names: str) -> None:
     """Raises Inconclusive for a line that the recording lacks."""
     for name in names:
-        if name not in e.wires:
-            raise Inconclusive(f"the recording has no line {name}")
+        conclusive(name in e.wires, f"the recording has no line {name}")
 
 
 def first_of(bad: Bools) -> int | None:
@@ -52,8 +51,7 @@ def interval(
     """
     known = e.wires.known(np.minimum(from_ns, to_ns), np.maximum(from_ns, to_ns))
     from_ns, to_ns = from_ns[known], to_ns[known]
-    if not len(from_ns):
-        raise Inconclusive(f"nothing to measure: {what}")
+    conclusive(len(from_ns), f"nothing to measure: {what}")
     took_ns = (to_ns - from_ns).astype(np.float64)
     slack_ns = tolerance_ns + e.slack_ns(due_ns)
     saw = [f"{t:.0f} ns {what}" for t in took_ns]
@@ -86,8 +84,7 @@ def after(edges_ns: Ints, at_ns: Ints) -> Ints:
 
 def together(e: Capture, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what: str, lines: Sequence[str]) -> str:
     """Each instant (n,) is one of these edges. Returns what was seen; raises Failed, Inconclusive."""
-    if not len(at_ns):
-        raise Inconclusive(f"nothing to compare: {what}")
+    conclusive(len(at_ns), f"nothing to compare: {what}")
     off_ns = np.abs(at_ns - nearest(edges_ns, at_ns))
     slack_ns = tolerance_ns + e.slack_ns(0.0)
     saw = [f"{min(int(t), 10**9)} ns between {what}" for t in off_ns]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from psabench.conform.capture.log import CanFrame, Capture
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.protocol_files import message
 
 EMCY_BYTES = 8
@@ -30,8 +30,7 @@ def as_laid_out(e: Capture, names: Sequence[str]) -> str:
     """Each message has its length, and 0 in the bits that no signal has. Returns what was seen."""
     for name in names:
         log, due, used = e.frames_of(name), int(message(name).length), 0
-        if not len(log):
-            raise Inconclusive(f"no {name} came")
+        conclusive(len(log), f"no {name} came")
         for s in message(name).signals:
             used |= ((1 << s.length) - 1) << s.start
         bad = [f for f in log.frames if len(f.data) != due or int.from_bytes(f.data, "little") & ~used]
@@ -49,8 +48,7 @@ def emergencies(e: Capture, name: str) -> list[tuple[int, float]]:
 def booted(e: Capture, heartbeat: str) -> CanFrame:
     """The latest boot-up message. Raises Inconclusive where none came."""
     log = [f for f in e.frames_of(heartbeat).frames if f.data == b"\0"]
-    if not log:
-        raise Inconclusive("no boot-up message came after Res")
+    conclusive(log, "no boot-up message came after Res")
     return log[-1]
 
 
@@ -61,6 +59,5 @@ def late_readings(e: Capture, heartbeat: str, name: str, first_s: float, period_
     """
     boot = booted(e, heartbeat)
     told = [f for f in e.frames_of(name).frames if f.t_s > boot.t_s]
-    if not told:
-        raise Inconclusive(f"no {name} came after the boot-up message")
+    conclusive(told, f"no {name} came after the boot-up message")
     return 0 if e.facts.get("prompt") else max(0, round((told[0].t_s - boot.t_s - first_s) / period_s))

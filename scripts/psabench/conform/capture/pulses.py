@@ -15,7 +15,7 @@ import numpy as np
 from psabench.conform.capture.intervals import edges
 from psabench.conform.capture.log import Capture, apart
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 
 LEAST = re.compile(r"(?P<line>\w+?)(_(?P<level>high|low))?_min_ns")
 LEVELS = {"high": (1,), "low": (0,), None: (0, 1)}
@@ -54,8 +54,7 @@ def none_is_too_short(e: Capture, row: Requirement) -> str:
                 raise Failed(saw, f"{least_ns:g} ns or longer", at_ns=int(begin[k]), lines=(wire,))
             count += len(begin)
             seen.add(wire)
-    if not count:
-        raise Inconclusive("no line moves in the recording")
+    conclusive(count, "no line moves in the recording")
     return f"{count} stays of {len(seen)} lines, none too short"
 
 
@@ -76,8 +75,7 @@ def all_move(e: Capture, row: Requirement, ending: str = "_edges") -> str:
 
 def bus_moves(e: Capture) -> str:
     """CS, and lines of the bus that a cycle has at 1, have edges. Raises Failed, Inconclusive."""
-    if not e.cycles:
-        raise Inconclusive("no cycle on the bus")
+    conclusive(e.cycles, "no cycle on the bus")
     words = {"AB": 0, "D": 0}
     for c in e.cycles:
         words["AB"] |= c.address
@@ -85,8 +83,7 @@ def bus_moves(e: Capture) -> str:
     due = ["CS", *(["RW"] if any(c.write for c in e.cycles) else [])]
     due += [f"{name}{k}" for name, word in words.items() for k in range(16) if word >> k & 1]
     for wire in due:
-        if wire not in e.wires:
-            raise Inconclusive(f"the recording has no line {wire}")
+        conclusive(wire in e.wires, f"the recording has no line {wire}")
         if not len(edges(e, wire)):
             level = int(e.wires[wire].level[0])
             raise Failed(f"{wire} always {level}", "a cycle moves it", at_ns=e.wires.start_ns, lines=(wire, "CS"))

@@ -15,7 +15,7 @@ from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.protocol_files import database, dbc_node, message
 from psabench.link.signals import unwrap
 
@@ -61,8 +61,7 @@ def _mine(e: Capture) -> tuple[CanFrame, ...]:
     """Frames that this unit sent: all of the log with an identifier of its own. Raises Inconclusive for none."""
     own = {_id(e, n) for n in ("emcy", "sdo_tx", "heartbeat")} | {i + e.node for i in pdos(e.variant.family).values()}
     found = tuple(f for f in e.can.frames if f.can_id in own and not f.error and not f.sent)
-    if not found:
-        raise Inconclusive("no frame of this node in the log")
+    conclusive(found, "no frame of this node in the log")
     return found
 
 
@@ -126,12 +125,10 @@ def state_0_is_said_once(e: Capture, row: Requirement) -> str:
     state = bytes([int(row.limit("state_code"))])
     beats = [f for f in _mine(e) if f.can_id == _id(e, "heartbeat")]
     boots = [f for f in beats if f.data == state]
-    if any(len(f.data) != 1 for f in beats):
-        raise Failed("a heartbeat of other than one byte", "one byte", frames=beats)
+    expect(not any(len(f.data) != 1 for f in beats), "a heartbeat of other than one byte", "one byte", frames=beats)
     if "reset" in e.marks and len(boots) != 1:
         raise Failed(f"{len(boots)} boot-up messages after a reset", "one", frames=beats)
-    if not boots:
-        raise Inconclusive("no boot-up in the log")
+    conclusive(boots, "no boot-up in the log")
     return f"{len(boots)} boot-up messages of one byte"
 
 
@@ -148,8 +145,7 @@ def heartbeats_keep_their_period(e: Capture, row: Requirement) -> str:
     t_s = np.array([f.t_s for f in beats])
     keep = np.array([f.data != b"\0" for f in beats[1:]], bool)  # from one to a boot-up there is no period
     apart_s = np.diff(t_s)[keep] if len(t_s) > 1 else t_s[:0]
-    if len(apart_s) < 2:
-        raise Inconclusive(f"{len(apart_s)} intervals between heartbeats; expected 2")
+    conclusive(len(apart_s) >= 2, f"{len(apart_s)} intervals between heartbeats; expected 2")
     off_s = np.abs(apart_s - due_s)
     if off_s.max() > late_s + due_s * e.clock_ppm * PPM:
         worst = float(apart_s[off_s.argmax()])
@@ -172,8 +168,7 @@ def requests_and_answers_take_turns(e: Capture) -> str:
             if waiting:
                 _belongs(waiting.pop(0), f)
                 answered += 1
-    if len(waiting) > 1:
-        raise Failed(f"{len(waiting)} requests without an answer", "one each", frames=waiting)
+    expect(len(waiting) <= 1, f"{len(waiting)} requests without an answer", "one each", frames=waiting)
     if answered < 2:
         raise Inconclusive(f"{answered} SDO requests with their answers in the log")
     return f"{answered} requests, each with its answer"
@@ -192,11 +187,9 @@ def _belongs(request: CanFrame, answer: CanFrame) -> None:
 def _told(e: Capture) -> list[CanFrame]:
     """Raises Inconclusive where the log has none, Failed for one of another length."""
     told = list(e.can.of_id(_id(e, "emcy")).frames)
-    if not told:
-        raise Inconclusive("no emergency in the log")
+    conclusive(told, "no emergency in the log")
     size = int(row_for(e, "BUS-EMCY-01").limit("data_bytes"))
-    if any(len(f.data) != size for f in told):
-        raise Failed("an emergency of other than 8 bytes", "8 bytes", frames=told)
+    expect(not any(len(f.data) != size for f in told), "an emergency of other than 8 bytes", "8 bytes", frames=told)
     return told
 
 
@@ -220,8 +213,7 @@ def emergencies_have_their_form(e: Capture) -> str:
                 f"error register {f.data[2]:02X}h with code {code_of(f):04X}h", "0 with 0000h only", frames=[f]
             )
     times = [stamp_s(e, f) for f in told]
-    if any(b < a for a, b in itertools.pairwise(times)):
-        raise Failed(f"times {times}", "that they rise", frames=told)
+    expect(not any(b < a for a, b in itertools.pairwise(times)), f"times {times}", "that they rise", frames=told)
     t_s = [f.t_s - t for f, t in zip(told, times, strict=True)]
     return f"{len(told)} emergencies, {max(t_s) - min(t_s):.3f} s between their times and those of the log"
 
@@ -233,8 +225,7 @@ def a_condition_is_told_once(e: Capture) -> str:
     told = _told(e)
     for f in told:
         code = code_of(f)
-        if code in lasting:
-            raise Failed(f"{code:04X}h a second time before 0000h", "once", frames=told)
+        expect(code not in lasting, f"{code:04X}h a second time before 0000h", "once", frames=told)
         lasting = set() if code == 0 else lasting | {code}
     return f"{', '.join(f'{code_of(f):04X}h' for f in told)}"
 
@@ -247,8 +238,7 @@ def the_end_is_told_once(e: Capture, row: Requirement) -> str:
     ends = [k for k, f in enumerate(told) if code_of(f) == due]
     if any(k == 0 or code_of(told[k - 1]) == due for k in ends):
         raise Failed("0000h without a condition before it", "once, after the last one has ended", frames=told)
-    if any(any(told[k].data[2:3]) for k in ends):
-        raise Failed("0000h with an error register", "00h", frames=told)
+    expect(not any(any(told[k].data[2:3]) for k in ends), "0000h with an error register", "00h", frames=told)
     if not ends:
         raise (Failed("no 0000h", "one", frames=told) if "flood" in e.marks else Inconclusive("no condition has ended"))
     return f"{len(ends)} times 0000h, register 00h"
@@ -281,8 +271,7 @@ def _any(bits: Any) -> int:
 @check("overload", "BUS-EMCY-06", needs={"can", "stream"})
 def lost_samples_are_told(e: Capture, row: Requirement) -> str:
     """Compare what is missing in the numbers of the readings with the counter, and the emergencies with both."""
-    if "dropped" not in e.facts:
-        raise Inconclusive("the counter was not read")
+    conclusive("dropped" in e.facts, "the counter was not read")
     missing = int((np.diff(_numbers(e)) - 1).sum())
     if missing != e.facts["dropped"]:
         raise Failed(f"{missing} readings missing, {e.facts['dropped']} counted as dropped", "the same")
@@ -305,8 +294,7 @@ def _numbers(e: Capture) -> np.ndarray:
     counter = "SEQ" if family == "psa2" else of_board(family).layout.counter
     name = next(n for n in pdos(family) if counter in message(n).signal_tree)
     frames = e.frames_of(name)
-    if len(frames) < 2:
-        raise Inconclusive(f"{len(frames)} frames {name} in the log")
+    conclusive(len(frames) >= 2, f"{len(frames)} frames {name} in the log")
     try:
         raw = frames.raw(name)[counter]
     except ValueError as err:
@@ -320,20 +308,17 @@ def frames_of_a_sample_keep_their_order(e: Capture) -> str:
     order = [i + e.node for i in pdos(e.variant.family).values()]
     came = [f for f in e.can.frames if f.can_id in order and not f.error and not f.sent]
     used = [i for i in order if any(f.can_id == i for f in came)]
-    if len(came) < 2 * len(used) or not came:
-        raise Inconclusive(f"{len(came)} PDOs in the log")
+    conclusive(len(came) >= 2 * len(used) and came, f"{len(came)} PDOs in the log")
     for a, b in itertools.pairwise(came):
         due = used[(used.index(a.can_id) + 1) % len(used)]
-        if b.can_id != due:
-            raise Failed(f"{b.can_id:03X}h after {a.can_id:03X}h", f"{due:03X}h", frames=[a, b])
+        expect(b.can_id == due, f"{b.can_id:03X}h after {a.can_id:03X}h", f"{due:03X}h", frames=[a, b])
     return f"{len(came)} frames in the order {', '.join(f'{i:03X}h' for i in used)}"
 
 
 @check("overload", "BUS-LOAD-02", needs={"can", "lockstep", "stream"})
 def no_more_than_its_queue_waits(e: Capture, row: Requirement) -> str:
     """Count the readings that were kept when the bus was filled: those that come before the gap in the numbers."""
-    if "flood" not in e.marks:
-        raise Inconclusive("no node filled the bus")
+    conclusive("flood" in e.marks, "no node filled the bus")
     most = int(row.limit("queue_frames"))
     order = {i + e.node for i in pdos(e.variant.family).values()}
     at = int(e.marks["flood"])
@@ -341,8 +326,7 @@ def no_more_than_its_queue_waits(e: Capture, row: Requirement) -> str:
     before = len([f for f in e.can.frames[:at] if f.can_id in order and not f.error and not f.sent]) // max(1, used)
     numbers = _numbers(e)
     gaps = np.flatnonzero(np.diff(numbers) > 1)
-    if not len(gaps):
-        raise Inconclusive("no reading was lost")
+    conclusive(len(gaps), "no reading was lost")
     kept = int(gaps[gaps >= before - 1][0]) + 1 - before if (gaps >= before - 1).any() else 0
     if kept > most // used + 1:
         raise Failed(f"{kept} readings of {used} frames waited", f"{most} frames at most, and one under way")
@@ -368,8 +352,7 @@ def error_passive_is_told(e: Capture, row: Requirement) -> str:
     first = [f for f in e.can.frames[: e.can.frames.index(begin)] if f.error]
     if len(first) < PASSIVE_ERRORS:
         raise Failed(f"{code:04X}h after {len(first)} error frames", f"{PASSIVE_ERRORS} and more", frames=[begin])
-    if not any(code_of(f) == 0 for f in told[told.index(begin) :]):
-        raise Failed(f"no 0000h after {code:04X}h", "one", frames=told)
+    expect(any(code_of(f) == 0 for f in told[told.index(begin) :]), f"no 0000h after {code:04X}h", "one", frames=told)
     return f"{code:04X}h after {len(first)} error frames, and 0000h"
 
 
@@ -389,8 +372,7 @@ def coming_back_to_the_bus_is_told(e: Capture) -> str:
     if away_bits < least:
         raise Failed(f"back after {away_bits:.0f} bits", f"{least} and more", frames=[last, back])
     after = told[told.index(back) + 1 :]
-    if not after or code_of(after[0]) != 0:
-        raise Failed(f"no 0000h right after {code:04X}h", "one", frames=told)
+    expect(after and code_of(after[0]) == 0, f"no 0000h right after {code:04X}h", "one", frames=told)
     return f"back after {away_bits:.0f} bits; {code:04X}h, then 0000h"
 
 

@@ -11,7 +11,7 @@ from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.sources.samples import PORT_LINES
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Ints
 
 NS = 1e9
@@ -48,12 +48,9 @@ def bits_of_a_psa2(e: Capture, row: Requirement) -> str:
     rises = _edges(clk, 1)
     for a, b in zip(begin, end, strict=False):
         count = int(np.searchsorted(rises, b) - np.searchsorted(rises, a))
-        if count != bits:
-            raise Failed(f"{count} rises of bit 2 while bit 0 is low", f"{bits}")
-    if min(len(begin), len(end)) < 2:
-        raise Failed(f"{len(begin)} falls of bit 0", "frames")
-    if not 0 < data.sum() < len(x):
-        raise Failed("bit 1 never changes", "data")
+        expect(count == bits, f"{count} rises of bit 2 while bit 0 is low", f"{bits}")
+    expect(min(len(begin), len(end)) >= 2, f"{len(begin)} falls of bit 0", "frames")
+    expect(0 < data.sum() < len(x), "bit 1 never changes", "data")
     return f"{min(len(begin), len(end))} frames of {bits} bits"
 
 
@@ -72,8 +69,7 @@ def _t0_ns(e: Capture) -> float:
     step_ns = NS / row_for(e, "LINE-RATE-01").limit("sample_hz")
     names = [n for n in PORT_LINES[e.variant.family] if n in pins]
     busy = max(names, key=lambda n: len(port[n].t_ns), default="")
-    if not busy or len(port[busy].t_ns) < 3:
-        raise Inconclusive("no line of the port moved")
+    conclusive(busy and len(port[busy].t_ns) >= 3, "no line of the port moved")
     seen, there = port[busy].t_ns[1:], pins[busy].t_ns[1:]
     for first in there[: max(1, len(there) - len(seen) + 1)]:
         t0_ns = np.ceil((first - seen[0]) / step_ns) * step_ns
@@ -109,8 +105,7 @@ def samples_come_at_their_rate(e: Capture, row: Requirement) -> str:
     name = max(PORT_LINES[e.variant.family], key=lambda n: len(_port(e)[n].t_ns))
     port, pin = _port(e)[name].t_ns[1:], e.wires[name].t_ns[1:]
     at = np.searchsorted(pin, port[[0, -1]] + t0_ns, "right") - 1 if len(port) > 1 else np.array([-1])
-    if (at < 0).any():
-        raise Inconclusive("fewer than two edges")
+    conclusive(not (at < 0).any(), "fewer than two edges")
     samples = (port[-1] - port[0]) * rate_hz / NS
     took_s = (pin[at[1]] - pin[at[0]]) / NS
     if abs(samples - took_s * rate_hz) > row.limit("tolerance_samples"):

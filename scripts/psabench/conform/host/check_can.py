@@ -10,7 +10,7 @@ from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
 from psabench.conform.host.check import HostCapture, checks, enough, limits
-from psabench.conform.verdict import Failed, Unseen
+from psabench.conform.verdict import Failed, Unseen, expect
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd
@@ -136,8 +136,7 @@ def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
 @checks("HOST-SETUP-03", "power_on")
 def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
     """The order of the host's requests and of its NMT start."""
-    if not e.bus.starts:
-        raise Failed("no NMT start", "one, after identity and registers have been read")
+    expect(e.bus.starts, "no NMT start", "one, after identity and registers have been read")
     start_s = e.bus.starts[0]
     _all_are_read(e, before_s=start_s)
     if not any(_answered(e, index, None, start_s) for index in IDENTITY):
@@ -190,10 +189,8 @@ def _all_are_read(e: HostCapture, before_s: float = float("inf")) -> None:
 @checks("HOST-SETUP-01", "setup_order", "config0_x", "config0_z")
 def a_wrong_set_up_is_told(e: HostCapture) -> str:
     """The set-up was carried out backwards, or a bit of CONFIG0 is wrong, in one converter alone."""
-    if not e.told.of("wrong_setup"):
-        raise Failed("the set-up was taken for the article's", '{"wrong_setup": ...}')
-    if e.told.samples:
-        raise Failed(f"{len(e.told.samples)} samples told all the same", "none")
+    expect(e.told.of("wrong_setup"), "the set-up was taken for the article's", '{"wrong_setup": ...}')
+    expect(not e.told.samples, f"{len(e.told.samples)} samples told all the same", "none")
     return f"wrong set-up: {e.told.of('wrong_setup')[0]}"
 
 
@@ -353,8 +350,7 @@ def silence_is_told_and_its_end(e: HostCapture) -> str:
 def codes_that_stand_still_are_told(e: HostCapture) -> str:
     """The controller sends the same codes for two seconds."""
     e.samples()
-    if e.told.of("frozen")[:1] != [True]:
-        raise Failed("codes that stood still for 2 s were taken for data", '{"frozen": true}')
+    expect(e.told.of("frozen")[:1] == [True], "codes that stood still for 2 s were taken for data", '{"frozen": true}')
     if e.told.of("frozen") != [True, False]:
         raise Failed(f"frozen {e.told.of('frozen')}", "frozen, and its end")
     first = next(
@@ -408,8 +404,7 @@ def a_unit_without_heartbeat_is_gone(e: HostCapture) -> str:
 def a_missing_toggle_is_a_lost_frame(e: HostCapture) -> str:
     """Frame form 1, which the host asks for: three frames do not come, each told by TOG alone."""
     words = [number(f.data) for f in e.bus.frames if f.can_id == FAST + e.bus.node and len(f.data) == 8]
-    if not e.streamed or not words:
-        raise Failed(f"no frame of form 1{e.last_words()}", "2020h = 1, then NMT start")
+    expect(e.streamed and words, f"no frame of form 1{e.last_words()}", "2020h = 1, then NMT start")
     gaps = sum(a >> TOG == b >> TOG for a, b in itertools.pairwise(words))
     enough(gaps == 3, "three gaps")
     due = [tuple(float(_signed21(w >> 21 * k)) for k in range(3)) for w in words]

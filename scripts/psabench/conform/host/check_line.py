@@ -6,7 +6,7 @@ from psabench.conform.host.cases_line import LINE_CASES, due, falls_us
 from psabench.conform.host.check import HostCapture, checks, limits
 from psabench.conform.host.line_waves import LineFrame, form_of
 from psabench.conform.host.results import Sample
-from psabench.conform.verdict import Failed, Unseen
+from psabench.conform.verdict import Failed, Unseen, expect
 
 ALL_BITS, LOW_BITS, NO_BITS = -1, 0xFF, 0  # of codes that are held against each other
 
@@ -20,10 +20,8 @@ def _pairs(e: HostCapture, bits: int = ALL_BITS) -> list[tuple[Sample, int, Line
     want = due(LINE_CASES[e.case], form_of(e.profile))
     told = e.told.samples
     for s, (i, f) in zip(told, want, strict=False):
-        if [c & bits for c in s.codes] != [c & bits for c in f.codes]:
-            raise Failed(f"{s.codes} for frame {i}", f"{f.codes}")
-    if len(told) != len(want):
-        raise Failed(f"{len(told)} frames{e.last_words()}", f"{len(want)}")
+        expect([c & bits for c in s.codes] == [c & bits for c in f.codes], f"{s.codes} for frame {i}", f"{f.codes}")
+    expect(len(told) == len(want), f"{len(told)} frames{e.last_words()}", f"{len(want)}")
     return [(s, i, f) for s, (i, f) in zip(told, want, strict=True)]
 
 
@@ -166,8 +164,7 @@ def silence_on_the_line_is_told_and_its_end(e: HostCapture) -> str:
     _pairs(e)
     at = max(_lost(e))
     told = [(x.value, x.at) for x in e.told.events if x.name == "stale"]
-    if told != [(True, at), (False, at)]:
-        raise Failed(f"stale {told}", f"true and false after {at} samples")
+    expect(told == [(True, at), (False, at)], f"stale {told}", f"true and false after {at} samples")
     e.nothing_but("stale", "lost")
     return f"stale after {at} samples, fresh with the next"
 

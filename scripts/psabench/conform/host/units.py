@@ -9,7 +9,7 @@ from __future__ import annotations
 from psabench.conform.host.capture import XY, ZT, Bus, Frame
 from psabench.conform.host.check import HostCapture
 from psabench.conform.host.results import Reading
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import expect
 
 FIRST, SECOND, THIRD = XY, ZT, 0x380  # TPDO 1, 2 and 3
 
@@ -25,8 +25,6 @@ def frames_of(bus: Bus, service: int) -> list[Frame]:
 
 def readings_told(e: HostCapture) -> list[Reading]:
     """Raises Failed where the host told none."""
-    if not e.streamed:
-        raise Failed(f"no stream was started{e.last_words()}", "NMT start")
-    if not e.told.readings:
-        raise Failed(f"no reading was reported{e.last_words()}", '{"reading": ...}')
+    expect(e.streamed, f"no stream was started{e.last_words()}", "NMT start")
+    expect(e.told.readings, f"no reading was reported{e.last_words()}", '{"reading": ...}')
     return e.told.readings

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from psabench.boards.registry import BOARDS
 from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.taken import LineTake
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import conclusive
 from psabench.errors import BadInput, expected
 from psabench.link.vcd import Vcd, Wire
 
@@ -18,13 +18,11 @@ class Recorded(LineLog):
     """Lines of a recording: what no one recorded is not absent, and nothing is said about it."""
 
     def __contains__(self, name: str) -> bool:
-        if not super().__contains__(name):
-            raise Inconclusive(f"the recording has no line {name}")
+        conclusive(super().__contains__(name), f"the recording has no line {name}")
         return True
 
     def __getitem__(self, name: str) -> Wire:
-        if name not in self.recording.wires:
-            raise Inconclusive(f"the recording has no line {name}")
+        conclusive(name in self.recording.wires, f"the recording has no line {name}")
         return self.recording.wires[name]
 
 

@@ -13,7 +13,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 
 FRAMES = (OD.COUNTERS, 14)  # level frames taken
 
@@ -26,8 +26,7 @@ def modes_that_cannot_be_are_refused(s: Dut, row: Requirement) -> str:
     s.run_for(0.01)
     refused(lambda: s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL)), code, "mode 1 just after Res")
     reason = s.unit.refusal()
-    if not reason:
-        raise Failed("no reason in 2031h", "one in words")
+    expect(reason, "no reason in 2031h", "one in words")
     calm(s)
     s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL))
     return f"refused: {reason}"
@@ -80,8 +79,7 @@ def frames_of_others_are_not_taken(s: Dut) -> str:
     s.run_for(0.05)
     taken = int(s.unit.node.read(*FRAMES)) - before
     calm(s)
-    if taken:
-        raise Failed(f"{taken} frames of another node taken", "none")
+    expect(not taken, f"{taken} frames of another node taken", "none")
     return "none of 20 frames taken"
 
 

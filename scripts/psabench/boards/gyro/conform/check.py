@@ -14,7 +14,7 @@ from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn,
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, layout
@@ -62,8 +62,7 @@ def _codes(e: Capture) -> tuple[np.ndarray, Floats]:
     """SEQ (n,) and volts X, Y (n, 2) of the level unit's frames."""
     node = int(setting(e, "level_node"))
     log = e.can.of_id(int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node)
-    if len(log) < 20:
-        raise Inconclusive(f"{len(log)} frames of the level unit came")
+    conclusive(len(log) >= 20, f"{len(log)} frames of the level unit came")
     try:
         raw = log.raw("PSA2_XY")
     except ValueError as err:
@@ -96,8 +95,7 @@ def level_angles_follow_from_the_codes(e: Capture, row: Requirement) -> str:
                 f"{np.degrees(beta):.6f}, {np.degrees(gamma):.6f}",
             )
         worst, count = max(worst, off), count + 1
-    if count < 20:
-        raise Inconclusive(f"{count} readings whose frames of the level unit are known")
+    conclusive(count >= 20, f"{count} readings whose frames of the level unit are known")
     return f"{count} readings, {worst:.2f} udeg off at most"
 
 
@@ -116,8 +114,7 @@ def level_seq_is_that_of_the_last_frame(e: Capture) -> str:
             if (latest - told) & 0xFFFF > 1:  # a frame may pass between the step and its message
                 raise Failed(f"LEVEL_SEQ {told}", f"{latest}, the last that passed", frames=(f,))
             count += 1
-    if count < 20:
-        raise Inconclusive(f"{count} readings with frames of the level unit")
+    conclusive(count >= 20, f"{count} readings with frames of the level unit")
     return f"{count} readings"
 
 
@@ -176,8 +173,7 @@ def u2_turns_with_the_earth(e: Capture, row: Requirement) -> str:
     logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
     c = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
     wz = np.repeat([vertical_degph(d) for d, _, _ in parts], [len(log["U2"]) for log in logs])
-    if (c["MODE"] != Mode.HOLD).any():
-        raise Inconclusive("another mode than 2")
+    conclusive(not (c["MODE"] != Mode.HOLD).any(), "another mode than 2")
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
     moved = wrapped_deg(c["ENCODER"] - c["ENCODER"][0])
     m2 = setting(e, "m2_per_s")
@@ -210,8 +206,7 @@ def windows_show_the_rate_of_the_earth(e: Capture, row: Requirement) -> str:
     """Take the means of -m1 beta over the windows; the Earth's part of them goes as the sine of the angle."""
     c = columns(e)
     count = int(c["POSITION"].max())
-    if count < 3:
-        raise Inconclusive(f"{count} positions")
+    conclusive(count >= 3, f"{count} positions")
     rows, s = [], []
     for k in range(1, count + 1):
         mine = (c["PHASE"] == Phase.WINDOW) & (c["POSITION"] == k) & (c["MODE"] == Mode.GYROCOMPASS)
@@ -254,10 +249,8 @@ def a_limited_rate_is_an_emergency(e: Capture, row: Requirement) -> str:
     begun = [t for k, t in found if k == code]
     ended = [t for k, t in found if k == 0]
     steps = c["STEP"][c["SATURATED"] == 1]
-    if not len(steps):
-        raise Inconclusive("no rate was limited")
-    if len(begun) != 1 or not ended:
-        raise Failed(f"emergencies {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h once, then 0000h")
+    conclusive(len(steps), "no rate was limited")
+    expect(len(begun) == 1 and ended, f"emergencies {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h once, then 0000h")
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")
     if abs(ended[-1] - begun[0] - due) > 2 * period_s:
@@ -292,15 +285,13 @@ def angles_stay_without_the_level_unit(e: Capture, row: Requirement) -> str:
     c = columns(e)
     lost = np.flatnonzero(c["LEVEL_LOST"] == 1)
     silent = round(row.limit("silent_ms") * 1e3 / row_for(e, "GYRO-CAN-02").limit("period_us"))
-    if len(lost) < 2 * silent:
-        raise Inconclusive(f"{len(lost)} readings without the level unit")
+    conclusive(len(lost) >= 2 * silent, f"{len(lost)} readings without the level unit")
     mine = lost[silent:-silent]
     for name in ("BETA", "GAMMA", "U1"):
         if np.ptp(c[name][mine]) > 0:
             raise Failed(f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
     begun = [k for k, _ in emergencies(e, EMCY) if k == int(row.limit("emcy_code"))]
-    if len(begun) != 1:
-        raise Failed(f"{len(begun)} emergencies FF21h", "one")
+    expect(len(begun) == 1, f"{len(begun)} emergencies FF21h", "one")
     return f"{len(mine)} readings with the same angles and U1, one emergency"
 
 
@@ -335,16 +326,14 @@ def lines_show_the_phases(e: Capture, row: Requirement) -> str:
         off = np.abs(shown.sum(axis=0) - told.sum(axis=0))
         if off.max() > abs(len(rises) - n) + 2:  # steps at the ends of the recording
             raise Failed(f"{', '.join(PHASES)} high in {shown.sum(axis=0)} steps", f"{told.sum(axis=0)}", lines=LINES)
-    if not int(e.wires["READY"].at(e.wires.end_ns)):
-        raise Failed("READY low in a run", "high", lines=LINES)
+    expect(int(e.wires["READY"].at(e.wires.end_ns)), "READY low in a run", "high", lines=LINES)
     return f"{seen}; SLEW, SETTLE and WINDOW with their phases"
 
 
 @check("silence", "GYRO-SIG-01", needs={"line", "can"}, wires=("STEP", "FAULT"))
 def fault_shows_the_flags(e: Capture) -> str:
     """Compare FAULT with the flags of the readings while the level unit is silent for a while, twice."""
-    if len(e.wires.gaps_ns):
-        raise Inconclusive("samples were lost: a flag of a single step may be among them")
+    conclusive(not len(e.wires.gaps_ns), "samples were lost: a flag of a single step may be among them")
     c = columns(e)
     shown = e.wires["FAULT"].at(e.wires.rises("STEP") + round(US)).astype(np.int64)[:, None]
     told = np.max([c[name] for name in FLAGS], axis=0).astype(np.int64)[:, None]

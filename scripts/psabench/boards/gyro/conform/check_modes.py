@@ -12,7 +12,7 @@ from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.signals import Floats
 
@@ -37,8 +37,7 @@ def mode_1_levels(e: Capture, row: Requirement) -> str:
     """Look at BETA of the last readings, the platform having had its time."""
     c, most = columns(e), row.limit("level_max_arcmin")
     beta_arcmin = c["BETA"][c["MODE"] == Mode.LEVEL] * 60
-    if len(beta_arcmin) < 2 * LEAST:
-        raise Inconclusive(f"{len(beta_arcmin)} readings of mode 1")
+    conclusive(len(beta_arcmin) >= 2 * LEAST, f"{len(beta_arcmin)} readings of mode 1")
     left = float(np.abs(beta_arcmin[-LEAST:]).max())
     saw = f"beta {beta_arcmin[0]:.2f} arc minutes, at last {left:.2f}"
     if left > most:
@@ -51,18 +50,15 @@ def a_run_goes_through_its_positions(e: Capture) -> str:
     """Follow MODE, PHASE and POSITION."""
     c = columns(e)
     here = np.flatnonzero(c["MODE"] == Mode.GYROCOMPASS)
-    if len(here) < 100:
-        raise Inconclusive("no run in the recording")
+    conclusive(len(here) >= 100, "no run in the recording")
     pairs = np.stack([c["POSITION"][here], c["PHASE"][here]], axis=1)
     order = [tuple(int(v) for v in p) for k, p in enumerate(pairs) if k == 0 or (p != pairs[k - 1]).any()]
     positions = e.facts.get("positions")
     due = [(k, p) for k in range(1, len(positions if isinstance(positions, list) else []) + 1) for p in (1, 2, 3)]
     due_still = [p for p in due if p != (1, 1)] if order[:1] == [(1, 2)] else due
-    if order not in (due, due_still):
-        raise Failed(f"positions and phases {order}", f"{due}")
+    expect(order in (due, due_still), f"positions and phases {order}", f"{due}")
     after = c["MODE"][here[-1] + 1 :]
-    if not len(after) or after[0] != Mode.HOLD:
-        raise Failed("another mode than 2 after the run", "2")
+    expect(len(after) and after[0] == Mode.HOLD, "another mode than 2 after the run", "2")
     return f"{len(order)} phases in their order, then mode 2"
 
 
@@ -187,8 +183,7 @@ def a_calibration_measures_one_window(e: Capture) -> str:
     """Follow PHASE in mode 5 and count the readings of its window."""
     c = columns(e)
     here = np.flatnonzero(c["MODE"] == Mode.CALIBRATE)
-    if len(here) < 100:
-        raise Inconclusive("no calibration in the recording")
+    conclusive(len(here) >= 100, "no calibration in the recording")
     phases = c["PHASE"][here].astype(np.int64)
     order = [int(p) for k, p in enumerate(phases) if k == 0 or p != phases[k - 1]]
     window = int((phases == Phase.WINDOW).sum())

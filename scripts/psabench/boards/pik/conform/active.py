@@ -12,7 +12,7 @@ from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import unwrap
 
 WORD = 0xFFFF
@@ -67,8 +67,7 @@ def the_period_can_be_set(s: Dut, row: Requirement) -> str:
         s.run_for(0.02)
     made = (line(s, "R 9").data - first) & WORD
     calm(s)
-    if made != 3:
-        raise Failed(f"{made} readings with three writes to LATCH and PERIOD 0", "3")
+    expect(made == 3, f"{made} readings with three writes to LATCH and PERIOD 0", "3")
     return f"{due:g} us with PERIOD 50, three readings by three writes"
 
 
@@ -82,10 +81,8 @@ def registers_hold_what_was_latched(s: Dut) -> str:
     line(s, LATCH)
     later = counters(s)
     calm(s)
-    if first != again:
-        raise Failed(f"{first}, then {again}", "the same until the next latch")
-    if later == first:
-        raise Failed(f"{later} after another latch", "counts that went on")
+    expect(first == again, f"{first}, then {again}", "the same until the next latch")
+    expect(later != first, f"{later} after another latch", "counts that went on")
     return f"{first} twice, then {later}"
 
 
@@ -100,8 +97,7 @@ def a_channel_is_up_minus_down(s: Dut, row: Requirement) -> str:
     for k in range(3):
         if c[k] != (c[3 + 2 * k] - c[4 + 2 * k]) % modulo:
             raise Failed(f"{'XYZ'[k]} {c[k]}, up {c[3 + 2 * k]}, down {c[4 + 2 * k]}", "the difference")
-    if not any(c[3:]):
-        raise Failed("no pulse in any counter", "some")
+    expect(any(c[3:]), "no pulse in any counter", "some")
     return f"{c[:3]} of {c[3:]}"
 
 
@@ -144,8 +140,7 @@ def registers_begin_with_res(s: Dut) -> str:
     e = s.capture("registers", take)
     counts, xy, z = (e.frames_of(name) for name in ("PIK_COUNTS", "PIK_TOTALS", "PIK_TOTAL_Z"))
     n = min(len(counts), len(xy), len(z))
-    if not n:
-        raise Inconclusive("no reading came")
+    conclusive(n, "no reading came")
     seq, xy_raw, z_raw = counts.raw("PIK_COUNTS")["SEQ"][:n], xy.raw("PIK_TOTALS"), z.raw("PIK_TOTAL_Z")["Z"][:n]
     told = {
         int(k): (int(a), int(b), int(c))
@@ -159,8 +154,7 @@ def registers_begin_with_res(s: Dut) -> str:
         if [signed(w) for w in words[:3]] != [signed(t & WORD) for t in due] or sum(words[3:]) > 2 * sum(map(abs, due)):
             raise Failed(f"{words} in reading {number}", f"{list(due)} since Res")
         found += 1
-    if not found:
-        raise Inconclusive("no reading was seen on the bus and on CAN")
+    conclusive(found, "no reading was seen on the bus and on CAN")
     return f"{found} readings with the same counts since Res in registers and totals"
 
 

@@ -10,7 +10,7 @@ from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn,
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints, unwrap
 
@@ -27,8 +27,7 @@ COEFFICIENT = ("PIK-LAW-02", "PIK-LAW-03")
 
 def _told(e: Capture, name: str, least: int = LEAST) -> CanLog:
     log = e.frames_of(name)
-    if len(log) < least:
-        raise Inconclusive(f"{len(log)} messages {name} came; expected {least}")
+    conclusive(len(log) >= least, f"{len(log)} messages {name} came; expected {least}")
     bad = [f for f in log.frames if len(f.data) != int(message(name).length)]
     if bad:
         raise Inconclusive(f"{name} of {len(bad[0].data)} bytes")
@@ -133,12 +132,10 @@ def the_law_is_linear(e: Capture, row: Requirement) -> str:
 def nothing_saturates_below_full_scale(e: Capture, row: Requirement) -> str:
     """Look for SAT bits in a minute."""
     most = row.limit("input_max_v")
-    if any(abs(v) > most for v in e.inputs_v.values()):
-        raise Inconclusive(f"expected inputs of {most:g} V at most")
+    conclusive(not any(abs(v) > most for v in e.inputs_v.values()), f"expected inputs of {most:g} V at most")
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     for axis in "XYZ":
-        if raw[f"SAT_{axis}"].any():
-            raise Failed(f"SAT_{axis}", f"none up to {most:g} V")
+        expect(not raw[f"SAT_{axis}"].any(), f"SAT_{axis}", f"none up to {most:g} V")
     return f"{len(raw['X'])} readings without SAT"
 
 
@@ -167,8 +164,7 @@ def a_reset_lasts_its_time(e: Capture, row: Requirement) -> str:
         up, down = up[known], down[known]
         if len(up):
             seen = interval(e, up, down, due_ns, slack_ns, f"of {name} high", (name,))
-    if not seen:
-        raise Inconclusive("no pulse was recorded")
+    conclusive(seen, "no pulse was recorded")
     return seen
 
 
@@ -207,8 +203,7 @@ def pulses_begin_on_their_grid(e: Capture, row: Requirement) -> str:
             (f"F{axis}P",),
         )
         count += len(inside)
-    if count < LEAST:
-        raise Inconclusive(f"{count} pulses were recorded")
+    conclusive(count >= LEAST, f"{count} pulses were recorded")
     return f"{count} pulses on a grid of {tick_ns:.1f} ns"
 
 
@@ -257,8 +252,7 @@ def counts_are_the_pulses(e: Capture) -> str:
     """Count pulses between falls of LATCH and compare them with the readings."""
     log = e.wires.unbroken()
     latch = log.falls("LATCH")
-    if len(latch) < LEAST:
-        raise Inconclusive(f"{len(latch)} latches were recorded")
+    conclusive(len(latch) >= LEAST, f"{len(latch)} latches were recorded")
     seen = np.stack([_between(log, f"F{a}P", latch) - _between(log, f"F{a}N", latch) for a in "XYZ"], axis=1)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     told = np.stack([raw[a] for a in "XYZ"], axis=1)
@@ -361,8 +355,7 @@ def _at_rest_ns(e: Capture) -> int:
     begins = np.concatenate([*(edges(e, name) for name in PULSES), e.wires.falls("LATCH")])
     still = np.diff(moves, prepend=e.wires.start_ns) > tclk_ns + ROUNDED_NS + e.slack_ns(tclk_ns)
     found = moves[still & np.isin(moves, begins)]
-    if not len(found):
-        raise Inconclusive("no pulse and no latch after Res, or too many for the lines to be at rest")
+    conclusive(len(found), "no pulse and no latch after Res, or too many for the lines to be at rest")
     return int(found[0]) - 1 - round(e.slack_ns(0.0))
 
 
@@ -370,8 +363,7 @@ def _at_rest_ns(e: Capture) -> int:
 def the_clock_rests_low(e: Capture, row: Requirement) -> str:
     """Look at CLK while the board has no power: the longest time without an edge of it."""
     ends = e.wires["CLK"].t_ns
-    if len(ends) < 3:
-        raise Inconclusive("CLK does not move")
+    conclusive(len(ends) >= 3, "CLK does not move")
     k = int(np.argmax(np.diff(ends)))
     still_ns = int(ends[k + 1] - ends[k])
     if still_ns < 2 * _tclk_ns(e):

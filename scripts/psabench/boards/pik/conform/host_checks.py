@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from psabench.conform.host.capture import Bus, Frame, signed
 from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.units import FIRST, SECOND, THIRD, after_start, readings_told
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +95,5 @@ def a_channel_that_cannot_keep_up_is_told(e: HostCapture) -> str:
         before = p.over
     enough(len(due) >= 12, "each channel beyond its range twice")
     told = [(x.name, x.value) for x in e.told.events if x.name in ("over_range", "in_range")]
-    if told != due:
-        raise Failed(f"{told}", f"{due}")
+    expect(told == due, f"{told}", f"{due}")
     return f"{len(due) // 2} times over the range and back"

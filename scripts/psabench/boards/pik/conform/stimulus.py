@@ -7,7 +7,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.stimulus.streamed import from_res, readings, while_streaming
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import conclusive
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
 OFF_S = 0.02  # without power
@@ -36,8 +36,7 @@ def minute(s: Dut) -> Capture:
 @stimulus("overdrive", boards=("pik",))
 def overdrive(s: Dut) -> Capture:
     """The accelerometer X turned by a dividing head until its channel cannot keep up, and back; a reading each 2 ms."""
-    if "head" not in s.probes:
-        raise Inconclusive("no dividing head was connected")
+    conclusive("head" in s.probes, "no dividing head was connected")
     s.reset()
     s.run_for(START_S)
     s.unit.node.write_raw(BUS, PERIOD + 1, SOON.to_bytes(2, "little"))

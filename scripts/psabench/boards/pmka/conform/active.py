@@ -14,7 +14,7 @@ from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.busport import Cycle
 
 STATUS, MODE, COMMAND, BEAT, ZERO = 8, 9, 10, 11, 12
@@ -219,9 +219,7 @@ def a_read_is_of_its_strobe_s_beginning(s: Dut) -> str:
     made = (after.data - long.data) & 0xFFFF
     whole = int(_periods(long, after) + STROBE_NS * 1e-9 / ts_s())
     saw = f"SEQ {long.data} with a strobe of 20 ms, {after.data} after it"
-    if made not in (whole, whole + 1):
-        raise Failed(saw, f"{whole} or {whole + 1} readings more, that of its beginning")
-    return saw
+    return expect(made in (whole, whole + 1), saw, f"{whole} or {whole + 1} readings more, that of its beginning")
 
 
 @active("PMKA-BUS-04", needs={"bus", "can"}, before=calm)
@@ -235,13 +233,10 @@ def a_write_acts_at_the_end_of_its_strobe(s: Dut) -> str:
     calm(s)
     states: CanLog = s.capture("mode", take).frames_of("PMKA_STATE")
     changed = [int.from_bytes(f.data[:2], "little") for f in states.frames if (f.data[4] >> 5 & 1) != was]
-    if not changed:
-        raise Failed("AUTONOMOUS never changes", "after the strobe")
+    expect(changed, "AUTONOMOUS never changes", "after the strobe")
     readings, whole = (changed[0] - first.data) & 0xFFFF, int(_periods(first, written))
     saw = f"AUTONOMOUS changes {readings} readings after the beginning of a strobe of 20 ms"
-    if not whole <= readings <= whole + 2:
-        raise Failed(saw, f"{whole} to {whole + 2}: at its end")
-    return saw
+    return expect(whole <= readings <= whole + 2, saw, f"{whole} to {whole + 2}: at its end")
 
 
 @active("PMKA-BUS-05", needs={"bus"}, before=calm, after=calm)

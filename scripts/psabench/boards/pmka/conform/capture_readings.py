@@ -11,7 +11,7 @@ import numpy as np
 from psabench.boards.pmka import estimate as est
 from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.conform.proves import row_for
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Inconclusive, conclusive, expect
 from psabench.link.signals import Floats
 
 CODES, STATE = "PMKA_CODES", "PMKA_STATE"
@@ -29,8 +29,7 @@ def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Flo
     if min(len(codes), len(states)) < least:
         raise Inconclusive(f"{len(codes)} PMKA_CODES, {len(states)} PMKA_STATE came; expected {least} of each")
     pairs = _pairs(can, codes.frames[0].can_id, states.frames[0].can_id)
-    if len(pairs) < least:
-        raise Inconclusive(f"{len(pairs)} PMKA_CODES had their PMKA_STATE; expected {least}")
+    conclusive(len(pairs) >= least, f"{len(pairs)} PMKA_CODES had their PMKA_STATE; expected {least}")
     found: dict[str, Floats] = {}
     try:
         for name, frames in ((CODES, [p[0] for p in pairs]), (STATE, [p[1] for p in pairs])):
@@ -70,8 +69,7 @@ class Run:
         """First and last reading at which each axis is on its own integrator."""
         home = self.periods.serves[:, 3] == 0
         both = np.flatnonzero(home & np.roll(home, 1))[1:]
-        if len(both) < 2:
-            raise Inconclusive("the spare is never free")
+        conclusive(len(both) >= 2, "the spare is never free")
         return int(both[0]), int(both[-1])
 
     def error_mmps(self, e: Capture, integral_vs: Floats) -> Floats:
@@ -104,6 +102,4 @@ def largest(e: Capture, run: Run, integral_vs: Floats, most_mmps: float) -> str:
     """Raises Failed where an axis is off by more than that."""
     error = run.error_mmps(e, integral_vs)
     saw = f"{', '.join(f'{v:.2f}' for v in error)} mm/s on X, Y, Z"
-    if not np.abs(error).max() <= most_mmps:
-        raise Failed(saw, f"{most_mmps:g} mm/s at most")
-    return saw
+    return expect(np.abs(error).max() <= most_mmps, saw, f"{most_mmps:g} mm/s at most")

@@ -10,7 +10,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
 KEYS = ("KL1", "KL2", "KL3", "KL4")
@@ -33,8 +33,7 @@ def samples(e: Capture, least: int = LEAST) -> tuple[Ints, Ints]:
     pause_ns = row_for(e, "PMKA-SAMP-01").limit("ts_us") * US / 2
     begins = np.flatnonzero(np.diff(rises, prepend=log.start_ns) > pause_ns)  # what comes before is a part of a reading
     rises = rises[int(begins[0]) :] if len(begins) else rises[:0]
-    if len(rises) < 4 * least:
-        raise Inconclusive(f"{len(rises)} samples were recorded; expected {4 * least}")
+    conclusive(len(rises) >= 4 * least, f"{len(rises)} samples were recorded; expected {4 * least}")
     return rises, bus_word(e, "MUX", 2, rises - 1 - round(e.slack_ns(0.0)))
 
 
@@ -70,8 +69,7 @@ def samples_are_held_and_converted(e: Capture, row: Requirement) -> str:
     """Measure SH, and CONV from it."""
     up, down = e.wires.pulses("SH", 1)
     begin, end = after(e.wires.rises("CONV"), up - 1), after(e.wires.falls("CONV"), up)
-    if len(up) < LEAST:
-        raise Inconclusive(f"{len(up)} samples were recorded")
+    conclusive(len(up) >= LEAST, f"{len(up)} samples were recorded")
     tolerance_ns, hold_ns = row.limit("tolerance_us") * US, row.limit("hold_us") * US
     interval(e, up, begin, row.limit("convert_from_us") * US, tolerance_ns, "from SH to CONV", SAMPLE)
     interval(e, up, end, hold_ns, tolerance_ns, "from SH to the end of CONV", SAMPLE)
@@ -93,8 +91,7 @@ def resets_last_half_a_period(e: Capture, row: Requirement) -> str:
             count += len(up)
             seen = interval(e, up, down, row.limit("reset_us") * US, tolerance_ns, f"of {name} high", (name, *SAMPLE))
             interval(e, nearest(mine, up), up, 0.0, tolerance_ns, f"from the sample to {name}", (name, *SAMPLE))
-    if count < LEAST:
-        raise Inconclusive(f"{count} resets were recorded")
+    conclusive(count >= LEAST, f"{count} resets were recorded")
     return f"{count} resets; {seen}"
 
 
@@ -126,8 +123,7 @@ def a_calibrated_integrator_is_off_its_sensor(e: Capture) -> str:
         bad = level == 1
         first_bad(bad, turns, f"{key} closed while it is calibrated", "open", (key, f"RP{k + 1}", f"RN{k + 1}"))
         off += int((level == 0).sum())
-    if not off:
-        raise Inconclusive("no calibration of resets in the recording")
+    conclusive(off, "no calibration of resets in the recording")
     return f"{off} resets in turn, all with the key open"
 
 
@@ -137,8 +133,7 @@ def three_keys_are_closed_at_any_instant(e: Capture) -> str:
     at_ns = np.unique(np.concatenate([e.wires[k].t_ns for k in KEYS])) + round(e.slack_ns(0.0))
     closed = sum((e.wires[k].at(at_ns).astype(np.int64) for k in KEYS), np.zeros(len(at_ns), np.int64))
     first_bad(closed != 3, at_ns, [f"{n} keys closed" for n in closed], "3: an integrator for each axis", KEYS)
-    if len(at_ns) < 4:
-        raise Inconclusive("no hand-over in the recording")
+    conclusive(len(at_ns) >= 4, "no hand-over in the recording")
     return f"{len(at_ns) - 1} moves of keys, three closed at any instant"
 
 

@@ -14,7 +14,7 @@ from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Floats, Ints
 
 BEAT_OF_AXIS = {2: 0, 3: 1, 4: 2}  # beat to the axis that the spare serves
@@ -95,8 +95,7 @@ def messages_have_their_lengths(e: Capture) -> str:
 def the_first_sample_comes_in_time(e: Capture, row: Requirement) -> str:
     """Measure from the boot-up message to the first PMKA_CODES."""
     boot, log = booted(e, "PMKA_HEARTBEAT"), e.frames_of(CODES)
-    if not len(log):
-        raise Inconclusive("no PMKA_CODES came")
+    conclusive(len(log), "no PMKA_CODES came")
     seq, ts_ms = int(columns(e, 3)["SEQ"][0]), row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-3
     took_ms, due_ms = float(log.t_s[0] - boot.t_s) * 1e3, row.limit("start_ms") + seq * ts_ms
     if abs(took_ms - due_ms) > row.limit("tolerance_ms"):
@@ -144,8 +143,7 @@ def resets_are_as_many_as_the_input_wants(e: Capture, row: Requirement) -> str:
 def nothing_saturates_below_full_scale(e: Capture, row: Requirement) -> str:
     """Look for SATURATED and CLIPPED in a minute."""
     most, c = row.limit("full_scale_v"), columns(e)
-    if any(abs(v) > most for v in e.inputs_v.values()):
-        raise Inconclusive(f"expected inputs of {most:g} V at most")
+    conclusive(not any(abs(v) > most for v in e.inputs_v.values()), f"expected inputs of {most:g} V at most")
     for flag in ("SATURATED", "CLIPPED"):
         if c[flag].any():
             raise Failed(f"{flag} in {np.count_nonzero(c[flag])} of {len(c[flag])} readings", f"none up to {most:g} V")
@@ -167,8 +165,7 @@ def resets_follow_codes_beyond_uc(e: Capture, row: Requirement) -> str:
                 f"RESET_{name} {int(reset[k])} after a code of {code[k]:.4f} V", f"{int(due[k])}: Uc is {uc:g} V"
             )
         count += int((reset[sure] != 0).sum())
-    if count < 10:
-        raise Inconclusive(f"{count} resets were reported")
+    conclusive(count >= 10, f"{count} resets were reported")
     return f"{count} resets, each after a code beyond {uc:g} V"
 
 
@@ -218,8 +215,7 @@ def the_two_signs_have_sizes_of_their_own(e: Capture, row: Requirement) -> str:
     sizes, degc = _sizes(run.periods), run.periods.degc.mean(keepdims=True)
     nr = sizes[:, 0] / sizes[:, 1] - 1
     ct = np.array([float(run.rom.ct_at(k, 0, degc)[0] / run.rom.ct_at(k, 1, degc)[0]) - 1 for k in range(4)])
-    if not np.any(run.rom.ct[:, :, 0] != run.rom.ct[:, :, 1]):
-        raise Failed("CT(+) is CT(-) in the whole ROM", "two of them")
+    expect(np.any(run.rom.ct[:, :, 0] != run.rom.ct[:, :, 1]), "CT(+) is CT(-) in the whole ROM", "two of them")
     off = np.abs(nr - ct) * 1e6
     if off.max() > row.limit("ratio_tolerance_ppm"):
         raise Failed(
@@ -287,10 +283,8 @@ def calibration_is_first_of_zero_then_of_resets(e: Capture) -> str:
     beats = np.flatnonzero(np.diff(c["TAU"])) + 1
     busy = p.cal != 0
     idle = (p.serves == 0).sum(axis=1)
-    if not busy.any():
-        raise Inconclusive("no calibration in the recording")
-    if (idle[busy] != 1).any():
-        raise Failed("CAL without one integrator that serves no axis", "one")
+    conclusive(busy.any(), "no calibration in the recording")
+    expect(not (idle[busy] != 1).any(), "CAL without one integrator that serves no axis", "one")
     count = 0
     for a, b in pairwise(beats):
         cal = p.cal[a:b]
@@ -306,8 +300,7 @@ def beats_have_their_lengths(e: Capture, row: Requirement) -> str:
     """Count the periods of each beat, and those of its zero and its resets."""
     c = columns(e)
     turns = np.flatnonzero(np.diff(c["TAU"])) + 1
-    if len(turns) < 3:
-        raise Inconclusive(f"{len(turns)} changes of the beat")
+    conclusive(len(turns) >= 3, f"{len(turns)} changes of the beat")
     due = [int(row.limit(n)) for n in ("beat_periods", "zero_periods", "reset_periods")]
     for a, b in pairwise(turns):
         cal = c["CAL"][a:b]
@@ -343,8 +336,7 @@ def in_beat_5_the_spare_is_free(e: Capture) -> str:
 def _serves(e: Capture, tau: int, due: tuple[int, ...]) -> str:
     c = columns(e)
     mine = _steady(c["TAU"]) & (c["TAU"] == tau)
-    if not mine.any():
-        raise Inconclusive(f"no reading of beat {tau}")
+    conclusive(mine.any(), f"no reading of beat {tau}")
     serves = np.column_stack([c[f"SERVES_{n}"] for n in est.INTEGRATORS]).astype(np.int64)[mine]
     bad = np.flatnonzero((serves != np.array(due)).any(axis=1))
     if len(bad):
@@ -388,10 +380,8 @@ def nothing_is_lost_in_a_hand_over(e: Capture, row: Requirement) -> str:
                 (ds[k, axis] + ds[k, 3] - due_vs)
                 / est.quantum_vs(float(run.calibrations[axis].nr.mean()), run.rom.ts_s)
             )
-        if (p.cal[both] != 0).any():
-            raise Failed("CAL in the period of a hand-over", "0")
-    if len(off) < 6:
-        raise Inconclusive(f"{len(off)} hand-overs were recorded")
+        expect(not (p.cal[both] != 0).any(), "CAL in the period of a hand-over", "0")
+    conclusive(len(off) >= 6, f"{len(off)} hand-overs were recorded")
     if np.abs(off).max() > row.limit("tolerance_codes"):
         raise Failed(f"{np.abs(off).max():.1f} codes off", f"{row.limit('tolerance_codes'):g} codes at most")
     return f"{len(off)} hand-overs, {np.abs(off).max():.1f} codes off at most"

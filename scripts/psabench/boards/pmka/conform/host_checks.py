@@ -16,7 +16,7 @@ from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.results import Reading
 from psabench.conform.host.units import SECOND, frames_of, readings_told
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +100,7 @@ def _numbered(told: Sequence[Reading], sent: Sequence[State]) -> list[tuple[Read
     found = []
     place = {s.seq: k for k, s in enumerate(sent)}  # none is sent for so long that SEQ wraps
     for r in told:
-        if r.number not in place:
-            raise Failed(f"reading {r.number}, which was not played", "none")
+        expect(r.number in place, f"reading {r.number}, which was not played", "none")
         found.append((r, place[r.number], sent[place[r.number]]))
     return found
 
@@ -109,8 +108,7 @@ def _numbered(told: Sequence[Reading], sent: Sequence[State]) -> list[tuple[Read
 @checks("HOST-PMKA-03", "pmka_lost")
 def what_is_lost_is_told_and_not_made_up(e: HostCapture) -> str:
     """One reading is lost, then three; input X is beyond the range for half a second."""
-    if not e.streamed:
-        raise Failed(f"no stream was started{e.last_words()}", "NMT start")
+    expect(e.streamed, f"no stream was started{e.last_words()}", "NMT start")
     sent = states(e.bus)
     gaps = [(b.seq - a.seq - 1) % 65536 for a, b in itertools.pairwise(sent) if b.seq != (a.seq + 1) % 65536]
     enough(len(gaps) == 2, "two gaps")

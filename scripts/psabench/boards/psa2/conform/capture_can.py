@@ -8,7 +8,7 @@ import numpy as np
 
 from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Bools, CanFrame, CanLog, Capture
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link import signals
 from psabench.link.signals import Ints
 
@@ -66,8 +66,7 @@ def segment(e: Capture, begin: str, end: str | None = None) -> Capture:
 def pairs(e: Capture, least: int = 20) -> Pairs:
     """Raises Inconclusive for fewer than `least`, Failed for one of another length."""
     first, second = _halves(e)
-    if len(first) < least:
-        raise Inconclusive(f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
+    conclusive(len(first) >= least, f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
     try:
         xy, zt = CanLog(frames=tuple(first)).raw("PSA2_XY"), CanLog(frames=tuple(second)).raw("PSA2_ZT")
     except ValueError as err:

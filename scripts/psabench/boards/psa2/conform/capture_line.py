@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from psabench.conform.capture.log import Bools, LineLog
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import conclusive
 from psabench.link.signals import Floats, Ints
 
 WORDS = 4  # a transfer (article, section 5: protocol of exchange)
@@ -69,11 +69,9 @@ class Transfers:
 def transfers(log: LineLog) -> Transfers:
     """Raises Inconclusive where the recording has too few, or no such lines."""
     for name in ("Int", "Data", "CLK"):
-        if name not in log:
-            raise Inconclusive(f"the recording has no line {name}")
+        conclusive(name in log, f"the recording has no line {name}")
     fall, rise = log.pulses("Int", 0)
-    if len(fall) < LEAST:
-        raise Inconclusive(f"{len(fall)} transfers were recorded; expected {LEAST}")
+    conclusive(len(fall) >= LEAST, f"{len(fall)} transfers were recorded; expected {LEAST}")
     return Transfers(fall_ns=fall, rise_ns=rise, clk_rise_ns=log.rises("CLK"), clk_fall_ns=log.falls("CLK"), log=log)
 
 

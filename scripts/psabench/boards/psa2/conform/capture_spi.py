@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.conform.capture.log import LineLog
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import conclusive
 from psabench.link.signals import Ints
 
 PINS = ("SClk", "DIn", "DOutX", "DOutY", "DOutZ", "CST", "DInT", "DOutT", "DRD_A", "DRD_T", "SYNC_A", "SYNC_T", "Res")
@@ -62,11 +62,9 @@ class Message:
 def bursts(log: LineLog, period_ns: float) -> list[Burst]:
     """All of them in order. Raises Inconclusive where the recording lacks a pin, or SClk never moves."""
     for pin in PINS:
-        if pin not in log:
-            raise Inconclusive(f"the recording has no line {pin}")
+        conclusive(pin in log, f"the recording has no line {pin}")
     rise, fall = log.rises("SClk"), log.falls("SClk")
-    if not len(rise):
-        raise Inconclusive("SClk never rises in the recording")
+    conclusive(len(rise), "SClk never rises in the recording")
     fall = fall[np.searchsorted(fall, rise[0], "right") :]
     at_rise = {pin: log[pin].at(rise) for pin in ("DIn", *AXES, "CST")}
     at_fall = {pin: log[pin].at(fall) for pin in ("DInT", "DOutT")}

@@ -14,7 +14,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Floats
 
 AXES = "xyz"
@@ -24,8 +24,7 @@ ZERO_K = 273.15
 def _inputs(e: Capture) -> dict[int, float]:
     """Volts by number of the axis. Raises Inconclusive where none are known."""
     found = {k: e.inputs_v[a] for k, a in enumerate(AXES) if a in e.inputs_v}
-    if not found:
-        raise Inconclusive("the volts at the inputs are not known")
+    conclusive(found, "the volts at the inputs are not known")
     return found
 
 
@@ -50,8 +49,7 @@ def codes_have_the_sign_of_the_volts(e: Capture, row: Requirement) -> str:
     p = pairs(e)
     least = row.limit("least_v")
     seen = {k: v for k, v in _inputs(e).items() if abs(v) >= least}
-    if not seen:
-        raise Inconclusive(f"no input is {least:g} V or more from zero")
+    conclusive(seen, f"no input is {least:g} V or more from zero")
     for k, volt_v in seen.items():
         if np.sign(np.median(p.code[:, k])) != np.sign(volt_v):
             raise Failed(

@@ -15,7 +15,7 @@ from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -26,8 +26,7 @@ from psabench.link.signals import Floats, Ints
 def _form(e: Capture, form: int, name: str, least: int = LEAST) -> CanLog:
     """The frames of a form, and no others of the stream. Raises Failed, Inconclusive."""
     answer = e.facts.get(f"answer {form}")
-    if answer != Answer():
-        raise Failed(f"form {form} answered by {answer}", "it is taken")
+    expect(answer == Answer(), f"form {form} answered by {answer}", "it is taken")
     part = segment(e, f"form {form}", f"form {form} end")
     log = part.frames_of(name)
     other = [
@@ -130,8 +129,7 @@ def a_block_begins_anew_after_a_stop(e: Capture) -> str:
         raise Inconclusive("the scene started no stream again")
     for k, stamp in enumerate(stamps):
         log = segment(e, f"again {k}", f"again {k} end").frames_of("PSA2_BLOCK")
-        if not len(log):
-            raise Failed("no block after the start", "one every five samples")
+        expect(len(log), "no block after the start", "one every five samples")
         try:
             before_us, first_us = number(stamp), int(log.raw("PSA2_BLOCK")["TSTAMP"][0])
         except ValueError as err:

@@ -14,7 +14,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.canopen_host import Described
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
@@ -25,12 +25,10 @@ def the_board_says_who_it_is(e: Capture, row: Requirement) -> str:
     """Read 1008h and 1018h."""
     read = fact(e, "read")
     name = read[OD.DEVICE_NAME, 0].value
-    if name != "PSA-2":
-        raise Failed(f"1008h {name!r}", "'PSA-2'")
+    expect(name == "PSA-2", f"1008h {name!r}", "'PSA-2'")
     for sub, limit in ((2, "product_code"), (3, "revision_code")):
         saw, due = number(read[OD.IDENTITY, sub]), int(row.limit(limit))
-        if saw != due:
-            raise Failed(f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
+        expect(saw == due, f"1018h:{sub} {saw:08X}h", f"{due:08X}h")
     return f"{name}, product {number(read[OD.IDENTITY, 2]):08X}h, revision {number(read[OD.IDENTITY, 3]):08X}h"
 
 
@@ -39,9 +37,7 @@ def object_2021h_is_the_word_width(e: Capture) -> str:
     """Read 2021h."""
     saw = number(fact(e, "read")[OD.WORD_BITS, 0])
     due = int(row_for(e, "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08").limit("word_bits"))
-    if saw != due:
-        raise Failed(f"{saw} bits", f"{due} bits")
-    return f"{saw} bits"
+    return expect(saw == due, f"{saw} bits", f"{due} bits")
 
 
 @check("objects", "PSA2-CAN-11")
@@ -102,11 +98,9 @@ def objects_have_type_rights_default_and_limits(e: Capture) -> str:
     for r in rows:
         d, name = r.due, f"{r.due.index:04X}h:{r.due.sub} {r.due.name}"
         if d.access == "wo":
-            if r.abort != WRITE_ONLY:
-                raise Failed(f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
+            expect(r.abort == WRITE_ONLY, f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
             continue
-        if r.abort:
-            raise Failed(f"{name} read: abort {r.abort:08X}h", "its value")
+        expect(not r.abort, f"{name} read: abort {r.abort:08X}h", "its value")
         if d.data_bytes is not None and len(r.raw) != d.data_bytes:
             raise Failed(f"{name} of {len(r.raw)} bytes", f"{d.data_bytes}")
         if d.access in ("const", "rw") and d.default is not None and r.raw != encoded(d):

@@ -21,7 +21,7 @@ from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 
 # ---- limits of the parts
 
@@ -45,8 +45,7 @@ def _known(
             good = len(m.sent) > 2 and code & 0x0F <= last and len(m.sent) == 3 + m.sent[1]
         else:
             good = code in known
-        if not good:
-            raise Failed(m.name, "a command of the table with its bytes", at_ns=m.begin_ns, lines=lines)
+        expect(good, m.name, "a command of the table with its bytes", at_ns=m.begin_ns, lines=lines)
     kinds = sorted({m.sent[0] for m in found})
     return f"{len(found)} commands: {', '.join(f'{k:02X}h' for k in kinds)}"
 
@@ -55,8 +54,7 @@ def _known(
 def accelerometer_converters_get_commands_that_they_have(e: Capture, row: Requirement) -> str:
     """Decode every burst on DIn."""
     found = port_traffic(e).of(temp=False)
-    if not found:
-        raise Inconclusive("no command was recorded")
+    conclusive(found, "no command was recorded")
     for b in port_traffic(e).reads:
         if "1" in b.sent:
             raise Failed("DIn high in a read", "low", at_ns=int(b.rise_ns[0]), lines=ACCEL)
@@ -78,8 +76,7 @@ def _setup_hold(e: Capture, found: Sequence[Burst], line: str, *, falls: bool, d
     """A data line stands still around the edges that take it. Raises Failed."""
     edges = np.sort(np.concatenate([b.fall_ns if falls else b.rise_ns for b in found]))
     t = e.wires[line].t_ns[1:]
-    if not len(t):
-        raise Inconclusive(f"{line} never changes")
+    conclusive(len(t), f"{line} never changes")
     after = np.searchsorted(edges, t)
     ahead = np.where(after < len(edges), edges[np.minimum(after, len(edges) - 1)] - t, 1 << 60)
     since = np.where(after > 0, t - edges[np.maximum(after - 1, 0)], 1 << 60)

@@ -31,7 +31,7 @@ from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 STATUS = 1
@@ -40,8 +40,7 @@ SCANNED = (STATUS, 2)  # of the temperature converter: DRDY is a level, MUX is t
 
 def fact(e: Capture, name: str) -> Any:
     """What the stimulus has of this. Raises Inconclusive where it has none."""
-    if name not in e.facts:
-        raise Inconclusive(f"the scene has no {name}")
+    conclusive(name in e.facts, f"the scene has no {name}")
     return e.facts[name]
 
 
@@ -61,8 +60,7 @@ def _all(e: Capture, sub: int, due: int, what: str, mask: int = 0xFF) -> str:
     """A register of all three accelerometer converters. Raises Failed."""
     for index in ACCEL:
         saw = register(e, index, sub) & mask
-        if saw != due:
-            raise Failed(f"{what} {saw:02X}h at {index:04X}h", f"{due:02X}h")
+        expect(saw == due, f"{what} {saw:02X}h at {index:04X}h", f"{due:02X}h")
     return f"{what} {due:02X}h on three converters"
 
 
@@ -95,18 +93,14 @@ def status_is_what_its_writes_left(e: Capture, row: Requirement) -> str:
     """Read STATUS of the temperature converter after the set-up."""
     mask, due = int(row.limit("mask_bits")), int(row.limit("value_bits"))
     saw = register(e, TEMP, STATUS) & mask
-    if saw != due:
-        raise Failed(f"ACAL and BUFEN {saw:02X}h", f"{due:02X}h")
-    return f"ACAL and BUFEN {saw:02X}h"
+    return expect(saw == due, f"ACAL and BUFEN {saw:02X}h", f"{due:02X}h")
 
 
 @check("registers", "PSA2-REG-04")
 def drate_is_100_a_second(e: Capture, row: Requirement) -> str:
     """Read DRATE of the temperature converter after the set-up."""
     saw, due = register(e, TEMP, DRATE), int(row.limit("drate_code"))
-    if saw != due:
-        raise Failed(f"DRATE {saw:02X}h", f"{due:02X}h")
-    return f"DRATE {saw:02X}h"
+    return expect(saw == due, f"DRATE {saw:02X}h", f"{due:02X}h")
 
 
 @check("registers", "PSA2-REG-05", "PSA1-REG-01")
@@ -133,8 +127,7 @@ def the_temperature_converter_has_its_reset_values(e: Capture) -> str:
     for sub, name, due in own:
         mask = 0xFE if sub == STATUS else 0x00 if sub == 2 else 0xF0 if name == "IO" else 0xFF
         saw = register(e, TEMP, sub)
-        if saw & mask != due & mask:
-            raise Failed(f"{name} {saw:02X}h", f"{due:02X}h")
+        expect(saw & mask == due & mask, f"{name} {saw:02X}h", f"{due:02X}h")
     return f"{len(own)} registers"
 
 
@@ -181,8 +174,7 @@ def the_part_of_the_temperature_converter_cannot_be_written(e: Capture, row: Req
 def one_write_reaches_three_converters(e: Capture) -> str:
     """Write through 2000h and read 2000h, 2003h and 2004h."""
     found = _written(e, temp=False)
-    if not found:
-        raise Inconclusive("nothing was written")
+    conclusive(found, "nothing was written")
     for _, sub, value, answer, read in found:
         saw = [number(a) for a in read]
         if answer == Answer() and len(set(saw)) != 1:
@@ -239,8 +231,7 @@ def _between_its_opcodes(e: Capture) -> None:
 
 def _no_overrun(e: Capture) -> None:
     lost = number(fact(e, "after")[OVERRUNS]) - number(fact(e, "before")[OVERRUNS])
-    if lost:
-        raise Failed(f"{lost} overruns counted", "none")
+    expect(not lost, f"{lost} overruns counted", "none")
 
 
 @check("registers", "PSA2-ACC-02")
@@ -259,8 +250,7 @@ def register_reads_cost_no_conversion_at_the_highest_rate(e: Capture) -> str:
     if refused:
         raise Failed(f"4000 SPS in the fast form answered by {refused[0].abort:08X}h", "it is taken")
     log = e.frames_of("PSA2_FAST")
-    if len(log) < LEAST:
-        raise Inconclusive(f"{len(log)} frames PSA2_FAST came")
+    conclusive(len(log) >= LEAST, f"{len(log)} frames PSA2_FAST came")
     try:
         twice = np.flatnonzero(np.diff(log.raw("PSA2_FAST")["TOG"]) == 0)
     except ValueError as err:
@@ -357,9 +347,7 @@ def one_access_at_a_time(e: Capture, row: Requirement) -> str:
 def a_sync_that_could_not_pulse_is_counted(e: Capture) -> str:
     """SYNC with 2024h = 1 while the set-up runs."""
     before, after = (number(a) for a in fact(e, "missed"))
-    if after != before + 1:
-        raise Failed(f"2030h:{SYNCS_MISSED} {before}, then {after}", "one more")
-    return f"2030h:{SYNCS_MISSED} {before}, then {after}"
+    return expect(after == before + 1, f"2030h:{SYNCS_MISSED} {before}, then {after}", "one more")
 
 
 # ---- opcodes
@@ -369,8 +357,7 @@ def a_sync_that_could_not_pulse_is_counted(e: Capture) -> str:
 def opcodes_are_taken(e: Capture) -> str:
     """RESET to both groups: answered, and CONFIG0 and DRATE are those of the parts afterwards."""
     for group, answer in zip(("accelerometer", "temperature"), fact(e, "answers"), strict=True):
-        if answer != Answer():
-            raise Failed(f"RESET to the {group} converters answered by {answer.abort:08X}h", "it is taken")
+        expect(answer == Answer(), f"RESET to the {group} converters answered by {answer.abort:08X}h", "it is taken")
     code = dict(table("ads1256"))["DRATE"]
     if register(e, TEMP, DRATE) != code:
         raise Failed(f"DRATE {register(e, TEMP, DRATE):02X}h after RESET", f"{code:02X}h")

@@ -14,7 +14,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Floats, Ints
 
 NS = 1e9
@@ -46,15 +46,13 @@ def port_bursts(e: Capture, *, temp: bool) -> list[Burst]:
 def temp_messages(e: Capture) -> list[Message]:
     """Raises Inconclusive where there are few."""
     found = port_traffic(e).of(temp=True)
-    if len(found) < LEAST:
-        raise Inconclusive(f"{len(found)} messages on the temperature port; expected {LEAST}")
+    conclusive(len(found) >= LEAST, f"{len(found)} messages on the temperature port; expected {LEAST}")
     return found
 
 
 def least(e: Capture, saw_ns: Floats, at_ns: Ints, due_ns: float, what: str, lines: Sequence[str]) -> str:
     """Raises Failed for the shortest of intervals that is too short, Inconclusive for none."""
-    if not len(saw_ns):
-        raise Inconclusive(f"nothing was recorded of {what}")
+    conclusive(len(saw_ns), f"nothing was recorded of {what}")
     k = int(np.argmin(saw_ns))
     if saw_ns[k] < due_ns - e.slack_ns(due_ns):
         raise Failed(f"{saw_ns[k]:.0f} ns {what}", f"not less than {due_ns:.1f} ns", at_ns=int(at_ns[k]), lines=lines)
@@ -65,8 +63,7 @@ def near(
     e: Capture, saw_ns: Floats, at_ns: Ints, due_ns: float, slack_ns: float, what: str, lines: Sequence[str]
 ) -> str:
     """Raises Failed for the interval that is farthest off, if it is too far; Inconclusive for none."""
-    if not len(saw_ns):
-        raise Inconclusive(f"nothing was recorded of {what}")
+    conclusive(len(saw_ns), f"nothing was recorded of {what}")
     k = int(np.argmax(np.abs(saw_ns - due_ns)))
     allowed_ns = slack_ns + e.slack_ns(due_ns)
     if abs(saw_ns[k] - due_ns) > allowed_ns:
@@ -119,8 +116,7 @@ def _quiet(e: Capture, quiet_ns: float) -> Ints:
     )
     gap = np.diff(edges)
     middle: Ints = (edges[:-1] + gap // 2)[gap > 2 * quiet_ns]
-    if len(middle) < LEAST:
-        raise Inconclusive(f"{len(middle)} quiet instants in the recording; expected {LEAST}")
+    conclusive(len(middle) >= LEAST, f"{len(middle)} quiet instants in the recording; expected {LEAST}")
     return middle
 
 
@@ -128,8 +124,7 @@ def _quiet(e: Capture, quiet_ns: float) -> Ints:
 def sync_a_is_high_for_its_time(e: Capture, row: Requirement) -> str:
     """Measure the pulse on SYNC_A."""
     up, down = e.wires.pulses("SYNC_A", 1)
-    if not len(up):
-        raise Failed("no pulse on SYNC_A", "one after Res", at_ns=e.wires.start_ns, lines=("SYNC_A", "Res"))
+    expect(len(up), "no pulse on SYNC_A", "one after Res", at_ns=e.wires.start_ns, lines=("SYNC_A", "Res"))
     saw = (down - up).astype(np.float64)
     return near(e, saw, up, row.limit("pulse_ns"), row.limit("tolerance_ns"), "of SYNC_A high", ("SYNC_A",))
 
@@ -138,12 +133,10 @@ def sync_a_is_high_for_its_time(e: Capture, row: Requirement) -> str:
 def sync_a_moves_on_falling_edges_of_fclk(e: Capture, row: Requirement) -> str:
     """Pulse SYNC_A while frames flow: where do its edges lie in the clock that the falls of DRD_A before it give?"""
     edges = e.wires["SYNC_A"].t_ns[1:]
-    if not len(edges):
-        raise Failed("no pulse on SYNC_A", "one for the SYNC with 2024h = 1", at_ns=e.wires.end_ns, lines=("SYNC_A",))
+    expect(len(edges), "no pulse on SYNC_A", "one for the SYNC with 2024h = 1", at_ns=e.wires.end_ns, lines=("SYNC_A",))
     falls = e.wires.falls("DRD_A")
     falls = falls[falls < edges[0]]
-    if len(falls) <= LEAST:
-        raise Inconclusive(f"{len(falls)} falls of DRD_A before the pulse")
+    conclusive(len(falls) > LEAST, f"{len(falls)} falls of DRD_A before the pulse")
     clocks = row_for(e, "PSA2-READ-06").limit("period_tclk")
     period_ns = float(falls[-1] - falls[-1 - LEAST]) / LEAST / clocks
     phase = (edges - falls[-1]) / period_ns % 1.0
@@ -230,8 +223,7 @@ def sclk_has_its_frequency_and_rests_low(e: Capture, row: Requirement) -> str:
     """Measure the period of SClk within bursts, and look at it between them."""
     due_ns = NS / row.limit("sclk_hz")
     found = [b for b in port_traffic(e).bursts if b.bits > 1 and len(b.fall_ns) == b.bits]
-    if not found:
-        raise Inconclusive("no burst of SClk was recorded")
+    conclusive(found, "no burst of SClk was recorded")
     at = np.array([b.rise_ns[0] for b in found])
     count = np.array([b.bits - 1 for b in found])
     period_ns = np.array([b.rise_ns[-1] - b.rise_ns[0] for b in found]) / count
@@ -274,8 +266,7 @@ def data_wait_after_rdata(e: Capture, row: Requirement) -> str:
 def dout_stands_still_while_the_other_port_is_used(e: Capture) -> str:
     """Look for changes of DOutX, DOutY and DOutZ while CST is low."""
     falls, rises = e.wires.pulses("CST", 0)
-    if len(falls) < LEAST:
-        raise Inconclusive(f"CST was low {len(falls)} times")
+    conclusive(len(falls) >= LEAST, f"CST was low {len(falls)} times")
     for line in AXES:
         t = e.wires[line].t_ns[1:]
         k = np.searchsorted(falls, t, "right") - 1
@@ -316,8 +307,7 @@ def _read_of_each_fall(e: Capture) -> list[tuple[int, list[Burst]]]:
     reads = port_traffic(e).reads
     begin = np.array([b.rise_ns[0] for b in reads], np.int64)
     cut = np.searchsorted(begin, falls)
-    if len(falls) <= LEAST:
-        raise Inconclusive(f"{len(falls)} falls of DRD_A were recorded")
+    conclusive(len(falls) > LEAST, f"{len(falls)} falls of DRD_A were recorded")
     return [(int(falls[k]), reads[cut[k] : cut[k + 1]]) for k in range(len(falls) - 1)]
 
 
@@ -336,8 +326,7 @@ def a_read_has_its_bits(e: Capture, row: Requirement) -> str:
     """Count the pulses of SClk of each read."""
     due = int(row.limit("read_bits"))
     reads = port_traffic(e).reads
-    if len(reads) < LEAST:
-        raise Inconclusive(f"{len(reads)} reads were recorded")
+    conclusive(len(reads) >= LEAST, f"{len(reads)} reads were recorded")
     for b in reads[:-1]:
         if b.bits != due:
             raise Failed(f"{b.bits} pulses of SClk in a read", f"{due}", at_ns=int(b.rise_ns[0]), lines=READING)
@@ -373,8 +362,7 @@ def int_falls_after_the_read(e: Capture, row: Requirement) -> str:
     falls, ints = e.wires.falls("DRD_A"), e.wires.falls("Int")
     k = np.searchsorted(falls, ints, "right") - 1
     ints, k = ints[k >= 0], k[k >= 0]
-    if len(ints) < LEAST:
-        raise Inconclusive(f"{len(ints)} frames were recorded")
+    conclusive(len(ints) >= LEAST, f"{len(ints)} frames were recorded")
     after = (ints - falls[k]).astype(np.float64)
     bad = (after < lo - e.slack_ns(lo)) | (after > hi + e.slack_ns(hi))
     if bad.any():
@@ -388,8 +376,7 @@ def int_falls_after_the_read(e: Capture, row: Requirement) -> str:
 def every_conversion_gives_a_frame(e: Capture) -> str:
     """Count the falls of Int between falls of DRD_A."""
     falls, ints = e.wires.falls("DRD_A"), e.wires.falls("Int")
-    if len(falls) <= LEAST:
-        raise Inconclusive(f"{len(falls)} falls of DRD_A were recorded")
+    conclusive(len(falls) > LEAST, f"{len(falls)} falls of DRD_A were recorded")
     count = np.diff(np.searchsorted(ints, falls))
     if (count != 1).any():
         k = int(np.flatnonzero(count != 1)[0])

@@ -12,7 +12,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.signals import Ints
 
 ACCEL = ("Res", "SClk", "DIn", "DRD_A", "SYNC_A", "CST")
@@ -65,8 +65,7 @@ class SetUp:
     def nth(self, line: str, n: int) -> Step:
         """The n-th thing done on a line after Res. Raises Failed where there are fewer."""
         found = [s for s in self.steps if s.line == line]
-        if len(found) <= n:
-            raise Failed(f"{len(found)} on {line} after Res", f"{n + 1}", at_ns=self.res_ns, lines=ACCEL + TEMP)
+        expect(len(found) > n, f"{len(found)} on {line} after Res", f"{n + 1}", at_ns=self.res_ns, lines=ACCEL + TEMP)
         return found[n]
 
 
@@ -79,8 +78,7 @@ def set_up(e: Capture) -> SetUp:
     """After the last pulse on Res that the recording has whole. Raises Inconclusive where there is none."""
     t = port_traffic(e)
     ends = e.wires.pulses("Res", 0)[1]
-    if not len(ends):
-        raise Inconclusive("the recording has no pulse on Res")
+    conclusive(len(ends), "the recording has no pulse on Res")
     res_ns = int(ends[-1])
     steps = [Step(m.begin_ns, m.end_ns, "DInT" if m.temp else "DIn", m.sent) for m in t.messages]
     for line, active in (("SYNC_A", 1), ("SYNC_T", 0)):
@@ -105,8 +103,7 @@ def demanded(e: Capture) -> list[tuple[str, bytes]]:
 
 def _is(step: Step, row: Requirement, what: str) -> str:
     due = sent_by(row).hex(" ").upper()
-    if step.sent != sent_by(row):
-        raise Failed(step.name, f"{due} as {what}", at_ns=step.begin_ns, lines=ACCEL + TEMP)
+    expect(step.sent == sent_by(row), step.name, f"{due} as {what}", at_ns=step.begin_ns, lines=ACCEL + TEMP)
     return f"{due} {step.begin_ns * 1e-6:.3f} ms"
 
 
@@ -137,8 +134,7 @@ def _span(e: Capture, row: Requirement, begin_ns: float, end_ns: float, lo: str,
 def first_fall(falls: Ints, after_ns: float, line: str) -> int:
     """Raises Failed where the line does not fall any more."""
     later = falls[falls > after_ns]
-    if not len(later):
-        raise Failed(f"{line} does not fall", f"a fall of {line}", at_ns=after_ns, lines=ACCEL + TEMP)
+    expect(len(later), f"{line} does not fall", f"a fall of {line}", at_ns=after_ns, lines=ACCEL + TEMP)
     return int(later[0])
 
 
@@ -146,11 +142,9 @@ def first_fall(falls: Ints, after_ns: float, line: str) -> int:
 def res_rests_high_and_acts_low(e: Capture, row: Requirement) -> str:
     """Look at Res before and after the reset."""
     low, high = e.wires.pulses("Res", 0)
-    if not len(low):
-        raise Failed("no low pulse on Res", "one", at_ns=e.wires.start_ns, lines=("Res",))
+    expect(len(low), "no low pulse on Res", "one", at_ns=e.wires.start_ns, lines=("Res",))
     total_ns = int((high - low).sum())
-    if not e.wires["Res"].at(e.wires.end_ns):
-        raise Failed("Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
+    expect(e.wires["Res"].at(e.wires.end_ns), "Res low at the end", "high", at_ns=e.wires.end_ns, lines=("Res",))
     if total_ns > row.limit("low_max_share") * (e.wires.end_ns - e.wires.start_ns):
         raise Failed("Res low most of the time", "high", at_ns=int(low[0]), lines=("Res",))
     return f"{len(low)} low pulse of {total_ns * 1e-3:.1f} us, high otherwise"
@@ -361,8 +355,7 @@ def int_is_quiet_while_the_set_up_lasts(e: Capture, row: Requirement) -> str:
     k = int(np.argmax(quiet_ns))
     due_ns = row.limit("quiet_min_ms") * MS
     if quiet_ns[k] < due_ns - e.slack_ns(due_ns):
-        if len(e.wires.gaps_ns):
-            raise Inconclusive("the line port lost samples, and with them time")
+        conclusive(not len(e.wires.gaps_ns), "the line port lost samples, and with them time")
         saw = f"Int falls again after {quiet_ns[k] / MS:.2f} ms"
         raise Failed(saw, f"{due_ns / MS:g} ms or more", at_ns=int(falls[k + 1]), lines=("Int", "Res"))
     return f"no fall of Int for {quiet_ns[k] / MS:.2f} ms"
@@ -406,8 +399,7 @@ def power_up_begins_anew(e: Capture) -> str:
     if not boot:
         raise Failed("no boot-up message", "one after power-up", frames=e.can.frames[:20])
     after = [f for f in e.frames_of("PSA2_XY").frames if f.t_s > boot[-1].t_s]
-    if not after:
-        raise Inconclusive("no PSA2_XY came after power-up")
+    conclusive(after, "no PSA2_XY came after power-up")
     seq = int.from_bytes(after[0].data[6:8], "little")
     if seq != 0:
         raise Failed(f"SEQ {seq} first", "0", frames=after[:4])

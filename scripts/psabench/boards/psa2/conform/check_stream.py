@@ -15,7 +15,7 @@ from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.protocol_files import message
 
 LINES = ("Int", "Data", "CLK")
@@ -107,8 +107,7 @@ def no_frame_before_its_transfer_has_ended(e: Capture, row: Requirement) -> str:
     bad = after_us < least_us
     if (n := first_of(bad)) is not None:
         raise Failed(f"PSA2_XY {after_us[n]:.0f} us after its sample", f"{least_us:.0f} us or more", frames=p.about(n))
-    if not len(since_us):
-        raise Failed("no rise of Int before any PSA2_XY", "one before each", at_ns=e.wires.start_ns, lines=LINES)
+    expect(len(since_us), "no rise of Int before any PSA2_XY", "one before each", at_ns=e.wires.start_ns, lines=LINES)
     if since_us.max() > row.limit("after_int_max_us"):
         n = int(np.argmax(since_us)) + int((k == 0).sum())
         raise Failed(f"PSA2_XY {since_us.max():.0f} us after Int", "it follows at once", frames=p.about(n))
@@ -166,8 +165,7 @@ def tstamp_is_the_fall_of_drd_a(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP with the falls of DRD_A."""
     p = pairs(e)
     falls = e.wires.falls("DRD_A")
-    if len(falls) < LEAST:
-        raise Inconclusive(f"{len(falls)} falls of DRD_A were recorded")
+    conclusive(len(falls) >= LEAST, f"{len(falls)} falls of DRD_A were recorded")
     due = np.unique(falls // round(unit_us(e) * 1e3) % (1 << STAMP_BITS))
     bad = ~np.isin(p.stamp % (1 << STAMP_BITS), due)
     if bad.sum() > row.limit("edge_max_frames"):
@@ -183,8 +181,7 @@ def samples_come_whole(e: Capture, row: Requirement) -> str:
     """Start and stop the stream at all phases of a sample: is there a second half without a first?"""
     first, second = (int(message(n).frame_id) - 5 + e.node for n in ("PSA2_XY", "PSA2_ZT"))
     halves = [f for f in e.can.frames if f.can_id in (first, second) and not f.error]
-    if len(halves) < LEAST:
-        raise Inconclusive(f"{len(halves)} halves of samples came")
+    conclusive(len(halves) >= LEAST, f"{len(halves)} halves of samples came")
     for k, f in enumerate(halves):
         if f.can_id == second and (k == 0 or halves[k - 1].can_id == second):
             raise Failed("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
@@ -225,8 +222,7 @@ def _meanwhile(e: Capture, sub: int) -> Capture:
     """
     answer, what = int(row_for(e, "BUS-ID-01").limit("sdo_tx_id")) + e.node, bytes([0x30, 0x20, sub])
     at = [k for k, f in enumerate(e.can.frames) if f.can_id == answer and f.data[1:4] == what and not f.sent]
-    if len(at) < 2:
-        raise Inconclusive("the answers that told the counter are not in the log")
+    conclusive(len(at) >= 2, "the answers that told the counter are not in the log")
     return e.with_can(CanLog(frames=e.can.frames[at[0] : at[-1]]))
 
 
@@ -260,8 +256,7 @@ def seq_begins_with_0(e: Capture) -> str:
         raise Failed("no boot-up message after the reset", "one", frames=e.can.frames[:10])
     log = CanLog(frames=e.can.frames[boots[-1] :])
     first = e.with_can(log).frames_of("PSA2_XY").frames[:1]
-    if not first or len(first[0].data) != 8:
-        raise Inconclusive("no PSA2_XY came after the reset")
+    conclusive(first and len(first[0].data) == 8, "no PSA2_XY came after the reset")
     seq = int.from_bytes(first[0].data[6:8], "little")
     if seq:
         raise Failed(f"SEQ {seq} first", "0", frames=log.frames[:6])

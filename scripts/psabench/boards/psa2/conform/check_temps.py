@@ -17,7 +17,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
 TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement wants, one every 10 ms at 1000 SPS
@@ -47,8 +47,7 @@ def temperature_codes_are_the_upper_bits_that_were_read(e: Capture, row: Require
     """Compare the temperature codes with the words on DOutT."""
     bits, code_bits = int(row.limit("read_bits")), int(row.limit("code_bits"))
     bursts = [b for m in port_traffic(e).of(temp=True) if m.sent[:1] == b"\x01" for b in m.bursts[1:]]
-    if len(bursts) < LEAST:
-        raise Inconclusive(f"{len(bursts)} temperatures were read")
+    conclusive(len(bursts) >= LEAST, f"{len(bursts)} temperatures were read")
     for b in bursts[:-1]:
         if b.bits != bits:
             raise Failed(f"{b.bits} clocks", f"{bits}", at_ns=int(b.rise_ns[0]), lines=("SClk", "CST", "DOutT"))
@@ -114,8 +113,7 @@ def the_scan_waits_for_a_calibration(e: Capture, row: Requirement) -> str:
 def drd_t_rises_when_a_temperature_is_read(e: Capture) -> str:
     """Look at DRD_T before and after each RDATA."""
     reads = [m for m in temp_messages(e) if m.sent[:1] == bytes([RDATA])][:-1]
-    if not reads:
-        raise Inconclusive("no RDATA was recorded")
+    conclusive(reads, "no RDATA was recorded")
     begin, end = (np.array([getattr(m, side) for m in reads], np.int64) for side in ("begin_ns", "end_ns"))
     for at_ns, level in ((begin, 0), (end, 1)):
         bad = e.wires["DRD_T"].at(at_ns) != level
@@ -224,8 +222,7 @@ def a_temperature_settles_in_its_time(e: Capture, row: Requirement) -> str:
     """Measure the rise of SYNC_T to the next fall of DRD_T."""
     rises, falls = e.wires.rises("SYNC_T"), e.wires.falls("DRD_T")
     rises = rises[rises < falls[-1]] if len(falls) else rises[:0]
-    if not len(rises):
-        raise Inconclusive("no fall of DRD_T after a pulse on SYNC_T was recorded")
+    conclusive(len(rises), "no fall of DRD_T after a pulse on SYNC_T was recorded")
     saw = (falls[np.searchsorted(falls, rises)] - rises).astype(np.float64)
     lo, hi = row.limit("t18_min_ms") * 1e6, row.limit("t18_max_ms") * 1e6
     return near(e, saw, rises, (lo + hi) / 2, (hi - lo) / 2, "from SYNC_T to DRD_T", TEMP)

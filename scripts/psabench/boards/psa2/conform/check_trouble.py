@@ -12,7 +12,7 @@ from psabench.conform.capture.log import CanFrame, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.protocol_files import message
 
 # ---- what does not fit the bus
@@ -51,8 +51,7 @@ def a_rate_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
 def a_refused_rate_never_reaches_the_converters(e: Capture) -> str:
     """Count the writes of CONFIG0 on DIn: the one in form 1 that was taken."""
     n = sum(m.sent[:1] == b"\x41" for m in port_traffic(e).of(temp=False))
-    if n != 1:
-        raise Failed(f"{n} writes of CONFIG0 on DIn", "one, in form 1", at_ns=e.wires.start_ns, lines=ACCEL_LINES)
+    expect(n == 1, f"{n} writes of CONFIG0 on DIn", "one, in form 1", at_ns=e.wires.start_ns, lines=ACCEL_LINES)
     return "one write of CONFIG0 on DIn, that in form 1"
 
 
@@ -104,8 +103,7 @@ def axes_go_on_without_temperatures(e: Capture, row: Requirement) -> str:
     p = pairs(segment(e, "stream", "silent end"))
     p.unbroken()
     at = p.new.nonzero()[0]
-    if not len(at):
-        raise Inconclusive("no new temperature came")
+    conclusive(len(at), "no new temperature came")
     pause = max(at[1:] - at[:-1]) if len(at) > 1 else len(p) - at[0]
     if pause < row.limit("silent_min_frames"):
         raise Failed(f"T_NEW pauses for {pause} frames at most", "the converter is silent", frames=p.about(int(at[-1])))
@@ -139,6 +137,5 @@ def time_outs_are_counted(e: Capture) -> str:
 def an_access_without_data_ready_is_aborted(e: Capture, row: Requirement) -> str:
     """Read a register of the silent temperature converter."""
     due, answer = int(row.limit("abort_code")), fact(e, "access")
-    if answer.abort != due:
-        raise Failed(f"answered by {answer.abort:08X}h {answer.value}", f"abort {due:08X}h")
+    expect(answer.abort == due, f"answered by {answer.abort:08X}h {answer.value}", f"abort {due:08X}h")
     return f"abort {due:08X}h"

@@ -16,7 +16,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
 # ---- words on the line beside CAN
@@ -191,8 +191,7 @@ def word_t_has_the_status(e: Capture, row: Requirement) -> str:
 def _read_words(e: Capture) -> Ints:
     """(n, 3) upper 24 bits of what DOutX, DOutY and DOutZ had at each read."""
     reads = [b for b in port_traffic(e).reads if b.bits >= 24]
-    if len(reads) < LEAST:
-        raise Inconclusive(f"{len(reads)} reads were recorded")
+    conclusive(len(reads) >= LEAST, f"{len(reads)} reads were recorded")
     return signed(np.array([[int(w[:24], 2) for w in b.got] for b in reads], np.int64), 24)
 
 

@@ -11,7 +11,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed
+from psabench.conform.verdict import Failed, expect
 from psabench.errors import CycleRefused
 
 CYCLE = 0x08  # of STATUS
@@ -48,8 +48,7 @@ def no_cycle_without_int0_and_fl1(s: Dut) -> str:
         if status(s) & CYCLE:
             raise Failed(f"a cycle with FLAGS {flags}", "none without both INT0 and FL1")
     _waiting(s)
-    if not status(s) & CYCLE:
-        raise Failed("no cycle with FLAGS 3", "one")
+    expect(status(s) & CYCLE, "no cycle with FLAGS 3", "one")
     calm(s)
     return "no cycle with FLAGS 0, 1 and 2, one with 3"
 
@@ -114,8 +113,7 @@ def a_strobe_for_another_word_is_refused(s: Dut, row: Requirement) -> str:
     line_refused(s, "R 2", code)
     line_refused(s, "R 1", code)
     first = line(s, "R 0").data
-    if first == 0:
-        raise Failed("0000h from X after refusals", "its word")
+    expect(first != 0, "0000h from X after refusals", "its word")
     return f"refused, and X gave {first:04X}h afterwards"
 
 
@@ -173,8 +171,7 @@ def channels_come_back_with_their_codes(s: Dut, row: Requirement) -> str:
         for channel in range(int(row.limit("channels_count"))):
             line(s, f"W {address} {channel:04X}")
             got = line(s, f"R {address}").data
-            if got >> bits != channel:
-                raise Failed(f"{got:04X}h at 0{address}h", f"channel {channel} above {bits} bits")
+            expect(got >> bits == channel, f"{got:04X}h at 0{address}h", f"channel {channel} above {bits} bits")
             seen.append(f"{got & (1 << bits) - 1:03X}h")
     return f"codes {' '.join(seen)}"
 

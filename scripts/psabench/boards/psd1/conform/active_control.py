@@ -25,7 +25,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.busport import Cycle
 from psabench.link.can_host import QUANTUM_S
 
@@ -83,8 +83,7 @@ def control_words_are_read_as_they_are(s: Dut, row: Requirement) -> str:
 def coefficients_are_kept(s: Dut) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
     first, again = _coefficients(s), _coefficients(s)
-    if not all(first) or first != again:
-        raise Failed(f"{first}, then {again}", "six that are not 0, and the same again")
+    expect(all(first) and first == again, f"{first}, then {again}", "six that are not 0, and the same again")
     return f"zero {first[:3]}, full scale {first[3:]}"
 
 
@@ -94,8 +93,7 @@ def coefficients_are_shown_on_the_bus(s: Dut) -> str:
     for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), _coefficients(s), strict=True):
         line(s, f"W E {command:X}")
         got = line(s, "R C").data << 16 | line(s, "R D").data
-        if got != due:
-            raise Failed(f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
+        expect(got == due, f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
     return "six by COMMAND as on CAN"
 
 
@@ -131,8 +129,7 @@ def uc1_calibrates_anew(s: Dut, row: Requirement) -> str:
         s.unit.node.write(index, 0, value)
         took.append(s.bench.time_s - begun_s)
     after = _coefficients(s)
-    if before == after:
-        raise Failed(f"coefficients {before} before and after", "new ones")
+    expect(before != after, f"coefficients {before} before and after", "new ones")
     if s.lockstep and took[0] > most_s:
         raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
     if s.lockstep and took[0] < row.limit("answer_min_periods") * period_s(s.variant):
@@ -159,8 +156,7 @@ def control_words_that_cannot_be_are_refused(s: Dut, row: Requirement) -> str:
     ]
     for index, value in wrong:
         refused(lambda i=index, v=value: s.unit.node.write(i, 0, v), code, f"{value:06X}h to {index:04X}h")  # type: ignore[misc]
-        if not s.unit.refusal():
-            raise Failed(f"no reason in 2031h after {value:06X}h to {index:04X}h", "one in words")
+        expect(s.unit.refusal(), f"no reason in 2031h after {value:06X}h to {index:04X}h", "one in words")
     if _control(s) != (uc1, uc2):
         raise Failed("{:06X}h, {:06X}h".format(*_control(s)), "the control words as before")
     _cycles(s, 4)
@@ -182,8 +178,7 @@ def commands_come_one_after_the_other(s: Dut, row: Requirement) -> str:
         refused(port(s).answer, code, "W E 1")
         told = port(s).answer()
         busy = told.data if isinstance(told, Cycle) else 0
-    if not busy & 0x8000:
-        raise Failed(f"COMMAND {busy:04X}h", "bit 15, under way")
+    expect(busy & 0x8000, f"COMMAND {busy:04X}h", "bit 15, under way")
     return "the second is refused while the first is under way"
 
 
@@ -198,8 +193,7 @@ def a_command_cuts_a_cycle_that_waits(s: Dut, row: Requirement) -> str:
     s.unit.node.write(OD.UC2, 0, _control(s)[1])
     took_s = s.bench.time_s - begun_s
     cut = int(s.unit.node.read(OD.COUNTERS, 24)) - before
-    if cut != 1:
-        raise Failed(f"{cut} cycles cut", "1")
+    expect(cut == 1, f"{cut} cycles cut", "1")
     if s.lockstep and took_s < timeout_s:
         raise Failed(f"an answer after {took_s * 1e3:.2f} ms", f"{timeout_s * 1e3:g} ms of timeout first")
     return f"one cycle cut, answer after {took_s * 1e3:.1f} ms"
@@ -278,14 +272,12 @@ def words_beyond_full_scale_are_marked(s: Dut, row: Requirement) -> str:
     _set(s, CLIP_GAIN << GAIN_SHIFT)
     words = _cycles(s, 6)
     calm(s)
-    if np.any(plain["CLIP"]):
-        raise Failed("CLIP with words within full scale", "0")
+    expect(not np.any(plain["CLIP"]), "CLIP with words within full scale", "0")
     for axis, volts in beyond.items():
         due = int(row.limit("code_max" if volts > 0 else "code_min"))
         if np.any(words[axis.upper()][1:] != due):
             raise Failed(f"{int(words[axis.upper()][-1]):04X}h on {axis.upper()}", f"{due:04X}h")
-    if not np.all(words["CLIP"][1:]):
-        raise Failed("CLIP 0 with words at their limit", "1")
+    expect(np.all(words["CLIP"][1:]), "CLIP 0 with words at their limit", "1")
     return f"{', '.join(beyond)} at their limits, CLIP 1"
 
 
@@ -307,8 +299,7 @@ def a_word_at_0_alone_is_marked(s: Dut, row: Requirement) -> str:
     low = [a for a in below if np.any(words[a.upper()][1:] != row.limit("code_min"))]
     if low or not all(0 < int(w) < row.limit("code_max") for a in within for w in words[a.upper()][1:]):
         raise Failed(f"{[f'{int(words[a][-1]):04X}h' for a in 'XYZ']}", f"0000h on {', '.join(below)} alone")
-    if not np.all(words["CLIP"][1:]):
-        raise Failed("CLIP 0 with a word at 0000h", "1")
+    expect(np.all(words["CLIP"][1:]), "CLIP 0 with a word at 0000h", "1")
     return f"0000h on {', '.join(below)} alone, CLIP 1"
 
 
@@ -334,8 +325,7 @@ def late_begins_at_its_time(s: Dut, row: Requirement) -> str:
     if not (near & (waited > late_ns)).any() or not (near & (waited < late_ns)).any():
         raise Inconclusive(f"strobes {waited.min()} to {waited.max()} ns after FL2; expected some about {late_ns:g} ns")
     calm(s)
-    if not sure <= told <= may:
-        raise Failed(f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
+    expect(sure <= told <= may, f"{told} late strobes counted", f"{sure}, those later than {late_ns:g} ns", lines=LINES)
     return f"{told} of {len(waited)} strobes late, {waited.min()} to {waited.max()} ns after FL2"
 
 
@@ -361,8 +351,7 @@ def late_strobes_are_told(s: Dut, row: Requirement) -> str:
     if not isinstance(cycles, Readings) or not np.all(cycles["LATE"]) or told != strobes:
         raise Failed(f"{told} late strobes counted", f"LATE in each cycle, {strobes} counted")
     status = line(s, "R 3").data
-    if not status & 1 << 11:
-        raise Failed(f"STATUS {status:04X}h", "bit 11, late")
+    expect(status & 1 << 11, f"STATUS {status:04X}h", "bit 11, late")
     return f"LATE in {len(cycles['LATE'])} cycles, {told} late strobes counted"
 
 
@@ -430,8 +419,7 @@ def messages_tell_what_their_objects_hold(s: Dut) -> str:
     last = {}
     for name in MAPPED:
         log = e.frames_of(name)
-        if not len(log):
-            raise Failed(f"no {name}", "one for each cycle")
+        expect(len(log), f"no {name}", "one for each cycle")
         last[name] = {k: int(v[-1]) for k, v in log.raw(name).items()}
     calm(s)
     for name, objects in MAPPED.items():

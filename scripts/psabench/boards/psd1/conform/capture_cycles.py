@@ -9,7 +9,7 @@ import numpy as np
 
 from psabench.conform.capture.intervals import wires_needed
 from psabench.conform.capture.log import Capture
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
 FRAMES = ("RFX", "RFY", "RFZ")
@@ -77,8 +77,7 @@ def transfers(e: Capture) -> list[Transfer]:
         )
     if found and found[-1].clear < 0:
         found.pop()  # the recording ends in it
-    if len(found) < 3 * LEAST:
-        raise Inconclusive(f"{len(found)} words were read in the recording; expected {3 * LEAST}")
+    conclusive(len(found) >= 3 * LEAST, f"{len(found)} words were read in the recording; expected {3 * LEAST}")
     return found
 
 
@@ -106,8 +105,7 @@ def cycles(e: Capture) -> list[tuple[Transfer, Transfer, Transfer]]:
     if found := trouble(words):
         raise Inconclusive(f"no whole cycles to measure: {found.saw}")
     whole = [(words[k], words[k + 1], words[k + 2]) for k in range(0, len(words) - 2, 3)]
-    if len(whole) < LEAST:
-        raise Inconclusive(f"{len(whole)} whole cycles were recorded; expected {LEAST}")
+    conclusive(len(whole) >= LEAST, f"{len(whole)} whole cycles were recorded; expected {LEAST}")
     return whole
 
 

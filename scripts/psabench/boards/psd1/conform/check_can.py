@@ -10,7 +10,7 @@ from psabench.conform.capture.messages import as_laid_out
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats
 
@@ -19,8 +19,7 @@ ALL = ("PSD1_CYCLE", *BEGUN)
 
 def _told(e: Capture, name: str, least: int = 3) -> CanLog:
     log = e.frames_of(name)
-    if len(log) < least:
-        raise Inconclusive(f"{len(log)} messages {name} came; expected {least}")
+    conclusive(len(log) >= least, f"{len(log)} messages {name} came; expected {least}")
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
     if bad:
@@ -68,10 +67,8 @@ def further_messages_are_off_until_wanted(e: Capture) -> str:
     early = CanLog(frames=e.can.frames[:before])
     for name in BEGUN:
         stray = early.of(name, e.variant.family, e.node)
-        if len(stray):
-            raise Failed(f"{name} before it was switched on", "none", frames=stray.frames)
-        if not len(e.frames_of(name)):
-            raise Failed(f"no {name} after it was switched on", "one for each cycle")
+        expect(not len(stray), f"{name} before it was switched on", "none", frames=stray.frames)
+        expect(len(e.frames_of(name)), f"no {name} after it was switched on", "one for each cycle")
     return "none before, all three after"
 
 

@@ -24,7 +24,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import conclusive
 from psabench.link.signals import Ints
 
 START = ("CLK_1M25", "INT0", "FL1", "DR", "A0", "RFX")
@@ -105,8 +105,7 @@ def the_clock_runs_without_a_gap(e: Capture, row: Requirement) -> str:
     """Measure every period of 1M25 and its high half."""
     rises = e.wires.rises("CLK_1M25")
     up, down = e.wires.pulses("CLK_1M25", 1)
-    if len(rises) < LEAST:
-        raise Inconclusive(f"{len(rises)} rises of 1M25 were recorded")
+    conclusive(len(rises) >= LEAST, f"{len(rises)} rises of 1M25 were recorded")
     tolerance_ns = row.limit("tolerance_ns")
     interval(e, up, down, row.limit("high_ns"), tolerance_ns, "of 1M25 high", ("CLK_1M25",))
     return interval(
@@ -188,8 +187,7 @@ def cycles_come_at_their_rate(e: Capture) -> str:
 def a_cycle_follows_each_fall_of_dr(e: Capture) -> str:
     """Count the falls of DR and the rises of A0 in turn."""
     falls, rises = e.wires.falls("DR"), e.wires.rises("A0")
-    if len(rises) < LEAST or not len(falls):
-        raise Inconclusive(f"{len(falls)} falls of DR, {len(rises)} rises of A0 were recorded")
+    conclusive(len(rises) >= LEAST and len(falls), f"{len(falls)} falls of DR, {len(rises)} rises of A0 were recorded")
     inside = rises[rises > falls[0]]
     n = min(len(inside), len(falls))
     answers = after(rises, falls[:n])
@@ -203,8 +201,7 @@ def lines_rest_at_their_levels(e: Capture, row: Requirement) -> str:
     """Look at every line after Res, before the first control word goes out."""
     moves = edges(e, "TFS")
     moves = moves[moves > e.wires.start_ns]
-    if not len(moves):
-        raise Inconclusive("TFS never moves after Res")
+    conclusive(len(moves), "TFS never moves after Res")
     names = [name for name in PINS if name not in ("CLK_1M25", "FL2")]
     return at_levels(e, names, int(moves[0]) - 1 - round(e.slack_ns(0.0)), row, "at rest", ("TFS",))
 

@@ -29,7 +29,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, conclusive
 
 SERIAL = (*FRAMES, "SCLK", "SDAT", "CLK_1M25")
 HAND = (*FRAMES, "FL2", "CS", "CLK_1M25")
@@ -54,8 +54,7 @@ def the_first_bit_comes_in_time(e: Capture, row: Requirement) -> str:
         SERIAL,
     )
     ones = int(e.wires["SDAT"].at(first).sum())
-    if not ones:
-        raise Inconclusive("no word begins with a 1")
+    conclusive(ones, "no word begins with a 1")
     return f"{len(words)} words, {ones} of them begin with a 1"
 
 
@@ -86,8 +85,7 @@ def each_cycle_is_told_once(e: Capture) -> str:
 def told_words(e: Capture) -> np.ndarray:
     """(n, 3) of PSD1_CYCLE. Raises Inconclusive for fewer than two, Failed for frames of another length."""
     log = e.frames_of("PSD1_CYCLE")
-    if len(log) < 3:
-        raise Inconclusive(f"{len(log)} messages PSD1_CYCLE came")
+    conclusive(len(log) >= 3, f"{len(log)} messages PSD1_CYCLE came")
     try:
         raw = log.raw("PSD1_CYCLE")
     except ValueError as err:

@@ -32,7 +32,7 @@ from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
@@ -135,8 +135,7 @@ def the_first_message_comes_in_time(e: Capture, row: Requirement) -> str:
     due_ms = _first_cycle_ms(e)
     boot = booted(e, "PSD1_HEARTBEAT")
     told = [f for f in e.frames_of("PSD1_CYCLE").frames if f.t_s > boot.t_s]
-    if not told or len(told[0].data) != CYCLE_BYTES:
-        raise Inconclusive("no whole PSD1_CYCLE after the boot-up message")
+    conclusive(told and len(told[0].data) == CYCLE_BYTES, "no whole PSD1_CYCLE after the boot-up message")
     took_ms, period_ms, modulo = (told[0].t_s - boot.t_s) * 1e3, period_s(e.variant) * 1e3, _modulo(e)
     cnt = told[0].data[CNT_AT]  # one that is reported late, because the host was, counts those before it
     before = cnt + modulo * round(((took_ms - due_ms) / period_ms - cnt) / modulo)
@@ -302,8 +301,7 @@ def status_tells_the_word_that_waits(e: Capture, row: Requirement) -> str:
     saw = (bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0))) & int(row.limit("fl2_mask"))) != 0
     first_bad(saw != ready, begin, [f"bit {int(v)}" for v in saw], "FL2 as the line is", ("FL2", "CS"))
     begin = begin[ready]
-    if not len(begin):
-        raise Inconclusive("no read of STATUS while a word waited")
+    conclusive(len(begin), "no read of STATUS while a word waited")
     latest = np.stack([before(e.wires.rises(n), begin) for n in FRAMES], axis=1)
     due = latest.argmax(axis=1)
     axis = (bus_word(e, "D", len(DATA), begin + round(e.slack_ns(0.0))) & mask) >> 1
@@ -320,8 +318,7 @@ def _reads_of_status(e: Capture) -> Ints:
     for name in (*STATUS_LINES, *FRAMES):
         moves = edges(e, name)
         begin = begin[after(moves, begin - 3 - round(2 * e.slack_ns(0.0))) > begin + 2 + round(2 * e.slack_ns(0.0))]
-    if len(begin) < 8:
-        raise Inconclusive(f"{len(begin)} reads of STATUS were recorded")
+    conclusive(len(begin) >= 8, f"{len(begin)} reads of STATUS were recorded")
     return begin
 
 
@@ -329,8 +326,7 @@ def _reads_of_status(e: Capture) -> Ints:
 def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
     """Look for changes of address, data and R/W within strobes, and for their levels between them."""
     begin, end = e.wires.pulses("CS", 0)
-    if len(begin) < 8:
-        raise Inconclusive(f"{len(begin)} strobes were recorded")
+    conclusive(len(begin) >= 8, f"{len(begin)} strobes were recorded")
     slack = round(e.slack_ns(0.0))
     free = end[e.wires["CS"].at(end + slack) == 1]  # another strobe may begin where one ends
     for name in ("RW", *ADDRESS, *DATA):
@@ -353,8 +349,7 @@ def psd1_time_tells_the_cycle(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP, LENGTH and WAITED of PSD1_TIME with A0, FL2 and DR."""
     whole = cycles(e)
     log = e.frames_of("PSD1_TIME")
-    if len(log) < 4:
-        raise Inconclusive(f"{len(log)} messages PSD1_TIME came")
+    conclusive(len(log) >= 4, f"{len(log)} messages PSD1_TIME came")
     try:
         raw = log.raw("PSD1_TIME")
     except ValueError as err:
