@@ -148,8 +148,7 @@ class Talk:
     def upload(self, index: int, sub: int = 0) -> bytes:
         """Value of an object, expedited or in segments. Raises Failed."""
         data = self.ask(read(index, sub))
-        if data[0] == ABORT:
-            raise Failed(f"{index:04X}h:{sub} is refused with {data[7:3:-1].hex().upper()}h", "its value")
+        expect(data[0] != ABORT, f"{index:04X}h:{sub} is refused with {data[7:3:-1].hex().upper()}h", "its value")
         if data[0] & 0xE0 != UPLOAD or data[1:4] != read(index, sub)[1:4]:
             raise Failed(f"{words(data)} as the answer to an upload of {index:04X}h:{sub}", "its value")
         if data[0] & 2:

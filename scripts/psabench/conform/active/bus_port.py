@@ -56,8 +56,7 @@ def each_line_has_its_answer_in_turn(s: Dut) -> str:
     answers = say(s, *lines)
     times = []
     for line, answer in zip(lines, answers, strict=True):
-        if not answer.startswith(kinds[line]):
-            raise Failed(f"{answer!r} to {line!r}", f"{kinds[line]}...")
+        expect(answer.startswith(kinds[line]), f"{answer!r} to {line!r}", f"{kinds[line]}...")
         times.append(_time_ns(answer))
     expect(times == sorted(times), "times that fall", "times in the order of the lines")
     return f"{MANY} lines, {MANY} answers in their order"
@@ -135,8 +134,7 @@ def a_long_line_is_refused(s: Dut, row: Requirement) -> str:
     good = f"R {quiet(s):X}"
     answers = say(s, good.ljust(most), good.ljust(most + 1), good)
     _cycle(answers[0], "R", quiet(s))
-    if not REFUSED.fullmatch(answers[1]) or not answers[1].startswith("E overlong "):
-        raise Failed(repr(answers[1]), "E overlong")
+    expect(REFUSED.fullmatch(answers[1]) and answers[1].startswith("E overlong "), repr(answers[1]), "E overlong")
     _cycle(answers[2], "R", quiet(s))
     return f"{most} characters taken; {answers[1]}"
 
@@ -161,9 +159,7 @@ def times_go_on_by_the_strobe(s: Dut) -> str:
     line = f"R {quiet(s):X} {strobe_ns}"
     times = [_cycle(a, "R", quiet(s))[1] for a in say(s, line, line, line, dwell_s=3.1 * STROBE_MS * 1e-3)]
     apart_ns = [b - a for a, b in itertools.pairwise(times)]
-    if min(apart_ns) < strobe_ns:
-        raise Failed(f"{apart_ns} ns apart", f"{strobe_ns} ns and more")
-    return f"{apart_ns} ns apart"
+    return expect(min(apart_ns) >= strobe_ns, f"{apart_ns} ns apart", f"{strobe_ns} ns and more")
 
 
 def _strobed(s: Dut, strobe_ns: int) -> tuple[int, Strobes]:

@@ -226,10 +226,8 @@ def counters_outlive_a_reset(t: Talk) -> str:
     before, readings = [t.counter(n) for n in names], t.number(Common.COUNTERS, READINGS)
     t.reset(Nmt.RESET)
     after, later = [t.counter(n) for n in names], t.number(Common.COUNTERS, READINGS)
-    if later < readings:
-        raise Failed(f"{readings} readings, {later} after NMT 81h", "as many or more")
-    if after != before or not all(before):
-        raise Failed(f"{', '.join(names)}: {before} became {after}", "the same, none of them 0")
+    expect(later >= readings, f"{readings} readings, {later} after NMT 81h", "as many or more")
+    expect(after == before and all(before), f"{', '.join(names)}: {before} became {after}", "the same, none of them 0")
     return f"{', '.join(names)}: {before}, after NMT 81h {after}"
 
 
@@ -247,9 +245,7 @@ def errors_on_the_wire_are_counted(t: Talk, row: Requirement) -> str:
     """Upload the error counters of the CAN controller while frames are destroyed."""
     most = int(row.limit("count_max"))
     found = {name: t.counter(name) for name in ERRORS_OF_CAN[:2]}
-    if not any(found.values()) or max(found.values()) > most:
-        raise Failed(f"{found}", f"1 to {most} in one of them")
-    return f"{found}"
+    return expect(any(found.values()) and max(found.values()) <= most, f"{found}", f"1 to {most} in one of them")
 
 
 @active("BUS-LOAD-01", needs={"can", "stamps", "lockstep", "stream"})

@@ -98,8 +98,7 @@ def type_0_sends_new_readings_at_sync(t: Talk) -> str:
     begin = t.number(Common.COUNTERS, READINGS)
     came = _sent_by(t, can_id, t.after(*[(t.sync_id, b"")] * 40))
     count = t.number(Common.COUNTERS, READINGS) - begin
-    if came > count + 1:
-        raise Failed(f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
+    expect(came <= count + 1, f"{came} frames at 40 SYNCs, while {count} readings were made", f"{count + 1} at most")
     return f"none without SYNC, 1 at a SYNC, {came} at 40 SYNCs and {count} readings"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from psabench.conform.capture.log import CanFrame, Capture
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.protocol_files import message
 
 EMCY_BYTES = 8
@@ -15,10 +15,8 @@ EMCY_BYTES = 8
 def in_turn(e: Capture, names: Sequence[str]) -> str:
     """The messages of each reading follow one another in this order. Returns what was seen."""
     ids = {e.frames_of(n).frames[0].can_id: k for k, n in enumerate(names) if len(e.frames_of(n))}
-    if not ids:
-        raise Inconclusive(f"none of the messages {', '.join(names)} came")
-    if len(ids) < len(names):
-        raise Failed(f"{len(ids)} of the messages {', '.join(names)}", f"all {len(names)}")
+    conclusive(ids, f"none of the messages {', '.join(names)} came")
+    expect(len(ids) >= len(names), f"{len(ids)} of the messages {', '.join(names)}", f"all {len(names)}")
     order = [(ids[f.can_id], f) for f in e.can.frames if f.can_id in ids and not f.sent]
     for (a, _), (b, f) in pairwise(order):
         if b != (a + 1) % len(names):

@@ -74,8 +74,7 @@ def frames_have_the_identifiers_of_the_node(e: Capture) -> str:
     stray = [f for f in e.can.frames if _is_stray(e, f)]
     if stray:
         raise Failed(f"a frame {stray[0].can_id:03X}h, which is no message of the unit", "its own", frames=stray)
-    if missing:
-        raise Inconclusive(f"no {', '.join(missing)} in the log")
+    conclusive(not missing, f"no {', '.join(missing)} in the log")
     if not mine & {i + e.node for i in pdos(e.variant.family).values()}:
         raise Failed(f"frames {', '.join(f'{i:03X}h' for i in sorted(mine))}", "TPDOs at the identifiers of the page")
     return f"frames {', '.join(f'{i:03X}h' for i in sorted(mine))}"
@@ -169,8 +168,7 @@ def requests_and_answers_take_turns(e: Capture) -> str:
                 _belongs(waiting.pop(0), f)
                 answered += 1
     expect(len(waiting) <= 1, f"{len(waiting)} requests without an answer", "one each", frames=waiting)
-    if answered < 2:
-        raise Inconclusive(f"{answered} SDO requests with their answers in the log")
+    conclusive(answered >= 2, f"{answered} SDO requests with their answers in the log")
     return f"{answered} requests, each with its answer"
 
 
@@ -277,11 +275,9 @@ def lost_samples_are_told(e: Capture, row: Requirement) -> str:
         raise Failed(f"{missing} readings missing, {e.facts['dropped']} counted as dropped", "the same")
     told = _told(e)
     begin = [f for f in told if code_of(f) == int(row.limit("emcy_code"))]
-    if not begin:
-        raise Failed(f"no {int(row.limit('emcy_code')):04X}h", "one", frames=told)
+    expect(begin, f"no {int(row.limit('emcy_code')):04X}h", "one", frames=told)
     after = [f for f in told[told.index(begin[-1]) + 1 :] if code_of(f) == 0]
-    if not after:
-        raise Failed("the condition does not end", f"0000h {row.limit('ends_s'):g} s after the last loss", frames=told)
+    expect(after, "the condition does not end", f"0000h {row.limit('ends_s'):g} s after the last loss", frames=told)
     lasted_s = stamp_s(e, after[0]) - stamp_s(e, begin[-1])
     if lasted_s < row.limit("ends_s") * (1 - e.clock_ppm * PPM):
         raise Failed(f"over after {lasted_s:.6f} s", f"{row.limit('ends_s'):g} s without a loss", frames=told)
@@ -369,8 +365,7 @@ def coming_back_to_the_bus_is_told(e: Capture) -> str:
         raise Failed(f"{code:04X}h without an error frame", "after bus-off", frames=[back])
     away_bits = (back.t_s - last.t_s) / BIT_S - frame_bits(back.can_id, back.data)
     least = row_for(e, "BUS-EMCY-09").limit("recessive_bits")
-    if away_bits < least:
-        raise Failed(f"back after {away_bits:.0f} bits", f"{least} and more", frames=[last, back])
+    expect(away_bits >= least, f"back after {away_bits:.0f} bits", f"{least} and more", frames=[last, back])
     after = told[told.index(back) + 1 :]
     expect(after and code_of(after[0]) == 0, f"no 0000h right after {code:04X}h", "one", frames=told)
     return f"back after {away_bits:.0f} bits; {code:04X}h, then 0000h"

@@ -299,8 +299,7 @@ def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
     """A brown-out and a reset node by somebody else: boot-up messages, numbers from 0."""
     restarts = len([t for t in e.bus.boots if e.bus.starts and t > e.bus.starts[0]])
     enough(restarts, "a boot-up message")
-    if len(e.told.of("restart")) != restarts:
-        raise Failed(f"{len(e.told.of('restart'))} restarts", f"{restarts}")
+    expect(len(e.told.of("restart")) == restarts, f"{len(e.told.of('restart'))} restarts", f"{restarts}")
     e.samples()
     epochs = {p.epoch for _, p in e.match.pairs}
     if epochs != set(range(restarts + 1)):
@@ -351,8 +350,7 @@ def codes_that_stand_still_are_told(e: HostCapture) -> str:
     """The controller sends the same codes for two seconds."""
     e.samples()
     expect(e.told.of("frozen")[:1] == [True], "codes that stood still for 2 s were taken for data", '{"frozen": true}')
-    if e.told.of("frozen") != [True, False]:
-        raise Failed(f"frozen {e.told.of('frozen')}", "frozen, and its end")
+    expect(e.told.of("frozen") == [True, False], f"frozen {e.told.of('frozen')}", "frozen, and its end")
     first = next(
         i for i, (a, b) in enumerate(zip(e.bus.samples, e.bus.samples[1:], strict=False)) if a.codes[:3] == b.codes[:3]
     )
@@ -374,8 +372,7 @@ def a_data_rate_that_is_off_is_told(e: HostCapture) -> str:
     if wrong := [x for x in e.told.events if x.name == "rate_ppm" and x.at < early]:
         raise Failed(f"{wrong[0].value} ppm told at {row.limit('silent_ppm')} ppm", "nothing")
     told = e.told.of("rate_ppm")
-    if not told:
-        raise Failed(f"nothing at {2 * row.limit('report_ppm')} ppm", '{"rate_ppm": ...}')
+    expect(told, f"nothing at {2 * row.limit('report_ppm')} ppm", '{"rate_ppm": ...}')
     e.nothing_but("rate_ppm")
     return f"{told[-1]} ppm"
 
@@ -385,8 +382,7 @@ def an_emergency_is_told_and_its_end(e: HostCapture) -> str:
     """Data-ready of X sticks for 0.4 s."""
     due = [number(f.data[0:2]) for f in e.bus.frames if f.can_id == 0x080 + e.bus.node and len(f.data) == 8]
     enough(len(due) >= 2, "an emergency and its end")
-    if e.told.of("emcy") != due:
-        raise Failed(f"{[f'{c:04X}h' for c in e.told.of('emcy')]}", f"{[f'{c:04X}h' for c in due]}")
+    expect(e.told.of("emcy") == due, f"{[f'{c:04X}h' for c in e.told.of('emcy')]}", f"{[f'{c:04X}h' for c in due]}")
     e.samples()
     return ", ".join(f"{c:04X}h" for c in due)
 
@@ -395,8 +391,7 @@ def an_emergency_is_told_and_its_end(e: HostCapture) -> str:
 def a_unit_without_heartbeat_is_gone(e: HostCapture) -> str:
     """The supply is switched off; four heartbeats do not come."""
     e.samples()
-    if e.told.of("gone") != [True]:
-        raise Failed(f"{len(e.told.of('gone'))} times gone", '{"gone": true} once')
+    expect(e.told.of("gone") == [True], f"{len(e.told.of('gone'))} times gone", '{"gone": true} once')
     return "gone"
 
 

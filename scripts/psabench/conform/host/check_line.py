@@ -173,8 +173,7 @@ def silence_on_the_line_is_told_and_its_end(e: HostCapture) -> str:
 def a_line_that_is_stuck_is_told(e: HostCapture) -> str:
     """INT stays low for 0.6 s while CLK goes on."""
     _pairs(e)
-    if e.told.of("stale") != [True, False]:
-        raise Failed(f"stale {e.told.of('stale')}", "true and false")
+    expect(e.told.of("stale") == [True, False], f"stale {e.told.of('stale')}", "true and false")
     e.nothing_but("stale", "lost", "torn")
     return f"stale after {e.told.places('stale')[0]} samples"
 
@@ -183,8 +182,7 @@ def a_line_that_is_stuck_is_told(e: HostCapture) -> str:
 def words_that_stand_still_are_told(e: HostCapture) -> str:
     """The same words for 1.5 s."""
     _pairs(e)
-    if e.told.of("frozen") != [True, False]:
-        raise Failed(f"frozen {e.told.of('frozen')}", "true and false")
+    expect(e.told.of("frozen") == [True, False], f"frozen {e.told.of('frozen')}", "true and false")
     e.nothing_but("frozen")
     return f"frozen after {e.told.places('frozen')[0] - 20} samples of the same codes"
 

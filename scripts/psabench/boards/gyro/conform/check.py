@@ -192,8 +192,7 @@ def u2_runs_free_when_it_levels(e: Capture, row: Requirement) -> str:
 
 
 def _as_the_law(saw: Floats, due: Floats, mine: np.ndarray, most: float) -> str:
-    if mine.sum() < 20:
-        raise Inconclusive(f"{int(mine.sum())} readings in which nothing turns")
+    conclusive(mine.sum() >= 20, f"{int(mine.sum())} readings in which nothing turns")
     off = np.abs(saw - due)[mine]
     if off.max() > most:
         k = int(np.flatnonzero(mine)[int(off.argmax())])
@@ -228,8 +227,7 @@ def rates_are_limited_and_say_so(e: Capture) -> str:
     c, most = columns(e), row_for(e, *LIMITS).limit("rate_max_dps") * 3600
     top = np.maximum(np.abs(c["U1"]), np.abs(c["U2"]))
     near = row_for(e, *LIMITS).limit("tolerance_degph")
-    if top.max() > most + near:
-        raise Failed(f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
+    expect(top.max() <= most + near, f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
     at_limit = top > most - near
     if not at_limit.any():
         raise Inconclusive(f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
@@ -274,8 +272,7 @@ def missing_frames_are_told(e: Capture, row: Requirement) -> str:
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")
     took = ended[-1] - begun[0]
-    if abs(took - due) > row.limit("tolerance_s"):
-        raise Failed(f"ended {took:.3f} s after it began", f"{due:.3f} s")
+    expect(abs(took - due) <= row.limit("tolerance_s"), f"ended {took:.3f} s after it began", f"{due:.3f} s")
     return f"LEVEL_LOST in {int(lost.sum())} readings, FF21h ended {took:.3f} s after it began"
 
 
@@ -303,8 +300,7 @@ def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     c = columns(e)
     if c["MODE"].any():
         raise Failed(f"mode {c['MODE'].max():g}", "0")
-    if c["STEP"][0] > 1 + late:
-        raise Failed(f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
+    expect(c["STEP"][0] <= 1 + late, f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 
 

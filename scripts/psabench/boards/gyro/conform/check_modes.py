@@ -25,8 +25,7 @@ def in_mode_0_the_torquers_are_left_alone(e: Capture) -> str:
     """Look at U1 and U2 of the readings with mode 0."""
     c = columns(e)
     mine = c["MODE"] == Mode.OFF
-    if mine.sum() < LEAST:
-        raise Inconclusive(f"{int(mine.sum())} readings of mode 0")
+    conclusive(mine.sum() >= LEAST, f"{int(mine.sum())} readings of mode 0")
     if c["U1"][mine].any() or c["U2"][mine].any():
         raise Failed(f"U1 {np.abs(c['U1'][mine]).max():g}, U2 {np.abs(c['U2'][mine]).max():g} deg/h", "0")
     return f"{int(mine.sum())} readings of mode 0, U1 and U2 0"
@@ -40,9 +39,7 @@ def mode_1_levels(e: Capture, row: Requirement) -> str:
     conclusive(len(beta_arcmin) >= 2 * LEAST, f"{len(beta_arcmin)} readings of mode 1")
     left = float(np.abs(beta_arcmin[-LEAST:]).max())
     saw = f"beta {beta_arcmin[0]:.2f} arc minutes, at last {left:.2f}"
-    if left > most:
-        raise Failed(saw, f"{most:g} at most")
-    return saw
+    return expect(left <= most, saw, f"{most:g} at most")
 
 
 @check("run", "GYRO-MODE-04", needs={"can"})
@@ -117,8 +114,7 @@ def navigation_keeps_the_azimuth(e: Capture, row: Requirement) -> str:
     moved_degph = abs(setting(e, "moved_deg")) / setting(e, "moved_s") * 3600
     drift_degph, free_degph = setting(e, "drift_degph"), setting(e, "free_deg") / setting(e, "free_s") * 3600
     saw = f"{moved_degph:.3f} deg/h in {setting(e, 'moved_s'):.1f} s, {free_degph:.3f} without what cancels the drift"
-    if moved_degph > most:
-        raise Failed(saw, f"{most:g} deg/h at most")
+    expect(moved_degph <= most, saw, f"{most:g} deg/h at most")
     if abs(abs(free_degph) - abs(drift_degph)) > row.limit("free_tolerance_pct") / 100 * abs(drift_degph):
         raise Failed(saw, f"the drift of {abs(drift_degph):.3f} deg/h where nothing cancels it")
     return saw

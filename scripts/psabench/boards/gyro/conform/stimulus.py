@@ -11,7 +11,7 @@ from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, while_streaming
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import Inconclusive, conclusive
 from psabench.estimate.angles import wrapped_deg
 
 READY_S = 0.4
@@ -60,8 +60,7 @@ def until_mode(s: Dut, mode: Mode, limit_s: float) -> None:
     """Raises Inconclusive where the unit does not come to that mode."""
     left_s = limit_s
     while int(s.unit.node.read(OD.CONTROL, 1)) != mode:
-        if left_s <= 0:
-            raise Inconclusive(f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
+        conclusive(left_s > 0, f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
 
@@ -74,8 +73,7 @@ def levelled(s: Dut) -> None:
     left_s = row.limit("limit_s")
     s.run_for(WAIT_S)
     while abs(unit(s).beta_deg) * 60 > row.limit("level_max_arcmin"):
-        if left_s <= 0:
-            raise Inconclusive(f"the platform is not level after {row.limit('limit_s'):g} s")
+        conclusive(left_s > 0, f"the platform is not level after {row.limit('limit_s'):g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
     s.run_for(REST_S)
@@ -88,8 +86,7 @@ def slew(s: Dut, to_deg: float) -> None:
     s.run_for(0.1)
     left_s = TURN_LIMIT_S
     while unit(s).phase == Phase.SLEWING:
-        if left_s <= 0:
-            raise Inconclusive(f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
+        conclusive(left_s > 0, f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
         s.run_for(WAIT_S)
         left_s -= WAIT_S
     s.run_for(1.0)

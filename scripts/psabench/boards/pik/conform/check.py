@@ -51,8 +51,7 @@ def rates(e: Capture) -> dict[str, tuple[float, float]]:
     """Volts and pulses a second of each axis whose input is known, over the whole recording."""
     t_s, n = totals(e)
     took_s = float(t_s[-1] - t_s[0])
-    if took_s <= 0.0 or not e.inputs_v:
-        raise Inconclusive("expected inputs that are known, and stamps that go on")
+    conclusive(took_s > 0.0 and e.inputs_v, "expected inputs that are known, and stamps that go on")
     mine = {a: k for k, a in enumerate("xyz") if a in e.inputs_v}
     return {a: (e.inputs_v[a], float(n[-1, k] - n[0, k]) / took_s) for a, k in mine.items()}
 
@@ -123,8 +122,7 @@ def the_law_is_linear(e: Capture, row: Requirement) -> str:
     k = np.array([hz / volts for volts, hz in found.values()])
     zero = row_for(e, "PIK-LAW-01").limit("zero_max_v") / min(abs(v) for v, _ in found.values())
     spread, most = float(np.ptp(k) / k.mean()), row.limit("spread_max_pct") / 100 + 2 * zero
-    if len(k) < 2 or spread > most:
-        raise Failed(f"coefficients {spread * 100:.3f} % apart", f"{most * 100:.3f} % at most")
+    expect(len(k) >= 2 and spread <= most, f"coefficients {spread * 100:.3f} % apart", f"{most * 100:.3f} % at most")
     return f"coefficients {spread * 100:.4f} % apart at {', '.join(f'{v:g}' for v, _ in found.values())} V"
 
 
@@ -366,8 +364,7 @@ def the_clock_rests_low(e: Capture, row: Requirement) -> str:
     conclusive(len(ends) >= 3, "CLK does not move")
     k = int(np.argmax(np.diff(ends)))
     still_ns = int(ends[k + 1] - ends[k])
-    if still_ns < 2 * _tclk_ns(e):
-        raise Inconclusive(f"CLK moves on: {still_ns} ns without an edge at most")
+    conclusive(still_ns >= 2 * _tclk_ns(e), f"CLK moves on: {still_ns} ns without an edge at most")
     level, due = int(e.wires["CLK"].level[k]), int(row.limits.get("clk_level", 0))
     if level != due:
         raise Failed(f"CLK {level} for {still_ns} ns", f"{due} at rest", at_ns=int(ends[k]), lines=("CLK",))

@@ -71,8 +71,7 @@ def _sums(e: HostCapture, sent: Sequence[Pulses]) -> str:
     at, first = -1, None
     for r in told:
         at = next((k for k in range(at + 1, len(sent)) if sent[k].seq == r.number % 256), -1)
-        if at < 0:
-            raise Failed(f"reading {r.number}, which was not played, or not then", "each once, in order")
+        expect(at >= 0, f"reading {r.number}, which was not played, or not then", "each once, in order")
         first = (r, sent[at]) if first is None else first
         for k, axis in enumerate("xyz"):
             saw = round(r.values[k] - first[0].values[k])

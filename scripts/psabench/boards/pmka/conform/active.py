@@ -14,7 +14,7 @@ from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed, Inconclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.busport import Cycle
 
 STATUS, MODE, COMMAND, BEAT, ZERO = 8, 9, 10, 11, 12
@@ -75,8 +75,7 @@ def _as_on_can(s: Dut, first: int, end: int) -> str:
         if words[first:end] != due[first:end]:
             raise Failed(f"{[f'{v:04X}' for v in words[first:end]]}", f"{[f'{v:04X}' for v in due[first:end]]}")
         found += 1
-    if found < 5:
-        raise Inconclusive(f"{found} readings were seen on the bus and on CAN")
+    conclusive(found >= 5, f"{found} readings were seen on the bus and on CAN")
     return f"{found} readings as on CAN"
 
 
@@ -164,8 +163,7 @@ def the_temperature_is_that_of_the_chamber(s: Dut, row: Requirement) -> str:
     """Compare TEMPERATURE with the chamber at rest; heat the air for a minute, and see it follow."""
     chamber = s.bench.chamber
     air, first, ramp = chamber.temp_degc, _degc(s), chamber.ramp_k_per_min
-    if abs(first - air) > row.limit("offset_max_k"):
-        raise Failed(f"{first:.3f} degC", f"{air:.3f} degC in the chamber")
+    expect(abs(first - air) <= row.limit("offset_max_k"), f"{first:.3f} degC", f"{air:.3f} degC in the chamber")
     try:
         chamber.ramp(HEAT_K_PER_MIN)
         chamber.set(air + HEAT_K)

@@ -83,8 +83,7 @@ def _integrals(e: HostCapture, sign: float) -> str:
     enough(len(home) > 1, "readings with every axis on its own integrator")
     (first, at), (last, end) = home[0], home[-1]
     span_s = (end - at) * ts_s
-    if span_s < float(row.limit("duration_s")):
-        raise Failed(f"integrals over {span_s:.1f} s", f"{row.limit('duration_s')} s")
+    expect(span_s >= float(row.limit("duration_s")), f"integrals over {span_s:.1f} s", f"{row.limit('duration_s')} s")
     worst_mmps = 0.0
     for axis, volts in enumerate(INPUT_V):
         off_vs = last.values[axis] - first.values[axis] - sign * volts * span_s
@@ -112,8 +111,7 @@ def what_is_lost_is_told_and_not_made_up(e: HostCapture) -> str:
     sent = states(e.bus)
     gaps = [(b.seq - a.seq - 1) % 65536 for a, b in itertools.pairwise(sent) if b.seq != (a.seq + 1) % 65536]
     enough(len(gaps) == 2, "two gaps")
-    if e.told.of("lost") != gaps:
-        raise Failed(f"lost {e.told.of('lost')}", f"{gaps}")
+    expect(e.told.of("lost") == gaps, f"lost {e.told.of('lost')}", f"{gaps}")
     enough(any(s.over for s in sent), "an integrator at its limit")
     if e.told.of("over_range")[:1] != ["x"] or e.told.of("in_range")[-1:] != ["x"]:
         raise Failed(f"over-range {e.told.of('over_range')}, in range {e.told.of('in_range')}", "x, and its end")

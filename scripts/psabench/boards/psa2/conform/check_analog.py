@@ -14,7 +14,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Floats
 
 AXES = "xyz"
@@ -129,8 +129,7 @@ def _step(e: Capture) -> tuple[Pairs, int, Floats]:
 
     Raises Failed where the codes do not change, Inconclusive where too few came.
     """
-    if fact(e, "answer") != Answer():
-        raise Failed(f"CONFIG1 answered by {fact(e, 'answer').abort:08X}h", "it is taken")
+    expect(fact(e, "answer") == Answer(), f"CONFIG1 answered by {fact(e, 'answer').abort:08X}h", "it is taken")
     p = pairs(e, 200)
     tail = np.median(p.code[-50:], axis=0)
     head = np.median(p.code[:50], axis=0)
@@ -229,8 +228,7 @@ def settled_tells_of_a_new_gain(e: Capture, row: Requirement) -> str:
             f"{len(off)} frames without SETTLED", f"{due} in a row", frames=p.about(int(off[0]) if len(off) else 0)
         )
     _, first, _ = _step(e)
-    if first < off[0]:
-        raise Failed("codes moved while SETTLED was 1", "0 from the change on", frames=p.about(first))
+    expect(first >= off[0], "codes moved while SETTLED was 1", "0 from the change on", frames=p.about(first))
     return f"{len(off)} frames without SETTLED in a row"
 
 
@@ -305,8 +303,7 @@ def temperature_codes_are_kelvins(e: Capture, row: Requirement) -> str:
     p = pairs(e)
     temp_degc = fact(e, "temp_degc")
     codes = p.temp[(p.channel == int(row.limit("channel_code"))) & (p.temp != 0)]
-    if not len(codes):
-        raise Failed("no temperature of the converter board", "one every four", frames=p.about(0))
+    expect(len(codes), "no temperature of the converter board", "one every four", frames=p.about(0))
     due = row.limit("codes_per_k") * (temp_degc + ZERO_K)
     saw, slack = float(np.median(codes)), due * row.limit("tolerance_pct") / 100
     if abs(saw - due) > slack:

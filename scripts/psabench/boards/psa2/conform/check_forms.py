@@ -32,10 +32,8 @@ def _form(e: Capture, form: int, name: str, least: int = LEAST) -> CanLog:
     other = [
         f for n in MESSAGES if n != name and not (form == 0 and n in MESSAGES[:2]) for f in part.frames_of(n).frames
     ]
-    if other:
-        raise Failed(f"{len(other)} frames of another form", f"{name} alone", frames=other[:5])
-    if len(log) < least:
-        raise Failed(f"{len(log)} frames {name}", "one a sample", frames=part.can.frames[:10])
+    expect(not other, f"{len(other)} frames of another form", f"{name} alone", frames=other[:5])
+    expect(len(log) >= least, f"{len(log)} frames {name}", "one a sample", frames=part.can.frames[:10])
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
     if bad:
@@ -87,11 +85,9 @@ def tog_alternates(e: Capture) -> str:
 
 def _fd(log: CanLog, name: str) -> None:
     classic = [f for f in log.frames if not f.fd]
-    if classic:
-        raise Failed(f"{name} in a classic frame", "an FD frame", frames=classic[:3])
+    expect(not classic, f"{name} in a classic frame", "an FD frame", frames=classic[:3])
     slow = [f for f in log.frames if f.brs is False]
-    if slow:
-        raise Failed(f"{name} without bit rate switch", "with it", frames=slow[:3])
+    expect(not slow, f"{name} without bit rate switch", "with it", frames=slow[:3])
 
 
 @check("forms", "PSA2-FORM-03", needs={"fd"})
@@ -183,8 +179,7 @@ def each_sync_takes_one_sample(e: Capture, row: Requirement) -> str:
     p = pairs(begin, LEAST)
     gaps = p.steps
     far = e.facts.get("paced", True) and (gaps > int(row.limit("apart_max_frames"))).any()
-    if (gaps < 1).any() or far:
-        raise Failed(f"SEQ {p.seq.tolist()}", "rising, one for each SYNC", frames=p.frames)
+    expect(not (gaps < 1).any() and not far, f"SEQ {p.seq.tolist()}", "rising, one for each SYNC", frames=p.frames)
     return f"one sample for each of {len(p)} SYNCs"
 
 
@@ -244,8 +239,7 @@ def sync_starts_the_filters_anew(e: Capture, row: Requirement) -> str:
     k = int(np.argmax(pause_ms))
     period_ms = row_for(e, "PSA2-READ-06").limit("period_us") * 1e-3
     lo, hi = row.limit("settling_min_ms"), row.limit("settling_max_ms") + period_ms
-    if not lo <= pause_ms[k] <= hi:
-        raise Failed(f"the longest pause is {pause_ms[k]:.3f} ms", f"{lo} to {hi} ms", frames=p.about(k))
+    expect(lo <= pause_ms[k] <= hi, f"the longest pause is {pause_ms[k]:.3f} ms", f"{lo} to {hi} ms", frames=p.about(k))
     p.unbroken()
     return f"a pause of {pause_ms[k]:.3f} ms, SEQ goes on"
 

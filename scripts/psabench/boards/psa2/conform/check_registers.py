@@ -338,8 +338,7 @@ def no_access_before_the_set_up_is_over(e: Capture, row: Requirement) -> str:
 def one_access_at_a_time(e: Capture, row: Requirement) -> str:
     """Read a register while a read that its client gave up is under way."""
     due, saw = int(row.limit("abort_code")), fact(e, "busy")
-    if due not in saw:
-        raise Failed(f"aborts {', '.join(f'{a:08X}h' for a in saw) or 'none'}", f"{due:08X}h at least once")
+    expect(due in saw, f"aborts {', '.join(f'{a:08X}h' for a in saw) or 'none'}", f"{due:08X}h at least once")
     return f"abort {due:08X}h {saw.count(due)} times"
 
 
@@ -359,8 +358,7 @@ def opcodes_are_taken(e: Capture) -> str:
     for group, answer in zip(("accelerometer", "temperature"), fact(e, "answers"), strict=True):
         expect(answer == Answer(), f"RESET to the {group} converters answered by {answer.abort:08X}h", "it is taken")
     code = dict(table("ads1256"))["DRATE"]
-    if register(e, TEMP, DRATE) != code:
-        raise Failed(f"DRATE {register(e, TEMP, DRATE):02X}h after RESET", f"{code:02X}h")
+    expect(register(e, TEMP, DRATE) == code, f"DRATE {register(e, TEMP, DRATE):02X}h after RESET", f"{code:02X}h")
     return _all(e, CONFIG0, dict(table("ads1282"))["CONFIG0"], "CONFIG0")
 
 

@@ -86,11 +86,9 @@ def the_board_has_its_lines(e: Capture, row: Requirement) -> str:
     """Look for the lines of the article's table in the recording, and for those that a stream moves to move."""
     missing = [name for name in BOARD.lines if name not in e.wires]
     count = int(row.limit("lines_count"))
-    if missing or len(BOARD.lines) != count:
-        raise Failed(f"no {', '.join(missing)}", f"{count} lines")
+    expect(not missing and len(BOARD.lines) == count, f"no {', '.join(missing)}", f"{count} lines")
     still = [name for name in BOARD.lines if name not in STILL_IN_A_STREAM and len(e.wires[name].t_ns) < 2]
-    if still:
-        raise Failed(f"{', '.join(still)} never moves", "it does", at_ns=e.wires.start_ns, lines=still)
+    expect(not still, f"{', '.join(still)} never moves", "it does", at_ns=e.wires.start_ns, lines=still)
     return f"{count} lines"
 
 
@@ -199,8 +197,7 @@ def _changes_at(e: Capture, found: Sequence[Burst], lines: Sequence[str], *, fal
                 lines=("SClk", line, "CST"),
             )
         total += len(t)
-    if not total:
-        raise Inconclusive(f"{', '.join(lines)} never change within a burst")
+    conclusive(total, f"{', '.join(lines)} never change within a burst")
     return f"{total} changes, all at {'falls' if falls else 'rises'} of SClk"
 
 

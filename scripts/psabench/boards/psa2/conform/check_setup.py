@@ -371,8 +371,7 @@ def nothing_but_the_set_up_is_sent(e: Capture) -> str:
             raise Failed(
                 f"{step.name} as step {k + 1}", _names(due[k : k + 1]), at_ns=step.begin_ns, lines=ACCEL + TEMP
             )
-    if len(saw) < len(due):
-        raise Failed(f"{len(saw)} steps", _names(due), at_ns=s.res_ns, lines=ACCEL + TEMP)
+    expect(len(saw) >= len(due), f"{len(saw)} steps", _names(due), at_ns=s.res_ns, lines=ACCEL + TEMP)
     return "; ".join(x.name for x in saw)
 
 
@@ -396,13 +395,11 @@ def _names(due: list[tuple[str, bytes]]) -> str:
 def power_up_begins_anew(e: Capture) -> str:
     """Switch the supply off, in a frame where that can be timed, and on: what comes first on CAN and on the lines?"""
     boot = [f for f in e.can.of_id(0x700 + e.node).frames if f.data[:1] == b"\0"]
-    if not boot:
-        raise Failed("no boot-up message", "one after power-up", frames=e.can.frames[:20])
+    expect(boot, "no boot-up message", "one after power-up", frames=e.can.frames[:20])
     after = [f for f in e.frames_of("PSA2_XY").frames if f.t_s > boot[-1].t_s]
     conclusive(after, "no PSA2_XY came after power-up")
     seq = int.from_bytes(after[0].data[6:8], "little")
-    if seq != 0:
-        raise Failed(f"SEQ {seq} first", "0", frames=after[:4])
+    expect(seq == 0, f"SEQ {seq} first", "0", frames=after[:4])
     return "boot-up, then SEQ 0" + (_cut_on_the_line(e) if e.lines is not None else "")
 
 

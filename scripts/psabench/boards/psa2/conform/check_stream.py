@@ -66,8 +66,7 @@ def xy_comes_before_its_zt(e: Capture) -> str:
     for a, b in itertools.pairwise(found):
         if a.can_id != b.can_id:
             apart_s[ids[a.can_id]].append(b.t_s - a.t_s)
-    if min(len(times) for times in apart_s.values()) < LEAST:
-        raise Inconclusive(f"{len(found)} frames PSA2_XY and PSA2_ZT came")
+    conclusive(min(len(times) for times in apart_s.values()) >= LEAST, f"{len(found)} frames PSA2_XY and PSA2_ZT came")
     after_xy_us, after_zt_us = (float(np.median(apart_s[n])) / US for n in MESSAGES[:2])
     if after_xy_us > after_zt_us:
         saw = f"PSA2_ZT {after_xy_us:.0f} us after PSA2_XY, PSA2_XY {after_zt_us:.0f} us after PSA2_ZT"
@@ -187,8 +186,7 @@ def samples_come_whole(e: Capture, row: Requirement) -> str:
             raise Failed("a PSA2_ZT without its PSA2_XY", "both", frames=halves[max(0, k - 2) : k + 2])
     torn = sum(a.can_id == b.can_id == first for a, b in itertools.pairwise(halves))
     starts = int(row.limit("starts_count"))
-    if torn > starts:
-        raise Failed(f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
+    expect(torn <= starts, f"{torn} PSA2_XY without PSA2_ZT in {starts} stops", "at most one a stop")
     return f"{len(halves)} halves, {torn} cut by a stop"
 
 
@@ -252,14 +250,12 @@ def overruns_are_counted(e: Capture, row: Requirement) -> str:
 def seq_begins_with_0(e: Capture) -> str:
     """Look at the first sample after the reset."""
     boots = [k for k, f in enumerate(e.can.frames) if f.can_id == 0x700 + e.node and f.data[:1] == b"\0"]
-    if not boots:
-        raise Failed("no boot-up message after the reset", "one", frames=e.can.frames[:10])
+    expect(boots, "no boot-up message after the reset", "one", frames=e.can.frames[:10])
     log = CanLog(frames=e.can.frames[boots[-1] :])
     first = e.with_can(log).frames_of("PSA2_XY").frames[:1]
     conclusive(first and len(first[0].data) == 8, "no PSA2_XY came after the reset")
     seq = int.from_bytes(first[0].data[6:8], "little")
-    if seq:
-        raise Failed(f"SEQ {seq} first", "0", frames=log.frames[:6])
+    expect(not seq, f"SEQ {seq} first", "0", frames=log.frames[:6])
     return "SEQ 0 first"
 
 

@@ -17,7 +17,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Ints
 
 TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement wants, one every 10 ms at 1000 SPS
@@ -89,12 +89,10 @@ def temperatures_come_at_their_rate(e: Capture, row: Requirement) -> str:
 @check("selfcal", "PSA2-TEMP-08")
 def the_scan_waits_for_a_calibration(e: Capture, row: Requirement) -> str:
     """SELFCAL while temperatures are scanned: a pause, then they come again."""
-    if e.facts.get("opcode") != Answer():
-        raise Failed(f"SELFCAL answered by {e.facts.get('opcode')}", "it is taken")
+    expect(e.facts.get("opcode") == Answer(), f"SELFCAL answered by {e.facts.get('opcode')}", "it is taken")
     p = pairs(e)
     at_ms = p.stamp[p.new] * unit_us(e) * 1e-3
-    if len(at_ms) < LEAST:
-        raise Failed(f"{len(at_ms)} new temperatures", "they come again", frames=p.about(len(p) - 3))
+    expect(len(at_ms) >= LEAST, f"{len(at_ms)} new temperatures", "they come again", frames=p.about(len(p) - 3))
     pause = np.diff(at_ms)
     k = int(np.argmax(pause))
     if not row.limit("pause_min_ms") <= pause[k] <= row.limit("pause_max_ms"):

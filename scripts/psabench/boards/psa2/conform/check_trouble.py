@@ -21,8 +21,7 @@ from psabench.link.protocol_files import message
 @check("fit", "PSA2-FIT-01")
 def a_form_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     """Ask for pairs at 4000 a second."""
-    if fact(e, "fast") != Answer():
-        raise Failed(f"4000 SPS in form 1 answered by {fact(e, 'fast').abort:08X}h", "it is taken")
+    expect(fact(e, "fast") == Answer(), f"4000 SPS in form 1 answered by {fact(e, 'fast').abort:08X}h", "it is taken")
     due = int(row.limit("abort_code"))
     if fact(e, "form").abort != due:
         raise Failed(f"form 0 at 4000 SPS answered by {fact(e, 'form').abort:08X}h", f"abort {due:08X}h")
@@ -39,8 +38,7 @@ def a_form_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
 def a_rate_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     """Ask for 4000 SPS in pairs, and read CONFIG0."""
     due = int(row.limit("abort_code"))
-    if fact(e, "rate").abort != due:
-        raise Failed(f"CONFIG0 = 66h answered by {fact(e, 'rate').abort:08X}h", f"abort {due:08X}h")
+    expect(fact(e, "rate").abort == due, f"CONFIG0 = 66h answered by {fact(e, 'rate').abort:08X}h", f"abort {due:08X}h")
     before = int(row_for(e, "PSA2-REG-01").limit("config0_code"))
     if number(fact(e, "config0")) != before:
         raise Failed(f"CONFIG0 {number(fact(e, 'config0')):02X}h after a refusal", f"{before:02X}h")
@@ -85,8 +83,7 @@ def _emcy(e: Capture, code: int) -> CanFrame:
 @check("trouble", "PSA2-ERR-02")
 def a_silent_temperature_converter_is_told(e: Capture, row: Requirement) -> str:
     """Silence it by its SYNC command without WAKEUP: EMCY once, and its end."""
-    if fact(e, "opcode") != Answer():
-        raise Failed(f"SYNC FCh answered by {fact(e, 'opcode').abort:08X}h", "it is taken")
+    expect(fact(e, "opcode") == Answer(), f"SYNC FCh answered by {fact(e, 'opcode').abort:08X}h", "it is taken")
     e = segment(e, "silent", "silent end")
     told = _emcy(e, int(row.limit("emcy_code")))
     if told.data[3] != int(row.limit("source_code")):
@@ -128,8 +125,7 @@ def time_outs_are_counted(e: Capture) -> str:
     """2030h:9 before and after."""
     n = number(fact(e, "after")[TIMEOUTS]) - number(fact(e, "before")[TIMEOUTS])
     told = sum(f.data[:2] in (b"\x01\xff", b"\x02\xff") for f in emcys(e))
-    if n < 1 or n < told:
-        raise Failed(f"{n} time-outs counted, {told} told by EMCY", "one at least, and as many")
+    expect(n >= 1 and n >= told, f"{n} time-outs counted, {told} told by EMCY", "one at least, and as many")
     return f"{n} counted"
 
 

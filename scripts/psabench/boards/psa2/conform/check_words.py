@@ -70,8 +70,7 @@ def beside(e: Capture) -> Beside:
         )
     i = np.arange(len(p)) + shift
     keep = (i >= 0) & (i < len(words))
-    if keep.sum() < LEAST:
-        raise Inconclusive("the recording and the log have few samples in common")
+    conclusive(keep.sum() >= LEAST, "the recording and the log have few samples in common")
     at = i[keep]
     return Beside(
         line=line[at] << max(lost, 0), words=words[at], fall_ns=transfers(e.wires).fall_ns[at], samples=p.where(keep)

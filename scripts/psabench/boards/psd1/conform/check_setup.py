@@ -32,7 +32,7 @@ from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Ints
 
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
@@ -192,11 +192,9 @@ def the_register_has_its_four_modes(e: Capture, row: Requirement) -> str:
     word, control = int(row.limit("word_bits")), int(row.limit("control_bits"))
     counts = {name: {len(f.rises) for f in found if (f.line == "TFS") == (name == "TFS")} for name in ("TFS", "RFx")}
     at = found[0].fall
-    if counts["TFS"] != {control}:
-        raise Failed(f"{sorted(counts['TFS'])} bits under TFS", f"{control}", at_ns=at, lines=SETUP)
+    expect(counts["TFS"] == {control}, f"{sorted(counts['TFS'])} bits under TFS", f"{control}", at_ns=at, lines=SETUP)
     due = {word, control} if e.variant["host_strobe_ns"] else {control}
-    if counts["RFx"] != due:
-        raise Failed(f"{sorted(counts['RFx'])} bits under RFx", f"{sorted(due)}", at_ns=at, lines=SETUP)
+    expect(counts["RFx"] == due, f"{sorted(counts['RFx'])} bits under RFx", f"{sorted(due)}", at_ns=at, lines=SETUP)
     wires_needed(e, *DATA)
     strobes = e.wires.pulses("CS", 0)[0]
     if e.variant["host_strobe_ns"] and not bus_word(e, "D", len(DATA), strobes).any():
