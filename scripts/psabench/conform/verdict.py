@@ -7,7 +7,8 @@ first two where a condition does not hold. Only `decide` turns this into a verdi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -73,6 +74,15 @@ def conclusive(enough: object, why: str) -> None:
     """Raises Inconclusive unless there is enough to look at."""
     if not enough:
         raise Inconclusive(why)
+
+
+@contextmanager
+def damaged_data_are(other: Callable[..., Exception], *due: str, **shown: Sequence[CanFrame]) -> Iterator[None]:
+    """A ValueError within, of data that cannot be decoded, is raised as this one: its words, what is due, frames."""
+    try:
+        yield
+    except ValueError as e:
+        raise other(str(e), *due, **shown) from e
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.protocol_files import database, dbc_node, message
 from psabench.link.signals import unwrap
 
@@ -291,10 +291,8 @@ def _numbers(e: Capture) -> np.ndarray:
     name = next(n for n in pdos(family) if counter in message(n).signal_tree)
     frames = e.frames_of(name)
     conclusive(len(frames) >= 2, f"{len(frames)} frames {name} in the log")
-    try:
+    with damaged_data_are(Failed, "frames of the DBC's length"):
         raw = frames.raw(name)[counter]
-    except ValueError as err:
-        raise Failed(str(err), "frames of the DBC's length") from err
     return unwrap(raw, message(name).get_signal_by_name(counter).length)
 
 

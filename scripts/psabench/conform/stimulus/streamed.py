@@ -1,12 +1,14 @@
-"""What stimuli of boards that send readings have in common: from Res to some readings, and a while of them."""
+"""What stimuli of boards that send readings have in common: one take, from Res to some readings, a while of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import wraps
 
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
+from psabench.conform.plan import stimulus
 
 BOOT_S = 0.002
 
@@ -17,6 +19,36 @@ def while_streaming(s: Dut) -> Iterator[None]:
     s.unit.start()
     yield
     s.unit.stop()
+
+
+def recorded(
+    name: str,
+    *,
+    boards: Iterable[str],
+    lines: bool = True,
+    streaming: bool = False,
+    around: Callable[[Dut], AbstractContextManager[object]] = nullcontext,
+    before: Callable[[Dut], object] = lambda _: None,
+    after: Callable[[Dut], object] = lambda _: None,
+) -> Callable[[Callable[[Dut, Take], None]], Callable[[Dut], Capture]]:
+    """A @stimulus that is one take from its begin to its end, with the lines or without, while readings flow or not.
+
+    before, after: bring the board to a known state; around: the same where it must be done after a failure, too.
+    """
+
+    def register(play: Callable[[Dut, Take], None]) -> Callable[[Dut], Capture]:
+        @stimulus(name, boards=boards)
+        @wraps(play)
+        def make(s: Dut) -> Capture:
+            before(s)
+            with around(s), s.take(lines=lines) as take, while_streaming(s) if streaming else nullcontext():
+                play(s, take)
+            after(s)
+            return s.capture(name, take)
+
+        return make
+
+    return register
 
 
 def from_res(s: Dut, dwell_s: float) -> Capture:

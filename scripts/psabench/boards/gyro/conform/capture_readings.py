@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.verdict import Inconclusive
+from psabench.conform.verdict import Inconclusive, damaged_data_are
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, layout
 
@@ -29,12 +29,10 @@ def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Flo
     if n < least:
         raise Inconclusive(f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
     found: dict[str, Floats] = {}
-    try:
+    with damaged_data_are(Inconclusive):
         for name, log in zip(MESSAGES, logs, strict=True):
             raw, scales = CanLog(frames=log.frames[:n]).raw(name), layout(message(name))
             found |= {k: np.asarray(v * scales[k].scale, np.float64) for k, v in raw.items()}
-    except ValueError as err:
-        raise Inconclusive(str(err)) from err
     return found
 
 

@@ -14,7 +14,7 @@ from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn,
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, layout
@@ -63,10 +63,8 @@ def _codes(e: Capture) -> tuple[np.ndarray, Floats]:
     node = int(setting(e, "level_node"))
     log = e.can.of_id(int(message("PSA2_XY").frame_id) - dbc_node("psa2") + node)
     conclusive(len(log) >= 20, f"{len(log)} frames of the level unit came")
-    try:
+    with damaged_data_are(Inconclusive):
         raw = log.raw("PSA2_XY")
-    except ValueError as err:
-        raise Inconclusive(str(err)) from err
     scales = layout(message("PSA2_XY"))
     volts = np.stack([raw[a] * scales[a].scale for a in "XY"], axis=1)
     return raw["SEQ"], volts

@@ -7,10 +7,10 @@ from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.unit import NMT_PREOP, NMT_START
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Dut
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
-from psabench.conform.stimulus.streamed import from_res, while_streaming
+from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
 from psabench.conform.verdict import Inconclusive, conclusive
 from psabench.estimate.angles import wrapped_deg
 
@@ -101,14 +101,11 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, POWER_ON_S)
 
 
-@stimulus("level", boards=("gyro",))
-def level(s: Dut) -> Capture:
+@recorded("level", boards=("gyro",), before=calm, lines=False, streaming=True)
+def level(s: Dut, take: Take) -> None:
     """Mode 1, for as long as the platform may take to get level from where it is."""
-    calm(s)
-    with s.take(lines=False) as take, while_streaming(s):
-        unit(s).mode = Mode.LEVEL
-        s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
-    return s.capture("level", take)
+    unit(s).mode = Mode.LEVEL
+    s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
 
 
 @stimulus("run", boards=("gyro",))
@@ -215,19 +212,15 @@ def tilted(s: Dut) -> Capture:
     return s.capture("tilted", take)
 
 
-@stimulus("limits", boards=("gyro",))
-def limits(s: Dut) -> Capture:
+@recorded("limits", boards=("gyro",), before=levelled, after=calm, lines=False, streaming=True)
+def limits(s: Dut, take: Take) -> None:
     """A zero of the level sensors that is suddenly told wrongly, with a stiff loop: rates at their limits."""
-    levelled(s)
-    with s.take(lines=False) as take, while_streaming(s):
-        s.run_for(0.3)
-        unit(s).set(m1_per_s=20.0)
-        unit(s).set(zero_y_v=0.3)
-        s.run_for(0.2)
-        unit(s).set(m1_per_s=1.0, zero_y_v=0.0)
-        s.run_for(8.0)
-    calm(s)
-    return s.capture("limits", take)
+    s.run_for(0.3)
+    unit(s).set(m1_per_s=20.0)
+    unit(s).set(zero_y_v=0.3)
+    s.run_for(0.2)
+    unit(s).set(m1_per_s=1.0, zero_y_v=0.0)
+    s.run_for(8.0)
 
 
 @stimulus("silence", boards=("gyro",))

@@ -14,7 +14,7 @@ from psabench.conform.plan import active
 from psabench.conform.registers import names_and_rights
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.busport import Cycle
 
 STATUS, MODE, COMMAND, BEAT, ZERO = 8, 9, 10, 11, 12
@@ -133,10 +133,8 @@ def _rom_words(s: Dut) -> list[int]:
 
 
 def _rom(s: Dut) -> est.Rom:
-    try:
+    with damaged_data_are(Failed, "a ROM that is whole"):
         return est.rom_of(_rom_words(s))
-    except ValueError as err:
-        raise Failed(str(err), "a ROM that is whole") from err
 
 
 @active("PMKA-ROM-03", needs={"bus"})

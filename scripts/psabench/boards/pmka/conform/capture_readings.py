@@ -11,7 +11,7 @@ import numpy as np
 from psabench.boards.pmka import estimate as est
 from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.conform.proves import row_for
-from psabench.conform.verdict import Inconclusive, conclusive, expect
+from psabench.conform.verdict import Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.signals import Floats
 
 CODES, STATE = "PMKA_CODES", "PMKA_STATE"
@@ -89,12 +89,10 @@ def run_of(e: Capture) -> Run:
     words = e.facts.get("rom")
     if not isinstance(words, list) or len(e.inputs_v) < 3:
         raise Inconclusive("the ROM, or the volts at the three inputs, are not known")
-    try:
+    with damaged_data_are(Inconclusive):
         rom = est.rom_of(words)
         periods = est.periods_of(columns(e))
         calibrations = [est.calibrate(periods, i) for i in range(4)]
-    except ValueError as err:
-        raise Inconclusive(str(err)) from err
     return Run(periods=periods, calibrations=calibrations, rom=rom, inputs_v=e.inputs_v)
 
 

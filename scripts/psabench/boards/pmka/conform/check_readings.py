@@ -14,7 +14,7 @@ from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.signals import Floats, Ints
 
 BEAT_OF_AXIS = {2: 0, 3: 1, 4: 2}  # beat to the axis that the spare serves
@@ -23,10 +23,8 @@ HOME = (1, 2, 3, 0)  # SERVES of X, Y, Z, K with no one out of work but the spar
 
 def _periods(e: Capture) -> est.Periods:
     """Raises Inconclusive where readings are missing or at their limits."""
-    try:
+    with damaged_data_are(Inconclusive):
         return est.periods_of(columns(e))
-    except ValueError as err:
-        raise Inconclusive(str(err)) from err
 
 
 def _steady(tau: Floats) -> np.ndarray:
@@ -182,10 +180,8 @@ def a_reset_moves_the_code_by_its_size(e: Capture, row: Requirement) -> str:
 
 def _sizes(p: est.Periods) -> Floats:
     """(4, 2) mean Nr by integrator and sign. Raises Inconclusive."""
-    try:
+    with damaged_data_are(Inconclusive):
         return np.array([est.calibrate(p, k).nr.mean(axis=0) for k in range(4)])
-    except ValueError as err:
-        raise Inconclusive(str(err)) from err
 
 
 @check("minute", "PMKA-RST-04", needs={"can"})

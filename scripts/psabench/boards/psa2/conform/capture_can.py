@@ -8,7 +8,7 @@ import numpy as np
 
 from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Bools, CanFrame, CanLog, Capture
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are
 from psabench.link import signals
 from psabench.link.signals import Ints
 
@@ -67,10 +67,8 @@ def pairs(e: Capture, least: int = 20) -> Pairs:
     """Raises Inconclusive for fewer than `least`, Failed for one of another length."""
     first, second = _halves(e)
     conclusive(len(first) >= least, f"{len(first)} samples came as PSA2_XY and PSA2_ZT; expected {least}")
-    try:
+    with damaged_data_are(Failed, "messages of their length", frames=first[:4]):
         xy, zt = CanLog(frames=tuple(first)).raw("PSA2_XY"), CanLog(frames=tuple(second)).raw("PSA2_ZT")
-    except ValueError as err:
-        raise Failed(str(err), "messages of their length", frames=first[:4]) from err
     return Pairs(
         seq=xy["SEQ"],
         code=np.stack((xy["X"], xy["Y"], zt["Z"]), axis=1),

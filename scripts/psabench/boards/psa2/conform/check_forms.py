@@ -15,7 +15,7 @@ from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, damaged_data_are, expect
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -126,10 +126,8 @@ def a_block_begins_anew_after_a_stop(e: Capture) -> str:
     for k, stamp in enumerate(stamps):
         log = segment(e, f"again {k}", f"again {k} end").frames_of("PSA2_BLOCK")
         expect(len(log), "no block after the start", "one every five samples")
-        try:
+        with damaged_data_are(Failed, "messages of their length", frames=log.frames[:1]):
             before_us, first_us = number(stamp), int(log.raw("PSA2_BLOCK")["TSTAMP"][0])
-        except ValueError as err:
-            raise Failed(str(err), "messages of their length", frames=log.frames[:1]) from err
         if (first_us - before_us) % (1 << 32) >= 1 << 31 or first_us == before_us:
             saw = f"a sample of {first_us} us in the first block"
             raise Failed(saw, f"after {before_us} us", frames=log.frames[:1])

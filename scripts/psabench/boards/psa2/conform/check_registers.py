@@ -31,7 +31,7 @@ from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive, expect
+from psabench.conform.verdict import Failed, conclusive, damaged_data_are, expect
 
 READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 STATUS = 1
@@ -251,10 +251,8 @@ def register_reads_cost_no_conversion_at_the_highest_rate(e: Capture) -> str:
         raise Failed(f"4000 SPS in the fast form answered by {refused[0].abort:08X}h", "it is taken")
     log = e.frames_of("PSA2_FAST")
     conclusive(len(log) >= LEAST, f"{len(log)} frames PSA2_FAST came")
-    try:
+    with damaged_data_are(Failed, "messages of their length", frames=log.frames[:4]):
         twice = np.flatnonzero(np.diff(log.raw("PSA2_FAST")["TOG"]) == 0)
-    except ValueError as err:
-        raise Failed(str(err), "messages of their length", frames=log.frames[:4]) from err
     if len(twice):
         raise Failed("TOG twice the same", "0 and 1 in turn", frames=log.frames[twice[0] : twice[0] + 3])
     _no_overrun(e)

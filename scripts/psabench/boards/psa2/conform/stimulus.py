@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
-from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import while_streaming
+from psabench.conform.stimulus.streamed import recorded
 
 SETUP_S = 0.22  # Res to the first frames takes 0.19 s
 STREAM_S = 0.4
@@ -22,40 +20,31 @@ def into_a_frame(s: Dut, take: Take, lead_s: float = 0.0) -> None:
     s.run_for(ahead_s)
 
 
-@stimulus("power_on", boards=("psa2",))
-def power_on(s: Dut) -> Capture:
+@recorded("power_on", boards=("psa2",), before=Dut.wait_ready, streaming=True)
+def power_on(s: Dut, take: Take) -> None:
     """Res in the middle of a frame, then until frames come: the set-up on all lines, boot-up, the first frames."""
-    s.wait_ready()
-    with s.take() as take, while_streaming(s):
-        into_a_frame(s, take, ON_BUS_S)
-        take.marks["reset"] = s.bench.time_s
-        s.reset()
-        s.run_for(0.01)
-        s.unit.start()
-        s.run_for(SETUP_S)
-    return s.capture("power_on", take)
+    into_a_frame(s, take, ON_BUS_S)
+    take.marks["reset"] = s.bench.time_s
+    s.reset()
+    s.run_for(0.01)
+    s.unit.start()
+    s.run_for(SETUP_S)
 
 
-@stimulus("power_cycle", boards=("psa2",))
-def power_cycle(s: Dut) -> Capture:
+@recorded("power_cycle", boards=("psa2",), before=Dut.wait_ready, streaming=True)
+def power_cycle(s: Dut, take: Take) -> None:
     """The supply off in the middle of a frame, and on again until frames come."""
-    s.wait_ready()
-    with s.take() as take, while_streaming(s):
-        s.run_for(0.03)
-        into_a_frame(s, take)
-        take.marks["off"] = s.bench.time_s
-        s.power_cycle(0.02)
-        take.marks["on"] = s.bench.time_s
-        s.run_for(0.01)
-        s.unit.start()
-        s.run_for(SETUP_S)
-    return s.capture("power_cycle", take)
+    s.run_for(0.03)
+    into_a_frame(s, take)
+    take.marks["off"] = s.bench.time_s
+    s.power_cycle(0.02)
+    take.marks["on"] = s.bench.time_s
+    s.run_for(0.01)
+    s.unit.start()
+    s.run_for(SETUP_S)
 
 
-@stimulus("stream", boards=("psa2",))
-def stream(s: Dut) -> Capture:
+@recorded("stream", boards=("psa2",), before=Dut.wait_ready, streaming=True)
+def stream(s: Dut, take: Take) -> None:
     """Some hundred frames, on the lines and on CAN."""
-    s.wait_ready()
-    with s.take() as take, while_streaming(s):
-        s.run_for(STREAM_S)
-    return s.capture("stream", take)
+    s.run_for(STREAM_S)

@@ -18,8 +18,7 @@ from psabench.boards.psa2.conform.capture_can import CODE_MAX, pairs, segment
 from psabench.boards.psa2.conform.stimulus import PERIOD_S
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
-from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import while_streaming
+from psabench.conform.stimulus.streamed import recorded, while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
 
@@ -106,48 +105,40 @@ def split(index: int, sub: int, value: int) -> list[tuple[int, int, int]]:
     return [(index, sub + k, value >> 8 * k & 0xFF) for k in range(3)]
 
 
-@stimulus("quiet", boards=("psa2",))
-def quiet(s: Dut) -> Capture:
+@recorded("quiet", boards=("psa2",), before=Dut.wait_ready, lines=False, streaming=True)
+def quiet(s: Dut, take: Take) -> None:
     """Frames for two and a half seconds, on CAN alone; counters meanwhile: the log has them among the frames."""
-    s.wait_ready()
-    with s.take(lines=False) as take, while_streaming(s):
-        s.run_for(10 * PERIOD_S)
-        take.facts["before"] = counters(s)
-        s.run_for(2.5)
-        take.facts["after"] = counters(s, after=True)
-        s.run_for(10 * PERIOD_S)
-    return s.capture("quiet", take)
+    s.run_for(10 * PERIOD_S)
+    take.facts["before"] = counters(s)
+    s.run_for(2.5)
+    take.facts["after"] = counters(s, after=True)
+    s.run_for(10 * PERIOD_S)
 
 
-@stimulus("registers", boards=("psa2",))
-def registers(s: Dut) -> Capture:
+@recorded("registers", boards=("psa2",), before=Dut.wait_ready)
+def registers(s: Dut, take: Take) -> None:
     """All registers read while frames flow. facts: read, by index and sub-index; counters before and after."""
-    s.wait_ready()
-    with s.take() as take:
-        take.facts["before"] = counters(s)
-        with while_streaming(s):
-            s.run_for(10 * PERIOD_S)
-            take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
-            s.run_for(10 * PERIOD_S)
-        take.facts["after"] = counters(s, after=True)
-    return s.capture("registers", take)
+    take.facts["before"] = counters(s)
+    with while_streaming(s):
+        s.run_for(10 * PERIOD_S)
+        take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
+        s.run_for(10 * PERIOD_S)
+    take.facts["after"] = counters(s, after=True)
 
 
-@stimulus("busy", boards=("psa2",))
-def busy(s: Dut) -> Capture:
+@recorded("busy", boards=("psa2",), around=changed)
+def busy(s: Dut, take: Take) -> None:
     """All registers read again and again at 4000 SPS in the fast form. facts: answers; counters before and after."""
-    with changed(s), s.take() as take:
-        take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
-        s.run_for(SETTLE_PERIODS / RATES_HZ[4])
-        take.facts["before"] = counters(s)
-        with while_streaming(s):
-            for k in range(BUSY_ROUNDS):
-                s.run_for((1 + k / BUSY_ROUNDS) * PERIOD_S)  # at another phase of a conversion each
-                for index, sub in itertools.product((*ACCEL, TEMP), REGISTERS):
-                    ask(s, index, sub)
-            s.run_for(10 * PERIOD_S)
-        take.facts["after"] = counters(s, after=True)
-    return s.capture("busy", take)
+    take.facts["answers"] = [tell(s, FORM, 0, 1), tell(s, ACCEL[0], CONFIG0, 0x46 | 4 << 3)]
+    s.run_for(SETTLE_PERIODS / RATES_HZ[4])
+    take.facts["before"] = counters(s)
+    with while_streaming(s):
+        for k in range(BUSY_ROUNDS):
+            s.run_for((1 + k / BUSY_ROUNDS) * PERIOD_S)  # at another phase of a conversion each
+            for index, sub in itertools.product((*ACCEL, TEMP), REGISTERS):
+                ask(s, index, sub)
+        s.run_for(10 * PERIOD_S)
+    take.facts["after"] = counters(s, after=True)
 
 
 PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that the part takes
@@ -160,35 +151,31 @@ PATTERNS: Sequence[tuple[int, int, int]] = (  # object, sub-index, value that th
 STATUS_WRITES = (0xF6, 0x04)  # all but ORDER, which turns the bits of an answer; what the set-up writes
 
 
-@stimulus("writes", boards=("psa2",))
-def writes(s: Dut) -> Capture:
+@recorded("writes", boards=("psa2",), around=changed, lines=False)
+def writes(s: Dut, take: Take) -> None:
     """Registers written and read again. facts: written, list of object, sub-index, value, answer, what reads then.
 
     status: of the temperature converter, before and after each of STATUS_WRITES.
     """
-    with changed(s), s.take(lines=False) as take:
-        found = []
-        for index, sub, value in PATTERNS:
-            answer = tell(s, index, sub, value)
-            found.append((index, sub, value, answer, [ask(s, i, sub) for i in (ACCEL if index != TEMP else (TEMP,))]))
-        take.facts["written"] = found
-        status = [ask(s, TEMP, 1)]
-        for value in STATUS_WRITES:
-            tell(s, TEMP, 1, value)
-            status.append(ask(s, TEMP, 1))
-        take.facts["status"] = status
-    return s.capture("writes", take)
+    found = []
+    for index, sub, value in PATTERNS:
+        answer = tell(s, index, sub, value)
+        found.append((index, sub, value, answer, [ask(s, i, sub) for i in (ACCEL if index != TEMP else (TEMP,))]))
+    take.facts["written"] = found
+    status = [ask(s, TEMP, 1)]
+    for value in STATUS_WRITES:
+        tell(s, TEMP, 1, value)
+        status.append(ask(s, TEMP, 1))
+    take.facts["status"] = status
 
 
-@stimulus("opcodes", boards=("psa2",))
-def opcodes(s: Dut) -> Capture:
+@recorded("opcodes", boards=("psa2",), around=changed)
+def opcodes(s: Dut, take: Take) -> None:
     """RESET as an opcode to both groups, then all registers. facts: answers, read; cuts around the opcode."""
-    with changed(s), s.take() as take:
-        s.run_for(5 * PERIOD_S)
-        take.facts["answers"] = [tell(s, OPCODE, 1, 0x06), tell(s, OPCODE, 2, 0xFE)]
-        s.run_for(0.1)
-        take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
-    return s.capture("opcodes", take)
+    s.run_for(5 * PERIOD_S)
+    take.facts["answers"] = [tell(s, OPCODE, 1, 0x06), tell(s, OPCODE, 2, 0xFE)]
+    s.run_for(0.1)
+    take.facts["read"] = {(i, sub): ask(s, i, sub) for i in (*ACCEL, TEMP) for sub in REGISTERS}
 
 
 # What is rejected: object, sub-index, value.
@@ -207,39 +194,32 @@ OPCODES_REFUSED: Sequence[tuple[int, int, int]] = (
 )
 
 
-@stimulus("refusals", boards=("psa2",))
-def refusals(s: Dut) -> Capture:
+@recorded("refusals", boards=("psa2",), around=changed)
+def refusals(s: Dut, take: Take) -> None:
     """Values that the board rejects. facts: reserved, (object, sub, value, answer, before, after); opcodes; others."""
     reserved = [*RESERVED, *([RESERVED_GAIN] if s.variant.board == "psa2" else [])]
-    with changed(s), s.take() as take:
-        take.facts["reserved"] = [
-            (i, sub, v, ask(s, i, sub), tell(s, i, sub, v), ask(s, i, sub)) for i, sub, v in reserved
-        ]
-        take.facts["opcodes"] = [(i, sub, v, tell(s, i, sub, v)) for i, sub, v in OPCODES_REFUSED]
-        take.facts["read-only"] = [(i, 1, 0x55, tell_raw(s, i, 1, 0x55)) for i in ACCEL]
-        take.facts["form"] = tell_raw(s, FORM, 0, 4)
-    return s.capture("refusals", take)
+    take.facts["reserved"] = [(i, sub, v, ask(s, i, sub), tell(s, i, sub, v), ask(s, i, sub)) for i, sub, v in reserved]
+    take.facts["opcodes"] = [(i, sub, v, tell(s, i, sub, v)) for i, sub, v in OPCODES_REFUSED]
+    take.facts["read-only"] = [(i, 1, 0x55, tell_raw(s, i, 1, 0x55)) for i in ACCEL]
+    take.facts["form"] = tell_raw(s, FORM, 0, 4)
 
 
-@stimulus("early", boards=("psa2",))
-def early(s: Dut) -> Capture:
+@recorded("early", boards=("psa2",), before=Dut.wait_ready, lines=False)
+def early(s: Dut, take: Take) -> None:
     """Asked before the set-up is over, and while another request is under way. facts: early, busy, missed."""
+    s.reset()
+    s.run_for(20 * PERIOD_S)
+    take.facts["early"] = [ask(s, i, CONFIG0) for i in (*ACCEL, TEMP)]
+    tell(s, PULSES, 0, 1)
+    before = ask(s, COUNTERS, SYNCS_MISSED)
+    s.host.send(SYNC, b"")
+    s.run_for(2 * PERIOD_S)
+    take.facts["missed"] = (before, ask(s, COUNTERS, SYNCS_MISSED))
+    tell(s, PULSES, 0, 0)
     s.wait_ready()
-    with s.take(lines=False) as take:
-        s.reset()
-        s.run_for(20 * PERIOD_S)
-        take.facts["early"] = [ask(s, i, CONFIG0) for i in (*ACCEL, TEMP)]
-        tell(s, PULSES, 0, 1)
-        before = ask(s, COUNTERS, SYNCS_MISSED)
-        s.host.send(SYNC, b"")
-        s.run_for(2 * PERIOD_S)
-        take.facts["missed"] = (before, ask(s, COUNTERS, SYNCS_MISSED))
-        tell(s, PULSES, 0, 0)
-        s.wait_ready()
-        take.facts["busy"] = _busy(s, take)
-        s.reset()
-        s.run_for(PERIOD_S)
-    return s.capture("early", take)
+    take.facts["busy"] = _busy(s, take)
+    s.reset()
+    s.run_for(PERIOD_S)
 
 
 def _busy(s: Dut, take: Take) -> list[int]:
@@ -260,50 +240,46 @@ def _busy(s: Dut, take: Take) -> list[int]:
     return found
 
 
-@stimulus("rates", boards=("psa2",))
-def rates(s: Dut) -> Capture:
+@recorded("rates", boards=("psa2",), around=changed)
+def rates(s: Dut, take: Take) -> None:
     """Each data rate: frames (every fourth as a PDO), then a pulse on SYNC_A by SYNC. Cuts "DR 0" ... "DR 4"."""
-    with changed(s), s.take() as take:
-        tell(s, NTH, 0, 4)
-        take.facts["mode"] = tell(s, MODE, 0, 2)
-        for dr, rate_hz in enumerate(RATES_HZ):
-            take.facts[f"answer {dr}"] = tell(s, ACCEL[0], CONFIG0, 0x46 | dr << 3)
-            s.run_for(SETTLE_PERIODS / rate_hz)
-            streamed(s, take, f"DR {dr}", 24 / rate_hz + 0.01)
-            tell(s, PULSES, 0, 1)
-            s.host.send(SYNC, b"")
-            s.run_for(SETTLE_PERIODS / rate_hz + 0.005)
-            tell(s, PULSES, 0, 0)
-    return s.capture("rates", take)
+    tell(s, NTH, 0, 4)
+    take.facts["mode"] = tell(s, MODE, 0, 2)
+    for dr, rate_hz in enumerate(RATES_HZ):
+        take.facts[f"answer {dr}"] = tell(s, ACCEL[0], CONFIG0, 0x46 | dr << 3)
+        s.run_for(SETTLE_PERIODS / rate_hz)
+        streamed(s, take, f"DR {dr}", 24 / rate_hz + 0.01)
+        tell(s, PULSES, 0, 1)
+        s.host.send(SYNC, b"")
+        s.run_for(SETTLE_PERIODS / rate_hz + 0.005)
+        tell(s, PULSES, 0, 0)
 
 
-@stimulus("sync", boards=("psa2",))
-def sync(s: Dut) -> Capture:
+@recorded("sync", boards=("psa2",), around=changed)
+def sync(s: Dut, take: Take) -> None:
     """SYNC in sample mode 1, then with 2024h = 1. Cuts "SYNC 0" ... before each, "pulse" before the last.
 
     facts: paced, False where no one knows how long after one another they were sent.
     """
-    with changed(s), s.take() as take:
-        tell(s, MODE, 0, 1)
-        with while_streaming(s):
-            s.run_for(5 * PERIOD_S)
-            for k in range(10):
-                cut(take, f"SYNC {k}")
-                take.marks[f"SYNC {k}"] = s.bench.time_s
-                s.host.send(SYNC, b"")
-                s.run_for((4 + 0.3 * k) * PERIOD_S)
-                _wait_for_a_sample(s, take, f"SYNC {k}")
-            cut(take, "SYNC end")
-            tell(s, MODE, 0, 0)
-            s.run_for(20 * PERIOD_S)
-            tell(s, PULSES, 0, 1)
-            take.facts["before"] = ask(s, COUNTERS, SYNCS_MISSED)
-            cut(take, "pulse")
+    tell(s, MODE, 0, 1)
+    with while_streaming(s):
+        s.run_for(5 * PERIOD_S)
+        for k in range(10):
+            cut(take, f"SYNC {k}")
+            take.marks[f"SYNC {k}"] = s.bench.time_s
             s.host.send(SYNC, b"")
-            s.run_for(0.1)
-        cut(take, "pulse end")
-        take.facts["after"] = ask(s, COUNTERS, SYNCS_MISSED)
-    return s.capture("sync", take)
+            s.run_for((4 + 0.3 * k) * PERIOD_S)
+            _wait_for_a_sample(s, take, f"SYNC {k}")
+        cut(take, "SYNC end")
+        tell(s, MODE, 0, 0)
+        s.run_for(20 * PERIOD_S)
+        tell(s, PULSES, 0, 1)
+        take.facts["before"] = ask(s, COUNTERS, SYNCS_MISSED)
+        cut(take, "pulse")
+        s.host.send(SYNC, b"")
+        s.run_for(0.1)
+    cut(take, "pulse end")
+    take.facts["after"] = ask(s, COUNTERS, SYNCS_MISSED)
 
 
 LATE_S = 2.0  # real time that a busy machine may be late
@@ -320,18 +296,16 @@ def _wait_for_a_sample(s: Dut, take: Take, since: str) -> None:
         s.host.pump_until(came, LATE_S)
 
 
-@stimulus("gain", boards=("psa2",))
-def gain(s: Dut) -> Capture:
+@recorded("gain", boards=("psa2",), around=changed, lines=False)
+def gain(s: Dut, take: Take) -> None:
     """CONFIG1 written while frames flow: gain 4 for 2. Cuts "before", "gain"; facts: answer, read on all three."""
-    with changed(s), s.take(lines=False) as take:
-        cut(take, "before")
-        with while_streaming(s):
-            s.run_for(0.1)
-            cut(take, "gain")
-            take.facts["answer"] = tell(s, ACCEL[0], CONFIG1, 0x0A)
-            s.run_for(0.2)
-        take.facts["read"] = [ask(s, i, CONFIG1) for i in ACCEL]
-    return s.capture("gain", take)
+    cut(take, "before")
+    with while_streaming(s):
+        s.run_for(0.1)
+        cut(take, "gain")
+        take.facts["answer"] = tell(s, ACCEL[0], CONFIG1, 0x0A)
+        s.run_for(0.2)
+    take.facts["read"] = [ask(s, i, CONFIG1) for i in ACCEL]
 
 
 OFFSET = 0x012345  # codes; positive
@@ -339,8 +313,8 @@ FACTOR = 0x500000  # 1.25
 APART_CODES = 2000  # of two axes, so that one can be beyond its limit alone, whatever the noise
 
 
-@stimulus("numbers", boards=("psa2",))
-def numbers(s: Dut) -> Capture:
+@recorded("numbers", boards=("psa2",), around=changed)
+def numbers(s: Dut, take: Take) -> None:
     """OFC and FSC written through 2000h: as they were, an offset, a factor, both limits. Cuts by these names.
 
     At last one axis alone is driven beyond either limit. facts: alone, its number by "one high" and "one low", where
@@ -353,19 +327,17 @@ def numbers(s: Dut) -> Capture:
         "high": [*split(ACCEL[0], OFC0, 0x800000), *split(ACCEL[0], FSC0, 0x7FFFFF)],
         "low": split(ACCEL[0], OFC0, 0x7FFFFF),
     }
-    with changed(s), s.take() as take:
-        for name, told in steps.items():
-            take.facts[name] = [tell(s, *x) for x in told]
-            s.run_for(3 * PERIOD_S)
-            streamed(s, take, name, 0.06)
-        alone: dict[str, int] = {}
-        take.facts["alone"] = alone
-        for name, (axis, ofc) in _alone(s.capture("numbers", take)).items():
-            alone[name] = axis
-            take.facts[name] = [tell(s, *x) for x in split(ACCEL[0], OFC0, ofc & 0xFFFFFF)]
-            s.run_for(3 * PERIOD_S)
-            streamed(s, take, name, 0.06)
-    return s.capture("numbers", take)
+    for name, told in steps.items():
+        take.facts[name] = [tell(s, *x) for x in told]
+        s.run_for(3 * PERIOD_S)
+        streamed(s, take, name, 0.06)
+    alone: dict[str, int] = {}
+    take.facts["alone"] = alone
+    for name, (axis, ofc) in _alone(s.capture("numbers", take)).items():
+        alone[name] = axis
+        take.facts[name] = [tell(s, *x) for x in split(ACCEL[0], OFC0, ofc & 0xFFFFFF)]
+        s.run_for(3 * PERIOD_S)
+        streamed(s, take, name, 0.06)
 
 
 def _alone(e: Capture) -> dict[str, tuple[int, int]]:
@@ -385,51 +357,44 @@ def _alone(e: Capture) -> dict[str, tuple[int, int]]:
     return found
 
 
-@stimulus("forms", boards=("psa2",))
-def forms(s: Dut) -> Capture:
+@recorded("forms", boards=("psa2",), around=changed, lines=False)
+def forms(s: Dut, take: Take) -> None:
     """Every frame form for a while, the last one several times. Cuts "form 0" ..., "again 0" ...
 
     facts: answer of each, bit 31 of the TPDOs, stamps before each time.
     """
-    with changed(s), s.take(lines=False) as take:
-        for form in (0, 1, 2, 3):
-            take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
-            take.facts[f"off {form}"] = [ask(s, OD.TPDO + k, 1) for k in range(5)]
-            streamed(s, take, f"form {form}", FORM_S[form])
-        stamps = []
-        for k in range(AGAIN):  # stopped with another number of samples in the block each
-            s.run_for(2 * PERIOD_S)
-            stamps.append(ask(s, OD.FRAME_HEAD, 5))  # of the latest sample, us, before the start
-            streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
-        take.facts["stamps"] = stamps
-    return s.capture("forms", take)
+    for form in (0, 1, 2, 3):
+        take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
+        take.facts[f"off {form}"] = [ask(s, OD.TPDO + k, 1) for k in range(5)]
+        streamed(s, take, f"form {form}", FORM_S[form])
+    stamps = []
+    for k in range(AGAIN):  # stopped with another number of samples in the block each
+        s.run_for(2 * PERIOD_S)
+        stamps.append(ask(s, OD.FRAME_HEAD, 5))  # of the latest sample, us, before the start
+        streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
+    take.facts["stamps"] = stamps
 
 
-@stimulus("fit", boards=("psa2",))
-def fit(s: Dut) -> Capture:
+@recorded("fit", boards=("psa2",), around=changed)
+def fit(s: Dut, take: Take) -> None:
     """What the bus cannot carry. facts: words of 2031h, answers, CONFIG0 after; cuts "form", "rate"."""
-    with changed(s), s.take() as take:
-        cut(take, "rate")
-        take.facts["rate"] = tell(s, ACCEL[0], CONFIG0, 0x66)  # 4000 SPS in pairs
-        s.run_for(5 * PERIOD_S)
-        take.facts["rate text"], take.facts["config0"] = ask(s, OD.REFUSAL), ask(s, ACCEL[0], CONFIG0)
-        tell(s, FORM, 0, 1)
-        take.facts["fast"] = tell(s, ACCEL[0], CONFIG0, 0x66)
-        s.run_for(30 * PERIOD_S)
-        cut(take, "form")
-        take.facts["form"] = tell(s, FORM, 0, 0)
-        s.run_for(5 * PERIOD_S)
-        take.facts["form text"], take.facts["form read"] = ask(s, OD.REFUSAL), ask(s, FORM)
-        cut(take, "form end")
-    return s.capture("fit", take)
+    cut(take, "rate")
+    take.facts["rate"] = tell(s, ACCEL[0], CONFIG0, 0x66)  # 4000 SPS in pairs
+    s.run_for(5 * PERIOD_S)
+    take.facts["rate text"], take.facts["config0"] = ask(s, OD.REFUSAL), ask(s, ACCEL[0], CONFIG0)
+    tell(s, FORM, 0, 1)
+    take.facts["fast"] = tell(s, ACCEL[0], CONFIG0, 0x66)
+    s.run_for(30 * PERIOD_S)
+    cut(take, "form")
+    take.facts["form"] = tell(s, FORM, 0, 0)
+    s.run_for(5 * PERIOD_S)
+    take.facts["form text"], take.facts["form read"] = ask(s, OD.REFUSAL), ask(s, FORM)
+    cut(take, "form end")
 
 
-@stimulus("starts", boards=("psa2",))
-def starts(s: Dut) -> Capture:
+@recorded("starts", boards=("psa2",), before=Dut.wait_ready, lines=False)
+def starts(s: Dut, take: Take) -> None:
     """The stream started and stopped many times, at all phases of a sample."""
-    s.wait_ready()
-    with s.take(lines=False) as take:
-        for k in range(24):
-            with while_streaming(s):
-                s.run_for((4 + 0.13 * k) * PERIOD_S)
-    return s.capture("starts", take)
+    for k in range(24):
+        with while_streaming(s):
+            s.run_for((4 + 0.13 * k) * PERIOD_S)

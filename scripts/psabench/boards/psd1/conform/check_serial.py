@@ -29,7 +29,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive
+from psabench.conform.verdict import Failed, conclusive, damaged_data_are
 
 SERIAL = (*FRAMES, "SCLK", "SDAT", "CLK_1M25")
 HAND = (*FRAMES, "FL2", "CS", "CLK_1M25")
@@ -86,10 +86,8 @@ def told_words(e: Capture) -> np.ndarray:
     """(n, 3) of PSD1_CYCLE. Raises Inconclusive for fewer than two, Failed for frames of another length."""
     log = e.frames_of("PSD1_CYCLE")
     conclusive(len(log) >= 3, f"{len(log)} messages PSD1_CYCLE came")
-    try:
+    with damaged_data_are(Failed, "8 bytes", frames=log.frames):
         raw = log.raw("PSD1_CYCLE")
-    except ValueError as err:
-        raise Failed(str(err), "8 bytes", frames=log.frames) from err
     return np.stack([raw[a] for a in "XYZ"], axis=1)
 
 

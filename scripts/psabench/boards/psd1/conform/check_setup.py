@@ -32,7 +32,7 @@ from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.signals import Ints
 
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
@@ -348,10 +348,8 @@ def psd1_time_tells_the_cycle(e: Capture, row: Requirement) -> str:
     whole = cycles(e)
     log = e.frames_of("PSD1_TIME")
     conclusive(len(log) >= 4, f"{len(log)} messages PSD1_TIME came")
-    try:
+    with damaged_data_are(Failed, "8 bytes", frames=log.frames):
         raw = log.raw("PSD1_TIME")
-    except ValueError as err:
-        raise Failed(str(err), "8 bytes", frames=log.frames) from err
     period_ns = row.limit("period_ns")
     begin, end = starts(e, whole), np.array([c[2].clear for c in whole], np.int64)
     falls = e.wires.falls("DR")

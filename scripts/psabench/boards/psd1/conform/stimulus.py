@@ -5,9 +5,9 @@ from __future__ import annotations
 from psabench.boards.psd1.conform.host import calm, has_host, messages_on, period_s, run_cycles, setup_s, word
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Dut
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import from_res, while_streaming
+from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
 
 CYCLES = 24  # of a stimulus
 MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than that
@@ -19,23 +19,17 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, setup_s(s.variant))
 
 
-@stimulus("stream", boards=("psd1",))
-def stream(s: Dut) -> Capture:
+@recorded("stream", boards=("psd1",), before=calm, streaming=True)
+def stream(s: Dut, take: Take) -> None:
     """Cycles as the built-in host reads them, or as we do over the bus where there is none."""
-    calm(s)
-    with s.take() as take, while_streaming(s):
-        run_cycles(s, CYCLES)
-    return s.capture("stream", take)
+    run_cycles(s, CYCLES)
 
 
-@stimulus("words", boards=("psd1",))
-def words(s: Dut) -> Capture:
+@recorded("words", boards=("psd1",), before=calm, lines=False, streaming=True)
+def words(s: Dut, take: Take) -> None:
     """A thousand words at still inputs where the board reads them itself and is not slow, a few elsewhere."""
-    calm(s)
     fast = has_host(s.variant) and period_s(s.variant) < FAST_S
-    with s.take(lines=False) as take, while_streaming(s):
-        run_cycles(s, MANY if fast else 2 * CYCLES)
-    return s.capture("words", take)
+    run_cycles(s, MANY if fast else 2 * CYCLES)
 
 
 @stimulus("messages", boards=("psd1",))
