@@ -66,18 +66,7 @@ class Take:
 
     def on_message(self, m: Message) -> None:
         """Listener of a CanHost."""
-        self.frames.append(
-            CanFrame(
-                t_s=m.timestamp * self.rate,
-                can_id=m.arbitration_id,
-                data=bytes(m.data),
-                fd=bool(m.is_fd),
-                error=bool(m.is_error_frame),
-                extended=bool(m.is_extended_id),
-                remote=bool(m.is_remote_frame),
-                brs=bool(m.bitrate_switch) if m.is_fd else None,
-            )
-        )
+        self.frames.append(CanFrame.of(m, m.timestamp * self.rate, bool(m.bitrate_switch) if m.is_fd else None))
 
 
 class Dut:

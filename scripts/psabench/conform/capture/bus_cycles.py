@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -37,13 +37,7 @@ class Strobes:
     def at(self, address: int) -> Strobes:
         """Those at one address."""
         keep = self.address == address
-        return Strobes(
-            fall_ns=self.fall_ns[keep],
-            rise_ns=self.rise_ns[keep],
-            write=self.write[keep],
-            address=self.address[keep],
-            data=self.data[keep],
-        )
+        return Strobes(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
 
 
 def strobes(log: LineLog) -> Strobes:

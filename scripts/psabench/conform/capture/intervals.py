@@ -82,6 +82,11 @@ def after(edges_ns: Ints, at_ns: Ints) -> Ints:
     return found
 
 
+def within(edges_ns: Ints, begin_ns: int, end_ns: int) -> Ints:
+    """Those from one instant to the other, both included."""
+    return edges_ns[np.searchsorted(edges_ns, begin_ns, "left") : np.searchsorted(edges_ns, end_ns, "right")]
+
+
 def together(e: Capture, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what: str, lines: Sequence[str]) -> str:
     """Each instant (n,) is one of these edges. Returns what was seen; raises Failed, Inconclusive."""
     conclusive(len(at_ns), f"nothing to compare: {what}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,9 @@ from psabench.link.busport import Cycle
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, Ints
 from psabench.link.vcd import Vcd, Wire
+
+if TYPE_CHECKING:
+    from psabench.link.can_host import Message
 
 Bools = npt.NDArray[np.bool_]
 PPM = 1e-6
@@ -37,6 +41,20 @@ class CanFrame:
     extended: bool = False  # identifier of 29 bits
     remote: bool = False
     brs: bool | None = None  # data at the second bit rate, of an FD frame; None: no one told
+
+    @classmethod
+    def of(cls, m: Message, t_s: float, brs: bool | None = None) -> CanFrame:
+        """What python-can received or read."""
+        return cls(
+            t_s=t_s,
+            can_id=int(m.arbitration_id),
+            data=bytes(m.data),
+            fd=bool(m.is_fd),
+            error=bool(m.is_error_frame),
+            extended=bool(m.is_extended_id),
+            remote=bool(m.is_remote_frame),
+            brs=brs,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -41,7 +41,7 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
             if len(frames) >= MOST_FRAMES:
                 note, trouble = f"judged to its {MOST_FRAMES} frames", ""
                 break
-            frames.append(_frame(m))
+            frames.append(CanFrame.of(m, float(m.timestamp)))
     except OSError:
         raise
     except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
@@ -63,18 +63,6 @@ def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
     if not zero_s:
         return tuple(frames)
     return tuple(replace(f, t_s=f.t_s - zero_s) for f in frames)
-
-
-def _frame(m: can.Message) -> CanFrame:
-    return CanFrame(
-        t_s=float(m.timestamp),
-        can_id=int(m.arbitration_id),
-        data=bytes(m.data),
-        fd=bool(m.is_fd),
-        error=bool(m.is_error_frame),
-        extended=bool(m.is_extended_id),
-        remote=bool(m.is_remote_frame),
-    )
 
 
 def _source(path: Path, bounds: Bounds) -> tuple[Any, str]:

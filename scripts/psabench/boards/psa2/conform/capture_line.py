@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from psabench.conform.capture.intervals import within
 from psabench.conform.capture.log import Bools, LineLog
 from psabench.conform.verdict import conclusive
 from psabench.link.signals import Floats, Ints
@@ -31,23 +32,17 @@ class Transfers:
     @cached_property
     def rises(self) -> list[Ints]:
         """Rises of CLK in each transfer."""
-        return [_within(self.clk_rise_ns, a, b) for a, b in zip(self.fall_ns, self.rise_ns, strict=True)]
+        return [within(self.clk_rise_ns, a, b) for a, b in zip(self.fall_ns, self.rise_ns, strict=True)]
 
     @cached_property
     def falls(self) -> list[Ints]:
         """Falls of CLK in each transfer, one at its very end included."""
-        return [_within(self.clk_fall_ns, a, b) for a, b in zip(self.fall_ns, self.rise_ns, strict=True)]
+        return [within(self.clk_fall_ns, a, b) for a, b in zip(self.fall_ns, self.rise_ns, strict=True)]
 
     def of(self, bits: int) -> Transfers:
         """Those with exactly so many rises of CLK."""
         keep = np.array([len(r) == bits for r in self.rises], bool)
-        return Transfers(
-            fall_ns=self.fall_ns[keep],
-            rise_ns=self.rise_ns[keep],
-            clk_rise_ns=self.clk_rise_ns,
-            clk_fall_ns=self.clk_fall_ns,
-            log=self.log,
-        )
+        return replace(self, fall_ns=self.fall_ns[keep], rise_ns=self.rise_ns[keep])
 
     def grid_ns(self, bits: int) -> Floats:
         """(n, 4 * bits) rises of CLK. Every transfer must have them all."""
@@ -73,7 +68,3 @@ def transfers(log: LineLog) -> Transfers:
     fall, rise = log.pulses("Int", 0)
     conclusive(len(fall) >= LEAST, f"{len(fall)} transfers were recorded; expected {LEAST}")
     return Transfers(fall_ns=fall, rise_ns=rise, clk_rise_ns=log.rises("CLK"), clk_fall_ns=log.falls("CLK"), log=log)
-
-
-def _within(edges: Ints, begin_ns: int, end_ns: int) -> Ints:
-    return edges[np.searchsorted(edges, begin_ns, "left") : np.searchsorted(edges, end_ns, "right")]

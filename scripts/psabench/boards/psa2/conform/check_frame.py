@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
-from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
+from psabench.boards.psa2.conform.check_stream import FORMATS, LINES, whole_transfers, word_bits
 from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
@@ -17,22 +17,8 @@ from psabench.link.signals import Floats, Ints
 LOWS = ("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
 
 
-def _word_bits(e: Capture) -> int:
-    return int(row_for(e, *FORMATS).limit("word_bits"))
-
-
 def _clk_ns(e: Capture) -> float:
     return 1e9 / row_for(e, *FORMATS).limit("clk_hz")
-
-
-def _whole(e: Capture) -> Transfers:
-    """The transfers, each of which must have all its bits. Raises Failed for the first that has not."""
-    t = transfers(e.wires)
-    due = WORDS * _word_bits(e)
-    for fall, rises in zip(t.fall_ns, t.rises, strict=True):
-        if len(rises) != due:
-            raise Failed(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
-    return t
 
 
 def _first(bad: np.ndarray, at_ns: Ints, saw: Floats, due: str, unit: str = "ns") -> None:
@@ -56,8 +42,8 @@ def a_transfer_has_four_words(e: Capture, row: Requirement) -> str:
 @check("stream", "PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08", needs={"line"})
 def words_have_their_bits_at_their_clock(e: Capture) -> str:
     """Count the pulses of CLK in each transfer and measure their period."""
-    t, clk_ns = _whole(e), _clk_ns(e)
-    rises, bits = t.grid_ns(_word_bits(e)), _word_bits(e)
+    t, clk_ns = whole_transfers(e), _clk_ns(e)
+    rises, bits = t.grid_ns(word_bits(e)), word_bits(e)
     word_ns = (rises[:, bits - 1] - rises[:, 0]) / (bits - 1)
     slack_ns = e.slack_ns(clk_ns * (bits - 1)) / (bits - 1)
     bad = np.abs(word_ns - clk_ns) > slack_ns
@@ -68,7 +54,7 @@ def words_have_their_bits_at_their_clock(e: Capture) -> str:
 @check("stream", "PSA2-FRAME-02", needs={"line"})
 def words_are_apart(e: Capture, row: Requirement) -> str:
     """Measure the pauses between the words of a transfer."""
-    t, clk_ns, bits = _whole(e), _clk_ns(e), _word_bits(e)
+    t, clk_ns, bits = whole_transfers(e), _clk_ns(e), word_bits(e)
     due_ns = row.limit("rise_to_rise_clk") * clk_ns
     rises = t.grid_ns(bits)
     pause_ns = (rises[:, bits::bits] - rises[:, bits - 1 : -1 : bits]).reshape(-1)
@@ -81,7 +67,7 @@ def words_are_apart(e: Capture, row: Requirement) -> str:
 @check("stream", "PSA2-FRAME-09", "PSA2-INT-01", needs={"line"})
 def clk_runs_only_with_data(e: Capture) -> str:
     """Look for pulses of CLK outside transfers, and for more or fewer than one a bit within them."""
-    t = _whole(e)
+    t = whole_transfers(e)
     first, last = t.fall_ns[0], t.rise_ns[-1]
     rises = t.clk_rise_ns[(t.clk_rise_ns >= first) & (t.clk_rise_ns <= last)]
     inside = np.searchsorted(t.fall_ns, rises, "right") - np.searchsorted(t.rise_ns, rises, "left") == 1
@@ -94,7 +80,7 @@ def clk_runs_only_with_data(e: Capture) -> str:
 @check("stream", "PSA2-FRAME-10", needs={"line"})
 def data_stand_still_around_each_rise_of_clk(e: Capture, row: Requirement) -> str:
     """Look for changes of Data near a rise of CLK."""
-    t, clk_ns = _whole(e), _clk_ns(e)
+    t, clk_ns = whole_transfers(e), _clk_ns(e)
     changes = e.wires["Data"].t_ns[1:]
     keep_ns = (row.limit("hold_clk") - row.limit("tolerance_clk")) * clk_ns - e.slack_ns(clk_ns)
     rises = t.clk_rise_ns
@@ -109,7 +95,7 @@ def data_stand_still_around_each_rise_of_clk(e: Capture, row: Requirement) -> st
 
 
 def _rests_low(e: Capture, line: str, row: Requirement) -> str:
-    t, clk_ns, bits = _whole(e), _clk_ns(e), _word_bits(e)
+    t, clk_ns, bits = whole_transfers(e), _clk_ns(e), word_bits(e)
     rises = t.grid_ns(bits)
     pauses = (rises[:, bits - 1 : -1 : bits] + row.limit("look_in_pause_clk") * clk_ns).reshape(-1)
     after = t.rise_ns + row.limit("look_after_clk") * clk_ns
@@ -147,7 +133,7 @@ def clk_is_high_for_half_of_its_period(e: Capture, row: Requirement) -> str:
 @check("stream", "PSA2-INT-02", needs={"line"})
 def int_is_low_long_enough(e: Capture, row: Requirement) -> str:
     """Measure the lows of Int."""
-    t = _whole(e)
+    t = whole_transfers(e)
     low_ns = (t.rise_ns - t.fall_ns).astype(np.float64)
     least_ns = row.limit("int_low_min_us") * 1e3
     _first(low_ns < least_ns - e.slack_ns(least_ns), t.fall_ns, low_ns, f"not less than {least_ns:.0f} ns of Int low")
@@ -157,9 +143,9 @@ def int_is_low_long_enough(e: Capture, row: Requirement) -> str:
 @check("stream", "PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06", needs={"line"})
 def int_is_low_for_its_periods_of_clk(e: Capture) -> str:
     """Measure the lows of Int, and the lead-in before the first bit."""
-    t, row, clk_ns = _whole(e), row_for(e, *LOWS), _clk_ns(e)
+    t, row, clk_ns = whole_transfers(e), row_for(e, *LOWS), _clk_ns(e)
     low_ns = (t.rise_ns - t.fall_ns).astype(np.float64)
-    lead_ns = t.grid_ns(_word_bits(e))[:, 0] - t.fall_ns
+    lead_ns = t.grid_ns(word_bits(e))[:, 0] - t.fall_ns
     for saw_ns, due_ns, what in (
         (low_ns, row.limit("int_low_us") * 1e3, "of Int low"),
         (lead_ns, (row.limit("lead_in_clk") + 0.5) * clk_ns, "from the fall of Int to the first rise of CLK"),
@@ -180,7 +166,7 @@ def _clk_falls(t: Transfers) -> tuple[Floats, Floats]:
 @check("stream", "PSA2-INT-03", needs={"line"})
 def int_rises_with_the_last_fall_of_clk(e: Capture, row: Requirement) -> str:
     """Compare the rise of Int with the last falling edge of CLK."""
-    t, clk_ns = _whole(e), _clk_ns(e)
+    t, clk_ns = whole_transfers(e), _clk_ns(e)
     _first_ns, last_ns = _clk_falls(t)
     off_ns = t.rise_ns - last_ns
     slack_ns = row.limit("tolerance_clk") * clk_ns + e.slack_ns(0.0)
@@ -210,7 +196,7 @@ def int_rests_high(e: Capture, row: Requirement) -> str:
 @check("stream", "PSA2-INT-10", needs={"line"})
 def int_changes_on_the_grid_of_clk(e: Capture, row: Requirement) -> str:
     """Measure from both edges of Int to the first fall of CLK: whole periods of CLK?"""
-    t, clk_ns = _whole(e), _clk_ns(e)
+    t, clk_ns = whole_transfers(e), _clk_ns(e)
     first_ns, _last_ns = _clk_falls(t)
     tolerance_ns = row.limit("tolerance_clk") * clk_ns
     for edges, what in ((t.fall_ns, "fall"), (t.rise_ns, "rise")):

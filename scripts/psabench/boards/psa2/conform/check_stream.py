@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from psabench.boards.psa2.conform.capture_can import SEQ_BITS, STAMP_BITS, pairs
-from psabench.boards.psa2.conform.capture_line import transfers
+from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
 from psabench.conform.capture.intervals import first_of
@@ -34,6 +34,21 @@ def number(a: object) -> int:
 def unit_us(e: Capture) -> float:
     """Of TSTAMP."""
     return row_for(e, "PSA2-CAN-05").limit("unit_us")
+
+
+def word_bits(e: Capture) -> int:
+    """Of a word on the line."""
+    return int(row_for(e, *FORMATS).limit("word_bits"))
+
+
+def whole_transfers(e: Capture) -> Transfers:
+    """The transfers, each of which must have all its bits. Raises Failed for the first that has not."""
+    t = transfers(e.wires)
+    due = WORDS * word_bits(e)
+    for fall, rises in zip(t.fall_ns, t.rises, strict=True):
+        if len(rises) != due:
+            raise Failed(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
+    return t
 
 
 # ---- pairs

@@ -10,7 +10,7 @@ from psabench.boards.psa2.conform.capture_can import Pairs, aligned, pairs, sign
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_setup import port_traffic
-from psabench.boards.psa2.conform.check_stream import FORMATS, LINES
+from psabench.boards.psa2.conform.check_stream import LINES, whole_transfers, word_bits
 from psabench.conform.capture.intervals import first_of
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
@@ -24,13 +24,7 @@ from psabench.link.signals import Ints
 
 def _words(e: Capture) -> Ints:
     """(n, 4) words of the line, sign-extended. Raises Failed for a transfer without all its bits."""
-    t = transfers(e.wires)
-    bits = int(row_for(e, *FORMATS).limit("word_bits"))
-    due = 4 * bits
-    for fall, rises in zip(t.fall_ns, t.rises, strict=True):
-        if len(rises) != due:
-            raise Failed(f"{len(rises)} pulses of CLK in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
-    return signed(t.words(bits), bits)
+    return signed(whole_transfers(e).words(word_bits(e)), word_bits(e))
 
 
 WORDS = {
@@ -98,7 +92,7 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
 def words_come_least_significant_bit_first(e: Capture) -> str:
     """Read the words either way round: which way do they hold the codes of CAN?"""
     t, p = transfers(e.wires.unbroken()), pairs(e)
-    bits = int(row_for(e, *FORMATS).limit("word_bits"))
+    bits = word_bits(e)
     t = t.of(4 * bits)
     if len(t) < LEAST and len(e.wires.gaps_ns):
         raise Inconclusive(f"{len(t)} frames between two losses of samples")

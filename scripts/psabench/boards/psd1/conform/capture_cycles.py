@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.conform.capture.intervals import wires_needed
+from psabench.conform.capture.intervals import wires_needed, within
 from psabench.conform.capture.log import Capture
 from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
@@ -53,7 +53,7 @@ def transfers(e: Capture) -> list[Transfer]:
     )
     found = []
     for n, (fall, rise, axis) in enumerate(lows_of):
-        rises, falls = _within(up, fall, rise), _within(down, fall, rise)
+        rises, falls = within(up, fall, rise), within(down, fall, rise)
         if len(rises) == CONTROL_BITS:
             continue
         limit = lows_of[n + 1][0] if n + 1 < len(lows_of) else log.end_ns + 1
@@ -132,10 +132,6 @@ def starts(e: Capture, whole: Sequence[tuple[Transfer, Transfer, Transfer]]) -> 
         raise Failed("RFX low without a rise of A0 before it", "A0 = 1", at_ns=int(falls[0]), lines=("A0", "RFX", "DR"))
     found: Ints = rises[k]
     return found
-
-
-def _within(edges: Ints, begin_ns: int, end_ns: int) -> Ints:
-    return edges[np.searchsorted(edges, begin_ns, "left") : np.searchsorted(edges, end_ns, "right")]
 
 
 def _first(edges: Ints, from_ns: int, until_ns: int) -> int:

@@ -26,6 +26,7 @@ from psabench.conform.capture.intervals import (
     interval,
     together,
     wires_needed,
+    within,
 )
 from psabench.conform.capture.log import Capture
 from psabench.conform.capture.messages import booted, late_readings
@@ -65,9 +66,7 @@ def frames(e: Capture) -> list[Frame]:
     found = []
     for name in ("TFS", *FRAMES):
         for a, b in zip(*log.pulses(name, 0), strict=True):
-            rises = up[np.searchsorted(up, a) : np.searchsorted(up, b, "right")]
-            falls = down[np.searchsorted(down, a) : np.searchsorted(down, b, "right")]
-            found.append(Frame(name, int(a), int(b), rises, falls))
+            found.append(Frame(name, int(a), int(b), within(up, a, b), within(down, a, b)))
     begin = min((f.fall for f in found if f.line == "TFS"), default=None)
     if begin is None:
         raise Inconclusive("no control word in the recording")
