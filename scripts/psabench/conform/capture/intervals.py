@@ -33,6 +33,12 @@ def first_bad(
         raise Failed(f"{what} ({int(bad.sum())} of {len(bad)})", due, at_ns=int(at_ns[k]), lines=lines)
 
 
+def none_at(at_ns: Ints, saw: str, due: str, lines: Sequence[str]) -> None:
+    """Raises Failed at the first of these instants."""
+    if len(at_ns):
+        raise Failed(saw, due, at_ns=int(at_ns[0]), lines=lines)
+
+
 def at_levels(e: Capture, names: Sequence[str], at_ns: int, row: Requirement, when: str, beside: Sequence[str]) -> str:
     """Each line has its level of the row, `name_level`, 0 by default. Raises Failed, showing the lines beside it."""
     for name in names:

@@ -188,8 +188,7 @@ def what_cannot_be_is_refused(s: Dut, row: Requirement) -> str:
 @active("PIK-CNT-09", needs={"bus"}, before=calm, after=calm)
 def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
-    seen = names_and_rights(s, "pik", never={}, writes={"PERIOD": 100})
-    return seen
+    return names_and_rights(s, "pik", never={}, writes={"PERIOD": 100})
 
 
 @active("PIK-CAN-05", needs={"can"})

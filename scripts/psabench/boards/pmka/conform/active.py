@@ -83,8 +83,7 @@ def _as_on_can(s: Dut, first: int, end: int) -> str:
 def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     line(s, "W 9 0")  # COMMAND is taken in mode program
-    seen = names_and_rights(s, "pmka", never={}, writes={"COMMAND": 0, "BEAT": 200, "ZERO": 100, "INDEX": 1, "MODE": 0})
-    return seen
+    return names_and_rights(s, "pmka", never={}, writes={"COMMAND": 0, "BEAT": 200, "ZERO": 100, "INDEX": 1, "MODE": 0})
 
 
 @active("PMKA-CAL-02", needs={"bus", "can"}, before=calm, after=calm)

@@ -6,7 +6,7 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.boards.psa2.conform.check_stream import FORMATS, LINES, whole_transfers, word_bits
-from psabench.conform.capture.intervals import first_of
+from psabench.conform.capture.intervals import first_of, none_at
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -72,8 +72,7 @@ def clk_runs_only_with_data(e: Capture) -> str:
     rises = t.clk_rise_ns[(t.clk_rise_ns >= first) & (t.clk_rise_ns <= last)]
     inside = np.searchsorted(t.fall_ns, rises, "right") - np.searchsorted(t.rise_ns, rises, "left") == 1
     stray = rises[~inside & e.wires.known(np.full(len(rises), first), rises)]
-    if len(stray):
-        raise Failed(f"{len(stray)} pulses of CLK with Int high", "none", at_ns=int(stray[0]), lines=LINES)
+    none_at(stray, f"{len(stray)} pulses of CLK with Int high", "none", LINES)
     return f"{len(rises)} pulses, all within {len(t)} transfers"
 
 
@@ -186,10 +185,7 @@ def int_rests_high(e: Capture, row: Requirement) -> str:
     at_ns = (edges[:-1] + still_ns // 2)[long]
     conclusive(len(at_ns), "CLK never runs and then stands still")
     low = e.wires["Int"].at(at_ns) == 0
-    if low.any():
-        raise Failed(
-            f"Int low between frames ({int(low.sum())} of {len(low)})", "high", at_ns=int(at_ns[low][0]), lines=LINES
-        )
+    none_at(at_ns[low], f"Int low between frames ({int(low.sum())} of {len(low)})", "high", LINES)
     return f"high in {len(at_ns)} pauses between frames"
 
 

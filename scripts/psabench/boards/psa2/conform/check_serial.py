@@ -9,7 +9,7 @@ import numpy as np
 from psabench.boards.psa2.board import BOARD
 from psabench.boards.psa2.conform.capture_spi import AXES, Burst, Message
 from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
-from psabench.conform.capture.intervals import first_of
+from psabench.conform.capture.intervals import first_of, none_at
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -100,10 +100,7 @@ def lines_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
     names = {n.lower(): n for n in e.wires.recording.wires}
     for low, level in levels.items():
         bad = e.wires[names[low]].at(at_ns) != level
-        if bad.any():
-            raise Failed(
-                f"{names[low]} at {1 - level}", f"{level} at rest", at_ns=int(at_ns[bad][0]), lines=(names[low],)
-            )
+        none_at(at_ns[bad], f"{names[low]} at {1 - level}", f"{level} at rest", (names[low],))
     return f"{len(levels)} lines at {len(at_ns)} instants"
 
 
@@ -230,8 +227,7 @@ def sclk_has_its_frequency_and_rests_low(e: Capture, row: Requirement) -> str:
         due = f"{due_ns:.2f} +- {slack_ns[k]:.2f} ns"
         raise Failed(f"{period_ns[k]:.2f} ns a period of SClk", due, at_ns=int(at[k]), lines=("SClk",))
     tail = np.array([b.fall_ns[-1] - b.rise_ns[-1] for b in found], np.float64)
-    if (tail > due_ns).any():
-        raise Failed("SClk high between bursts", "low", at_ns=int(at[tail > due_ns][0]), lines=("SClk",))
+    none_at(at[tail > due_ns], "SClk high between bursts", "low", ("SClk",))
     return f"{period_ns.min():.2f} to {period_ns.max():.2f} ns a period of SClk, low between {len(found)} bursts"
 
 
@@ -268,13 +264,7 @@ def dout_stands_still_while_the_other_port_is_used(e: Capture) -> str:
         t = e.wires[line].t_ns[1:]
         k = np.searchsorted(falls, t, "right") - 1
         inside = (k >= 0) & (t < rises[np.maximum(k, 0)])
-        if inside.any():
-            raise Failed(
-                f"{line} changes while CST is low",
-                "it stands still",
-                at_ns=int(t[inside][0]),
-                lines=(line, "CST", "SClk"),
-            )
+        none_at(t[inside], f"{line} changes while CST is low", "it stands still", (line, "CST", "SClk"))
     return f"still in {len(falls)} lows of CST"
 
 

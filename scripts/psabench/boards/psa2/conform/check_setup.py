@@ -8,6 +8,7 @@ import numpy as np
 
 from psabench.boards.psa2.conform.capture_line import transfers
 from psabench.boards.psa2.conform.capture_spi import Traffic, traffic
+from psabench.conform.capture.intervals import none_at
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -162,8 +163,7 @@ def a_reset_brings_all_lines_to_rest(e: Capture) -> str:
             raise Failed(f"{line} {1 - rest} at the end of Res", f"{rest}", at_ns=s.res_ns, lines=("Res", line))
         moves = e.wires[line].t_ns
         moves = moves[(moves > s.res_ns) & (moves < quiet_ns)]
-        if len(moves):
-            raise Failed(f"{line} moves before the set-up is over", "rest", at_ns=int(moves[0]), lines=("Res", line))
+        none_at(moves, f"{line} moves before the set-up is over", "rest", ("Res", line))
     if not s.steps or s.steps[0].line != "DIn":
         raise Failed("the set-up does not begin again", "its first message", at_ns=s.res_ns, lines=ACCEL)
     return f"Res came {'in a frame' if in_frame else 'between frames'}; all lines at rest, then the set-up"
@@ -342,8 +342,7 @@ def no_frame_before_the_set_up_is_over(e: Capture) -> str:
     until_ns = first_fall(s.drd_a, s.nth("SYNC_A", 0).begin_ns, "DRD_A")
     falls = e.wires.falls("Int")
     early = falls[(falls > s.res_ns) & (falls < until_ns)]
-    if len(early):
-        raise Failed(f"{len(early)} falls of Int", "none", at_ns=int(early[0]), lines=("Int", "SYNC_A", "DRD_A"))
+    none_at(early, f"{len(early)} falls of Int", "none", ("Int", "SYNC_A", "DRD_A"))
     return f"Int high for {(until_ns - s.res_ns) / MS:.1f} ms after Res"
 
 
@@ -419,6 +418,5 @@ def _cut_on_the_line(e: Capture) -> str:
     cut = t.rises[k][: int(late[0]) + 1] if len(late) else t.rises[k]
     end_ns = int(cut[-1]) if len(cut) else int(t.fall_ns[k])
     stray = clk[(clk > end_ns) & (clk < t.fall_ns[k + 1])]
-    if len(stray):
-        raise Failed("CLK without power", "none", at_ns=int(stray[0]), lines=("Int", "CLK"))
+    none_at(stray, "CLK without power", "none", ("Int", "CLK"))
     return f"; the last frame before it had {len(cut)} of {whole} bits, then {pause_ns[k] / MS:.0f} ms of silence"

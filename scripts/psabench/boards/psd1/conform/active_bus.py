@@ -158,8 +158,7 @@ def _a_period_later(s: Dut, less_s: float) -> None:
 def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     words = {"X": 0x08000022, "Y": 0x08000022, "Z": 0x08000022}
-    seen = names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
-    return seen
+    return names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
 
 
 @active("PSD1-BUS-10", needs={"bus"}, before=calm)
