@@ -152,7 +152,7 @@ def _scaled(e: Capture, lines: Ratio | None, can: Ratio | None) -> Capture:
     """Times divided by these ratios; what is not known of them widens the limits."""
     found = e
     if lines is not None and isinstance(e.lines, Recorded):
-        found = found.with_lines(_lines_scaled(e.lines, 1.0 + lines.ppm * clocks.PPM))
+        found = found.with_lines(_slowed(e.lines, 1.0 + lines.ppm * clocks.PPM))
     if can is not None:
         factor = 1.0 + can.ppm * clocks.PPM
         found = found.with_can(CanLog(frames=tuple(replace(f, t_s=f.t_s / factor) for f in e.can.frames)))
@@ -160,18 +160,11 @@ def _scaled(e: Capture, lines: Ratio | None, can: Ratio | None) -> Capture:
     return replace(found, clock_ppm=e.clock_ppm + wider)
 
 
-def _lines_scaled(log: Recorded, factor: float) -> Recorded:
-    def scaled(t_ns: Ints) -> Ints:
-        off: Ints = np.rint(t_ns * (1.0 - 1.0 / factor)).astype(np.int64)
-        return t_ns - off
-
-    r = log.recording
-    ends = scaled(np.array([r.start_ns, r.end_ns], np.int64))
-    wires = {name: Wire(scaled(w.t_ns), w.level) for name, w in r.wires.items()}
-    return Recorded(
-        recording=Vcd(r.unit_ns, int(ends[0]), int(ends[1]), wires),
-        resolution_ns=log.resolution_ns / factor + (1.0 if factor != 1.0 else 0.0),
-        gaps_ns=scaled(log.gaps_ns),
+def _slowed(log: Recorded, factor: float) -> Recorded:
+    rounded_ns = 1.0 if factor != 1.0 else 0.0
+    return log.at_times(
+        lambda t_ns: t_ns - np.rint(t_ns * (1.0 - 1.0 / factor)).astype(np.int64),
+        log.resolution_ns / factor + rounded_ns,
     )
 
 

@@ -5,10 +5,10 @@ Capture comes from a stimulus of the device suite or from files (`conform.source
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -138,19 +138,16 @@ class LineLog:
         """As a clock sees them that counts `rate` seconds in one; an edge still happened before its instant."""
         if rate == 1.0:
             return self
+        late_ns = self.resolution_ns * max(rate, 1.0) + 1.0
+        return self.at_times(lambda t_ns: t_ns + np.ceil(t_ns * (rate - 1.0)).astype(np.int64), late_ns)
+
+    def at_times(self, moved: Callable[[Ints], Ints], resolution_ns: float) -> Self:
+        """The same with each instant moved."""
         r = self.recording
-
-        def seen(t_ns: Ints) -> Ints:
-            off: Ints = np.ceil(t_ns * (rate - 1.0)).astype(np.int64)
-            return t_ns + off
-
-        ends = seen(np.array([r.start_ns, r.end_ns], np.int64))
-        wires = {name: Wire(seen(w.t_ns), w.level) for name, w in r.wires.items()}
-        return LineLog(
-            recording=Vcd(r.unit_ns, int(ends[0]), int(ends[1]), wires),
-            resolution_ns=self.resolution_ns * max(rate, 1.0) + 1.0,
-            gaps_ns=seen(self.gaps_ns),
-        )
+        ends = moved(np.array([r.start_ns, r.end_ns], np.int64))
+        wires = {name: Wire(moved(w.t_ns), w.level) for name, w in r.wires.items()}
+        recording = Vcd(r.unit_ns, int(ends[0]), int(ends[1]), wires)
+        return replace(self, recording=recording, resolution_ns=resolution_ns, gaps_ns=moved(self.gaps_ns))
 
     def known(self, begin_ns: Ints, end_ns: Ints) -> Bools:
         """(n,) whether no samples were lost between these instants, nor just before one: its edge may be older."""
