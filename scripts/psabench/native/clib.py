@@ -1,4 +1,4 @@
-"""libpsabench as ctypes sees it: found, checked and declared here, used by `chips` only. The header is its manual."""
+"""libpsabench as ctypes sees it: declared here, used by `chips` only. The header is its manual."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import ctypes as c
 from functools import cache
 from typing import Any
 
-from psabench.errors import BadInput, expected
-from psabench.places import find_library
+from psabench.native.shared_library import SharedLibrary
 
 ABI = 0  # PSABENCH_ABI of the header that PROTOTYPES was written from
 NAME = f"libpsabench.so.{ABI}"
@@ -74,37 +73,13 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 }
 
 
-class Library:
-    """The functions of the header, each under its name without psabench_, with their C types checked by ctypes."""
+class Library(SharedLibrary):
+    """The functions of psabench.h."""
 
-    def __init__(self, path: str) -> None:
-        self.path = path
-        try:
-            so = c.CDLL(path)
-        except OSError as e:
-            raise BadInput(expected("a shared library (PSABENCH_LIB names another)", e, path)) from None
-        try:
-            abi = int(so.psabench_abi())
-            if abi != ABI:
-                raise BadInput(expected(f"ABI {ABI} (PSABENCH_LIB names another library)", abi, path))
-            for name, (result, *arguments) in PROTOTYPES.items():
-                function = getattr(so, f"psabench_{name}")
-                function.restype, function.argtypes = result, arguments
-                setattr(self, name, function)
-        except AttributeError as e:
-            raise BadInput(expected("a library of this version (or PSABENCH_LIB)", e, path)) from None
-
-    def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
-        raise AttributeError(name)
+    abi, prefix, variable, prototypes = ABI, "psabench_", "PSABENCH_LIB", PROTOTYPES
 
 
 @cache
 def library() -> Library:
     """The library of this process, loaded at the first use. Raises BadInput when it is nowhere or of another ABI."""
-    path = find_library(NAME)
-    if path is None:
-        try:
-            return Library(NAME)
-        except BadInput:
-            raise BadInput(expected("a library here or in the system (make builds it)", "none", NAME)) from None
-    return Library(str(path))
+    return Library.load(NAME)

@@ -1,4 +1,4 @@
-"""libpsabench-nav as ctypes sees it: found, checked and declared here, used by `nav` and `nav_mc`. Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here, used by `nav` and `nav_mc`. Manual: nav.h."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import ctypes as c
 from functools import cache
 from typing import Any
 
-from psabench.errors import BadInput, expected
-from psabench.places import find_library
+from psabench.native.shared_library import SharedLibrary
 
 ABI = 1  # NAV_ABI of the header that this was written from
 NAME = f"libpsabench-nav.so.{ABI}"
@@ -190,37 +189,13 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 }
 
 
-class NavLibrary:
-    """The functions of nav.h and nav_mc.h, each under its name without nav_, with their C types checked by ctypes."""
+class NavLibrary(SharedLibrary):
+    """The functions of nav.h and nav_mc.h."""
 
-    def __init__(self, path: str) -> None:
-        self.path = path
-        try:
-            so = c.CDLL(path)
-        except OSError as e:
-            raise BadInput(expected("a shared library (PSABENCH_NAV_LIB names another)", e, path)) from None
-        try:
-            abi = int(so.nav_abi())
-            if abi != ABI:
-                raise BadInput(expected(f"ABI {ABI} (PSABENCH_NAV_LIB names another library)", abi, path))
-            for name, (result, *arguments) in PROTOTYPES.items():
-                function = getattr(so, f"nav_{name}")
-                function.restype, function.argtypes = result, arguments
-                setattr(self, name, function)
-        except AttributeError as e:
-            raise BadInput(expected("a library of this version (or PSABENCH_NAV_LIB)", e, path)) from None
-
-    def __getattr__(self, name: str) -> Any:  # for the type checker: __init__ has set them all
-        raise AttributeError(name)
+    abi, prefix, variable, prototypes = ABI, "nav_", "PSABENCH_NAV_LIB", PROTOTYPES
 
 
 @cache
 def library() -> NavLibrary:
     """The library of this process, loaded at the first use. Raises BadInput when it is nowhere or of another ABI."""
-    path = find_library(NAME, "PSABENCH_NAV_LIB")
-    if path is None:
-        try:
-            return NavLibrary(NAME)
-        except BadInput:
-            raise BadInput(expected("a library here or in the system (make builds it)", "none", NAME)) from None
-    return NavLibrary(str(path))
+    return NavLibrary.load(NAME)
