@@ -8,19 +8,23 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 from psabench.errors import BadInput, BenchError
 from psabench.options import Parser
 
-# Help line of each command. Its module and libraries are loaded when it is called (`parse`).
-COMMANDS: Mapping[str, str] = {
-    "run": "run a calibration or gyrocompassing procedure and report it; psabench run --help lists them",
-    "record": "record the CAN bus to a log file",
-    "decode": "convert a log or a line capture to CSV in SI units",
-    "campaign": "run a procedure on thousands of virtual instruments",
-    "conform": "check a board, a recording or a host program against the requirements",
-    "shell": "open an interactive shell: instruments, device, faults",
+# Module and help line of each command. The module and its libraries are loaded when the command is called (`parse`).
+COMMANDS: Mapping[str, tuple[str, str]] = {
+    "run": (
+        "procedures.command",
+        "run a calibration or gyrocompassing procedure and report it; psabench run --help lists them",
+    ),
+    "record": ("link.record_command", "record the CAN bus to a log file"),
+    "decode": ("boards.decode_command", "convert a log or a line capture to CSV in SI units"),
+    "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
+    "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
+    "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
 }
 
 ABOUT = """\
@@ -74,34 +78,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """Reads the command line; `handler` of the result carries it out. Raises BadInput."""
-    command, rest = words[0], words[1:]
-    match command:
-        case "run":
-            from psabench.procedures import command as run_command
-
-            return run_command.parse(rest)
-        case "record":
-            from psabench.link import record_command
-
-            return record_command.parse(rest)
-        case "decode":
-            from psabench.boards import decode_command
-
-            return decode_command.parse(rest)
-        case "campaign":
-            from psabench.campaign import command as campaign_command
-
-            return campaign_command.parse(rest)
-        case "conform":
-            from psabench.conform import command as conform_command
-
-            return conform_command.parse(rest)
-        case "shell":
-            from psabench.shell import command_line
-
-            return command_line.parse(rest)
-        case _:  # an option, or no command: the parser says so
-            return parser().parse_args(words)
+    if words[0] not in COMMANDS:  # an option, or no command: the parser says so
+        return parser().parse_args(words)
+    module, _ = COMMANDS[words[0]]
+    args: argparse.Namespace = import_module(f"psabench.{module}").parse(words[1:])
+    return args
 
 
 def parser() -> argparse.ArgumentParser:
@@ -109,7 +90,7 @@ def parser() -> argparse.ArgumentParser:
     top = Parser(prog="psabench", description=ABOUT, epilog=TOP_EPILOG)
     top.add_argument("--version", action=Version, nargs=0, help="show program's version number and exit")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for name, line in COMMANDS.items():
+    for name, (_, line) in COMMANDS.items():
         commands.add_parser(name, help=line)
     return top
 
