@@ -35,6 +35,10 @@ def bits(mask: int, name: str, *meaning: str) -> Bits:
     return Bits(mask, name, dict(enumerate(meaning)))
 
 
+# By group and name of the register. Groups: converters "accel" and "temp"; of a parallel bus the board's name.
+Fields = Mapping[tuple[str, str], tuple[Bits, ...]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beat:
     """What a board does once a period: rows that give it (µs), the edge that shows it, the number that counts it."""
@@ -78,8 +82,7 @@ class Board:
     bus: Bus | None = None  # parallel bus
     beat: Beat | None = None  # None: no regular period that is known
     setting: Setting | None = None  # None, and a bus: object 2051h, its strobe
-    # Fields of registers by group and name. Groups: converters "accel" and "temp"; of a parallel bus the board's name.
-    fields: Mapping[tuple[str, str], tuple[Bits, ...]] = field(default_factory=dict)
+    fields: Fields = field(default_factory=dict)  # of its registers
     # Frequencies of a profile that follow from the board's clocks: an error of its clocks scales them.
     clocks: tuple[str, ...] = ()
     clock_at_limit: bool = False  # the part's clock is at its limit: none of them may be fast

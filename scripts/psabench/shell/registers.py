@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 
-from psabench.boards.board import Bits
+from psabench.boards.board import Fields
 from psabench.boards.registry import BOARDS
 from psabench.errors import expected
 from psabench.shell.lexer import Wrong
 
-# By group ("accel" and "temp": converters; a board's name: its bus) and register. One that is not here is a number.
-FIELDS: Mapping[tuple[str, str], tuple[Bits, ...]] = {
-    key: fields for board in BOARDS.values() for key, fields in board.fields.items()
-}
+# A register that is not here is a number.
+FIELDS: Fields = {key: fields for board in BOARDS.values() for key, fields in board.fields.items()}
 
 
 def group(converter: str) -> str:

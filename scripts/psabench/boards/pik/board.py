@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
-from psabench.boards.board import PARALLEL_BUS, Board, Bus
-from psabench.boards.pik.fields import FIELDS
+from psabench.boards.board import PARALLEL_BUS, Board, Bus, Fields, bits
+
+_AXES = ("X", "Y", "Z")
+
+# Fields of the registers on the bus (docs/reference/protocol_pik.md).
+FIELDS: Fields = {
+    ("pik", "STATUS"): (
+        *(bits(0x01 << i, f"SATURATED_{axis}", "no", "could not keep up") for i, axis in enumerate(_AXES)),
+        bits(0x08, "NEW", "no", "latched since the last look"),
+    ),
+}
 
 BOARD = Board(
     name="pik",
