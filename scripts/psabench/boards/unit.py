@@ -18,7 +18,7 @@ from psabench.link.canopen_host import CanopenNode
 from psabench.link.protocol_files import dbc_node
 from psabench.places import proto_file
 
-NMT_START, NMT_STOP, NMT_PREOP, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
+NMT_START, NMT_PREOP, NMT_RESET_NODE = 0x01, 0x80, 0x81
 
 # Objects that are registers, by what they are called here; sub-index = address + 1.
 BANKS: Mapping[str, int] = {

@@ -120,12 +120,6 @@ class Control:
         )
 
 
-def read_truth(path: Path) -> dict[str, Any]:
-    """Hidden parameters of the bench, from the truth port. For graders only, after the estimate is made."""
-    with Control(path) as port:
-        return port.call("truth").result
-
-
 class HasControl(Protocol):
     """A bench with a control socket."""
 

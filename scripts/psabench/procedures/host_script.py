@@ -32,7 +32,7 @@ from psabench.places import find_emulator, proto_file
 READY_S = 1.0  # after power-on: gyroscopes have run up and converters are set up
 TURN_S = 0.005  # a request and its answer, on a busy bus
 SDO_REQUEST, SDO_ANSWER = 0x600, 0x580
-DOWNLOAD, DOWNLOADED, UPLOAD, UPLOADED, ABORT = 0x20, 0x60, 0x40, 0x43, 0x80
+DOWNLOAD, UPLOAD, UPLOADED, ABORT = 0x20, 0x40, 0x43, 0x80
 SETTLED_S = 0.05  # recorded beyond the last thing that was asked for
 EMULATOR_S = 120.0  # timeout for a process that takes a twentieth of a second
 

@@ -17,14 +17,12 @@ from psabench.link.can_host import CanHost
 from psabench.link.protocol_files import message
 from psabench.link.signals import layout
 
-REGISTERS = {"x": OD.REG_X, "t": OD.REG_T, "y": OD.REG_Y, "z": OD.REG_Z}  # objects; sub-index = register + 1
 OPCODE = {"accel": 1, "temp": 2}  # sub-index of 2010h
-CONFIG0, DRATE = 0x01, 0x03
+CONFIG0 = 0x01
 
 # Output words a second at 4.096 MHz by the DR field of CONFIG0 (converter data sheet).
 DATA_HZ = {0: 250, 1: 500, 2: 1000, 3: 2000, 4: 4000}
 SETTLE_PERIODS = 64  # 62.98 data periods and 468 clocks from a step to a settled word, rounded up
-SETUP_S = 0.5  # after Res: self-calibrations of the temperature converter, then the filters settle
 
 
 class Psa2(Unit):
