@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,11 @@ from psabench.instruments import KINDS, Instrument
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message_name
 from psabench.shell import dut
-from psabench.shell.commands import EVENTS, OBJECTS, Arg, Command, Kind
+from psabench.shell.commands import EVENTS, OBJECTS, Arg, Kind
 from psabench.shell.expect import USAGE, Expectation
 from psabench.shell.grammar import describe
 from psabench.shell.lexer import Wrong
-from psabench.shell.row import Args, Context, Handler, Row, number
+from psabench.shell.row import Args, Context, Handler, Row, number, row
 
 SLICE_NS = NS // 10  # of a wait, between two looks at Ctrl-C and the status
 SHOWN = 32  # CAN frames that are listed
@@ -87,10 +87,10 @@ def _listen(session: Context, args: Args) -> Mapping[str, Any]:
 
 
 def _frame_row(m: Message, boards: Mapping[int, str]) -> dict[str, Any]:
+    can_id, name = f"{m.arbitration_id:03X}", message_name(m.arbitration_id, boards)
     if m.is_error_frame:
-        return {"t_s": m.timestamp, "id": "error", "data": bytes(m.data).hex().upper(), "name": ""}
-    name = message_name(m.arbitration_id, boards)
-    return {"t_s": m.timestamp, "id": f"{m.arbitration_id:03X}", "data": bytes(m.data).hex().upper(), "name": name}
+        can_id, name = "error", ""
+    return {"t_s": m.timestamp, "id": can_id, "data": bytes(m.data).hex().upper(), "name": name}
 
 
 def _send(session: Context, args: Args) -> Mapping[str, Any]:
@@ -183,28 +183,24 @@ _INSTRUMENT = Arg(name="instrument", kind=Kind.CHOICE, choices=tuple(KINDS), wha
 _LINE = Arg(name="line", kind=Kind.REST, what="as *IDN? or TEMP 25")
 
 
-def _row(name: str, what: str, run: Handler, *args: Arg, here: Callable[[Bench], bool] = lambda _: True) -> Row:
-    return Row(Command(name=name, what=what, args=args), run, here)
-
-
 ROWS: tuple[Row, ...] = (
-    _row("wait", "Lets time pass: simulated in step pace, else real.", _wait, _FOR),
-    _row("at", "Waits until a simulated instant; tells by how much it is over.", _at, _AT, here=_with_control),
-    _row(
+    row("wait", "Lets time pass: simulated in step pace, else real.", _wait, _FOR),
+    row("at", "Waits until a simulated instant; tells by how much it is over.", _at, _AT, here=_with_control),
+    row(
         "until",
         "Waits for an event of a unit; in step pace time stands still at it.",
         _until,
         *(_EVENT, _COUNT, _UNIT, _LIMIT),
         here=_with_control,
     ),
-    _row("time", "Tells the time and the pace.", _time),
-    _row("expect", "Checks the latest result; a script in which one fails ends with status 1.", _expect, _CHECK),
-    _row("save", "Writes what was said as a script.", _save, _FILE),
-    _row("help", "Tells of all, an object or a command.", _help, _COMMAND),
+    row("time", "Tells the time and the pace.", _time),
+    row("expect", "Checks the latest result; a script in which one fails ends with status 1.", _expect, _CHECK),
+    row("save", "Writes what was said as a script.", _save, _FILE),
+    row("help", "Tells of all, an object or a command.", _help, _COMMAND),
     *dut.ROWS,
-    _row("can.send", "Sends a frame and lists what comes within 20 ms.", _send, _FRAME, here=dut.here),
-    _row("can.listen", "Lists the frames that come.", _listen, replace(_FOR, optional=True), here=dut.here),
-    _row("scpi.send", "Sends a line; shows the answer to a query.", _scpi, _INSTRUMENT, _LINE, here=_with_scpi),
+    row("can.send", "Sends a frame and lists what comes within 20 ms.", _send, _FRAME, here=dut.here),
+    row("can.listen", "Lists the frames that come.", _listen, replace(_FOR, optional=True), here=dut.here),
+    row("scpi.send", "Sends a line; shows the answer to a query.", _scpi, _INSTRUMENT, _LINE, here=_with_scpi),
 )
 HANDLERS: Mapping[str, Handler] = {row.command.name: row.run for row in ROWS}
 UNSAID = {"save", "help"}  # what a script need not say again

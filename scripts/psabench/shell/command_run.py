@@ -7,21 +7,14 @@ import signal
 import sys
 
 from psabench.errors import BadInput, expected
+from psabench.options import of_fields
 from psabench.shell.connect import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
 
 
 def _opening(args: argparse.Namespace, pace: str | None) -> Opening:
-    return Opening(
-        scenario=args.scenario,
-        pace=args.pace or pace,
-        seed=args.seed,
-        connect=args.connect,
-        can=args.can,
-        scpi=addresses(args.scpi),
-        node=args.node,
-    )
+    return of_fields(Opening, args, pace=args.pace or pace, scpi=addresses(args.scpi))
 
 
 def run_shell(args: argparse.Namespace) -> int:

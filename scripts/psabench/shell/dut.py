@@ -15,10 +15,11 @@ from psabench.boards.psa2.frames import Form, Frames
 from psabench.boards.readings import Readings
 from psabench.boards.unit import BANKS, Unit
 from psabench.errors import CycleRefused, expected
+from psabench.link.signals import Floats
 from psabench.shell import registers
 from psabench.shell.commands import Arg, Command, Kind
 from psabench.shell.lexer import Wrong
-from psabench.shell.row import Args, Context, Handler, Row, number
+from psabench.shell.row import Args, Context, Handler, Row, number, row
 
 CONVERTERS = tuple(BANKS)
 A_WORD = "a word, as A55Ah"
@@ -142,41 +143,24 @@ def _stream(session: Context, args: Args) -> Mapping[str, Any]:
 
 def _of_readings(taken: Readings, lost: int) -> Mapping[str, Any]:
     """Mean and spread of each column."""
-    rows = [
-        {
-            "signal": name,
-            "unit": taken.units[name],
-            "mean": float(column.mean()),
-            "std": float(column.std()),
-            "min": float(column.min()),
-            "max": float(column.max()),
-        }
-        for name, column in taken.columns.items()
-    ]
+    rows = [{"signal": name, "unit": taken.units[name], **_spread(c)} for name, c in taken.columns.items()]
     return {"frames": len(taken), "lost": lost, "signals": rows}
 
 
 def _of_frames(frames: Frames, lost: int) -> Mapping[str, Any]:
-    rows = []
-    for axis in "xyz":
-        u_v = frames.axis(axis)
-        rows.append(
-            {
-                "axis": axis,
-                "mean_v": float(u_v.mean()),
-                "std_v": float(u_v.std()),
-                "min_v": u_v.min(),
-                "max_v": u_v.max(),
-            }
-        )
-    rows = [{k: v if isinstance(v, str) else float(v) for k, v in row.items()} for row in rows]
     return {
         "frames": len(frames),
         "settled": bool(np.all(frames.settled)),
         "clipped": bool(np.any(frames.clipped)),
         "lost": lost,
-        "axes": rows,
+        "axes": [{"axis": axis, **_spread(frames.axis(axis), "_v")} for axis in "xyz"],
     }
+
+
+def _spread(x: Floats, unit: str = "") -> dict[str, float]:
+    """unit: the end of the names."""
+    figures = {"mean": x.mean(), "std": x.std(), "min": x.min(), "max": x.max()}
+    return {name + unit: float(value) for name, value in figures.items()}
 
 
 def _form(session: Context, args: Args) -> Mapping[str, Any]:
@@ -224,7 +208,7 @@ _ANY = Arg(name="value", what="number (86, 56h, 0x56) or text")
 
 
 def _row(name: str, what: str, run: Handler, *args: Arg) -> Row:
-    return Row(Command(name=f"dut.{name}", what=what, args=args), run, here)
+    return row(f"dut.{name}", what, run, *args, here=here)
 
 
 ROWS: tuple[Row, ...] = (

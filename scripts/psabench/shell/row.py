@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from psabench.bench import Bench
 from psabench.boards.unit import Unit
-from psabench.shell.commands import Command, Vocabulary
+from psabench.shell.commands import Arg, Command, Vocabulary
 from psabench.shell.grammar import Value
 from psabench.shell.transcript import Transcript
 
@@ -37,17 +37,18 @@ class Context(Protocol):
 Handler = Callable[[Context, Args], Mapping[str, Any]]
 
 
-def _always(_: Bench) -> bool:
-    return True
-
-
 @dataclass(frozen=True, slots=True)
 class Row:
     """A command, what carries it out, and whether a bench has it."""
 
     command: Command
     run: Handler
-    here: Callable[[Bench], bool] = _always
+    here: Callable[[Bench], bool]
+
+
+def row(name: str, what: str, run: Handler, *args: Arg, here: Callable[[Bench], bool] = lambda _: True) -> Row:
+    """A row of a command with these arguments; here: always, unless given."""
+    return Row(Command(name=name, what=what, args=args), run, here)
 
 
 def number(args: Args, name: str, default: float = 0.0) -> float:

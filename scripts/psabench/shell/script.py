@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from psabench.errors import BadInput, BenchError, expected
-from psabench.shell import render
 from psabench.shell.connect import Opening
 from psabench.shell.expect import Expectation
 from psabench.shell.grammar import parse
@@ -40,9 +39,7 @@ class Voice:
             self.say(
                 json.dumps({"line": text, "ok": not o.failed, **t_s, "result": o.result}, allow_nan=False, default=str)
             )
-        elif o.failed:
-            self.say(f"FAILED: {o.failed}")
-        elif shown := render.text(o.result):
+        elif shown := o.text:
             self.say(shown)
 
     def error(self, text: str, e: BenchError) -> None:
@@ -72,6 +69,11 @@ def run_file(path: Path, opening: Opening, voice: Voice) -> int:
 def run_lines(session: Session, lines: Sequence[str], voice: Voice, path: Path | None = None) -> int:
     """Check all lines, then carry them out; the exit status, or the BenchError that ended it."""
     _check(session, lines, path)
+    return run_stream(session, lines, voice, path)
+
+
+def run_stream(session: Session, lines: Iterable[str], voice: Voice, path: Path | None = None) -> int:
+    """Lines from a pipe, each carried out when it comes."""
     failures = 0
     for number, line in enumerate(lines):
         text = line.strip()
@@ -85,21 +87,6 @@ def run_lines(session: Session, lines: Sequence[str], voice: Voice, path: Path |
             raise _at(path, number, e) from e
         if outcome is not None:
             voice.outcome(text, outcome)
-            failures += bool(outcome.failed)
-    return FAILED if failures else 0
-
-
-def run_stream(session: Session, lines: Iterable[str], voice: Voice) -> int:
-    """Lines from a pipe, each carried out when it comes."""
-    failures = 0
-    for number, line in enumerate(lines):
-        try:
-            outcome = session.do(line)
-        except BenchError as e:
-            voice.error(line.strip(), e)
-            raise _at(None, number, e) from e
-        if outcome is not None:
-            voice.outcome(line.strip(), outcome)
             failures += bool(outcome.failed)
     return FAILED if failures else 0
 

@@ -12,7 +12,7 @@ from psabench.bench import Bench
 from psabench.boards.unit import Unit
 from psabench.errors import BenchError, ControlError, CycleRefused, DeviceError
 from psabench.instruments import KINDS
-from psabench.shell import builtins, dut
+from psabench.shell import builtins, dut, render
 from psabench.shell.commands import EVENTS, Command, Vocabulary, from_help, with_events, with_kinds
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
@@ -36,6 +36,11 @@ class Outcome:
     result: Mapping[str, Any]
     t_ns: int | None  # simulated time afterwards; None: no one tells it
     failed: str = ""
+
+    @property
+    def text(self) -> str:
+        """As people see it; "": there is nothing to say."""
+        return f"FAILED: {self.failed}" if self.failed else render.text(self.result)
 
 
 @dataclass(slots=True)

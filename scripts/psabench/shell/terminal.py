@@ -22,7 +22,6 @@ from prompt_toolkit.output import Output
 from prompt_toolkit.shortcuts import CompleteStyle
 
 from psabench.errors import BenchError, expected
-from psabench.shell import render
 from psabench.shell.complete import argument, candidates
 from psabench.shell.grammar import describe
 from psabench.shell.lexer import Wrong
@@ -138,9 +137,7 @@ class Terminal:
         self._clear_tick()
         if outcome is None:
             return
-        if outcome.failed:
-            self._print(f"FAILED: {outcome.failed}")
-        elif text := render.text(outcome.result):
+        if text := outcome.text:
             self._print(text)
         if outcome.call.command.name == "help" and not outcome.call.args:
             self._print(KEYBOARD_HELP)
@@ -158,13 +155,8 @@ class Terminal:
         elif words[0] == "scpi" and "scpi.send" in self.session.vocabulary.commands:
             self._enter_scpi(words[1:])
         else:
-            absent = self.session.vocabulary.absent
-            why = (
-                f"{words[0]}: not available: {absent[words[0]]}"
-                if words[0] in absent
-                else f"{words[0]} takes no argument"
-            )
-            raise Wrong(why)
+            why = self.session.vocabulary.absent.get(words[0])
+            raise Wrong(f"{words[0]}: not available: {why}" if why is not None else f"{words[0]} takes no argument")
         return True
 
     def _enter_scpi(self, words: list[str]) -> None:
