@@ -11,7 +11,7 @@ import logging
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
@@ -91,12 +91,7 @@ def workers(
     if address is not None:
         return _cluster_at(address, chain)
     count = cores() if count is None else count
-    return _here() if count == 1 else _local_cluster(count)
-
-
-@contextmanager
-def _here() -> Iterator[Workers]:
-    yield ThisProcess()
+    return nullcontext(ThisProcess()) if count == 1 else _local_cluster(count)
 
 
 @contextmanager
