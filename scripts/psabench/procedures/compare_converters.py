@@ -79,13 +79,19 @@ GENERATIONS: Mapping[str, Generation] = {
 class Track:
     """What a unit told of the motion: integral of each input over time, from its first reading on."""
 
-    name: str
-    title: str
-    ma_v_per_g: float
+    name: str  # of GENERATIONS
     quantum_vs: float  # smallest step of the integral
     t_s: Floats  # (n,) of the readings, s of the bench; the first is where the integral is 0
     s_vs: Floats  # (n, 3) V s of X, Y, Z
     note: str = ""
+
+    @property
+    def title(self) -> str:
+        return GENERATIONS[self.name].title
+
+    @property
+    def ma_v_per_g(self) -> float:
+        return GENERATIONS[self.name].ma_v_per_g
 
     def velocity_mps(self, g_mps2: float) -> Floats:
         """Shape (n, 3)."""
@@ -114,13 +120,11 @@ def _bench_time_s(r: Readings) -> Floats:
     return np.asarray(r.t_rx_s[0] + (stamps - stamps[0]))
 
 
-def _pik(unit: Unit, r: Readings, gen: Generation, name: str) -> Track:
+def _pik(unit: Unit, r: Readings, name: str) -> Track:
     k_hz_per_v = float(unit.node.read(PLATE, 2)) * 1e-3
     totals = [r["PIK_TOTALS.X"], r["PIK_TOTALS.Y"], r["PIK_TOTAL_Z.Z"]]
     return Track(
         name=name,
-        title=gen.title,
-        ma_v_per_g=gen.ma_v_per_g,
         quantum_vs=pik.pulse_vs(k_hz_per_v),
         t_s=_bench_time_s(r),
         s_vs=np.stack([pik.integral_vs(t, k_hz_per_v) for t in totals], axis=1),
@@ -128,14 +132,12 @@ def _pik(unit: Unit, r: Readings, gen: Generation, name: str) -> Track:
     )
 
 
-def _means(name: str, gen: Generation, lsb_v: float, t_s: Floats, u_v: Floats, note: str) -> Track:
+def _means(name: str, lsb_v: float, t_s: Floats, u_v: Floats, note: str) -> Track:
     """Of a converter that gives means over the time since the reading before."""
     dt_s = np.diff(t_s)
     s_vs = np.concatenate([np.zeros((1, 3)), np.cumsum(u_v[1:] * dt_s[:, None], axis=0)])
     return Track(
         name=name,
-        title=gen.title,
-        ma_v_per_g=gen.ma_v_per_g,
         quantum_vs=lsb_v * float(np.median(dt_s)),
         t_s=t_s,
         s_vs=s_vs,
@@ -143,19 +145,19 @@ def _means(name: str, gen: Generation, lsb_v: float, t_s: Floats, u_v: Floats, n
     )
 
 
-def _psd1(r: Readings, gen: Generation, name: str) -> Track:
+def _psd1(r: Readings, name: str) -> Track:
     lsb_v = FULL_SCALE_V / OFFSET_BINARY
-    return _means(name, gen, lsb_v, _bench_time_s(r), volts(r), "16-bit words of ±10 V, each the mean of a cycle")
+    return _means(name, lsb_v, _bench_time_s(r), volts(r), "16-bit words of ±10 V, each the mean of a cycle")
 
 
-def _psa2(unit: Psa2, gen: Generation, name: str) -> Track:
+def _psa2(unit: Psa2, name: str) -> Track:
     """Of frames on a whole number of periods: the converter's crystal is taken at its word."""
     frames = unit.frames.take()
     t_s = frames.t_rx_s[0] + np.arange(len(frames)) / unit.data_hz
-    return _means(name, gen, PSA2_LSB_V, t_s, frames.u_v, "24-bit codes at the load, a mean of the filter each")
+    return _means(name, PSA2_LSB_V, t_s, frames.u_v, "24-bit codes at the load, a mean of the filter each")
 
 
-def _pmka(unit: Pmka, r: Readings, gen: Generation, name: str) -> Track:
+def _pmka(unit: Pmka, r: Readings, name: str) -> Track:
     """Raises LinkError where a reading is missing or an integrator was at its limit, or has not been calibrated."""
     rom = pmka.rom_of(unit.rom_words())
     try:
@@ -166,8 +168,6 @@ def _pmka(unit: Pmka, r: Readings, gen: Generation, name: str) -> Track:
     nr = float(np.mean([c.nr.mean() for c in calibrations]))
     return Track(
         name=name,
-        title=gen.title,
-        ma_v_per_g=gen.ma_v_per_g,
         quantum_vs=pmka.quantum_vs(nr, rom.ts_s),
         t_s=r.t_rx_s[0] + np.arange(len(periods)) * rom.ts_s,
         s_vs=pmka.integrals_vs(periods, rom, calibrations),
@@ -176,17 +176,16 @@ def _pmka(unit: Pmka, r: Readings, gen: Generation, name: str) -> Track:
 
 
 def _track(unit: Unit, name: str) -> Track:
-    gen = GENERATIONS[name]
     lost = unit.frames.counters.lost + unit.frames.counters.torn
     if lost:
         raise LinkError(f"{name}: {lost} readings lost between the unit and this program")
     if isinstance(unit, Psa2):
-        return _psa2(unit, gen, name)
+        return _psa2(unit, name)
     readings = unit.frames.take()
     assert isinstance(readings, Readings)
     if isinstance(unit, Pmka):
-        return _pmka(unit, readings, gen, name)
-    return _pik(unit, readings, gen, name) if isinstance(unit, Pik) else _psd1(readings, gen, name)
+        return _pmka(unit, readings, name)
+    return _pik(unit, readings, name) if isinstance(unit, Pik) else _psd1(readings, name)
 
 
 # ---- the run

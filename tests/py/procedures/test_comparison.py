@@ -39,8 +39,6 @@ def track(
     s_vs = scale * (v - v[0]) * ma / G_MPS2 + zero_v * (t_s - t_s[0])[:, None]
     return Track(
         name=name,
-        title=GENERATIONS[name].title,
-        ma_v_per_g=ma,
         quantum_vs=quantum_vs,
         t_s=t_s,
         s_vs=np.round(s_vs / quantum_vs) * quantum_vs,
