@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import ClassVar
 
@@ -87,29 +88,25 @@ class Unit:
 
         Raises CycleRefused with the board's own words (object 2031h).
         """
-        self._strobe(strobe_ns)
-        try:
-            data = self.node.read_raw(self._bank("bus"), address + 1)
-        except DeviceError as e:
-            raise self._in_words(e) from e
-        return int.from_bytes(data, "little")
+        with self._cycle(strobe_ns):
+            return int.from_bytes(self.node.read_raw(self._bank("bus"), address + 1), "little")
 
     def bus_write(self, address: int, value: int, strobe_ns: int | None = None) -> None:
         """A write cycle. Raises CycleRefused."""
-        self._strobe(strobe_ns)
-        if not 0 <= value <= 0xFFFF:
-            raise ValueError(expected("a 16-bit word", value, "value"))
-        try:
+        with self._cycle(strobe_ns):
+            if not 0 <= value <= 0xFFFF:
+                raise ValueError(expected("a 16-bit word", value, "value"))
             self.node.write_raw(self._bank("bus"), address + 1, value.to_bytes(2, "little"))
-        except DeviceError as e:
-            raise self._in_words(e) from e
 
-    def _strobe(self, strobe_ns: int | None) -> None:
+    @contextmanager
+    def _cycle(self, strobe_ns: int | None) -> Iterator[None]:
+        """A cycle with this strobe; what the board rejects is raised in its own words."""
         if strobe_ns is not None:
             self.node.write(STROBE_NS, 0, strobe_ns)
-
-    def _in_words(self, e: DeviceError) -> CycleRefused:
-        return CycleRefused(e.what, e.abort_code, self.refusal() or e.text)
+        try:
+            yield
+        except DeviceError as e:
+            raise CycleRefused(e.what, e.abort_code, self.refusal() or e.text) from e
 
     def refusal(self) -> str:
         """Object 2031h: why a bus cycle or a setting was rejected last, in words; "": nothing was."""
