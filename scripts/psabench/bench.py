@@ -18,10 +18,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TypeVar
 
 from can.interfaces.slcan import slcanBus
@@ -63,7 +62,7 @@ class Status:
     lost: int  # samples missing between the frames received
 
 
-class Bench:
+class Bench(AbstractContextManager["Bench"]):
     """A bench, made with `start`, `connect`, `restore` or `fork`; leaving its context closes everything."""
 
     def __init__(
@@ -90,9 +89,7 @@ class Bench:
             self._stack = stack.pop_all()
         try:
             self.pace = "real" if self._control is None else str(self._control.call("time").result["pace"])
-            self._clock = self._make_clock()
-            for host in self.hosts.values():
-                host.clock = self._clock
+            self._clock = self._set_clock()
             self.units: dict[str, Unit] = self._find_units(node)
             self.faults = Faults(self)
             self.probe = Probe(self)
@@ -119,17 +116,17 @@ class Bench:
         extra: further arguments of psa-emu. Raises BadInput or BenchError with the emulator's own words.
         """
         emulator = Emulator(scenario, cans=[can], pace=pace, seed=seed, truth=True, scpi=True, extra=extra)
-        return cls._of(emulator, node)
+        return cls._of(emulator.__enter__(), node)
 
     @classmethod
     def restore(cls, path: str | Path, *, pace: str = "step", can: str = "socketcand:0") -> Bench:
         """Start an emulator from a snapshot. Raises BadInput for a file that is damaged or of another version."""
         emulator = Emulator(cans=[can], pace=pace, truth=True, scpi=True, extra=["--restore", path])
-        return cls._of(emulator, None)
+        return cls._of(emulator.__enter__())
 
     @classmethod
-    def _of(cls, emulator: Emulator, node: int | None) -> Bench:
-        emulator.__enter__()
+    def _of(cls, emulator: Emulator | Forked, node: int | None = None) -> Bench:
+        """Of an emulator that runs: it is ended with the bench, or when there is none to be had."""
         try:
             cans = emulator_buses(emulator.endpoints, emulator.control_path)
         except BaseException:
@@ -181,14 +178,7 @@ class Bench:
 
     def fork(self, *, can: str = "socketcand:0") -> Bench:
         """A second bench that goes on from this very instant: the emulator forks, the copy gets doors of its own."""
-        emulator = Forked(self.control, can=can)
-        return Bench(
-            cans=emulator_buses(emulator.endpoints, emulator.control_path),
-            control=emulator.control_path,
-            truth=emulator.truth_path,
-            scpi=scpi_addresses(emulator.endpoints),
-            emulator=emulator,
-        )
+        return Bench._of(Forked(self.control, can=can))
 
     def close(self) -> None:
         """Close all connections and end the emulator if it is ours."""
@@ -198,10 +188,7 @@ class Bench:
         self._open.clear()
         self._stack.close()
 
-    def __enter__(self) -> Bench:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # ---- what there is
@@ -272,11 +259,15 @@ class Bench:
             return f"psa-emu was started without --scpi {name}, and no address was given"
         return f"no address was given for it, as in scpi={{{name!r}: 'TCPIP::192.0.2.7::5025::SOCKET'}}"
 
-    def _make_clock(self) -> WallClock | StepClock:
+    def _set_clock(self) -> WallClock | StepClock:
+        """The clock of the bench, which its hosts go by."""
         hosts = list(self.hosts.values())
+        clock: WallClock | StepClock = WallClock(hosts if len(hosts) > 1 else ())
         if self._control is not None and self.pace == "step":
-            return StepClock(self._control, hosts)
-        return WallClock(hosts if len(hosts) > 1 else ())
+            clock = StepClock(self._control, hosts)
+        for host in hosts:
+            host.clock = clock
+        return clock
 
     def _find_units(self, node: int | None) -> dict[str, Unit]:
         """By name, as the emulator tells them, if their bus is connected; a real bench has one, "a", which says itself
@@ -347,9 +338,7 @@ class Bench:
             left_ns -= AWAY_SLICE_NS
         for name, host in self.hosts.items():
             host.reopen(open_bus(self._specs[name]))
-        self._clock = self._make_clock()
-        for host in self.hosts.values():
-            host.clock = self._clock
+        self._clock = self._set_clock()
 
     def catch_up(self) -> None:
         """After a command of the control socket that moves time itself, as bus.read: receive what has come."""

@@ -25,9 +25,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike, fspath
-from types import TracebackType
 from typing import Any
 
 from psabench.errors import BadInput, BenchError, TimeOut, expected
@@ -86,7 +86,7 @@ class Frame:
     status: int
 
 
-class Bench:
+class Bench(AbstractContextManager["Bench"]):
     """Simulated time and the parts on it. Every noise source draws from a stream of its own, made from the seed."""
 
     def __init__(self, seed: int = 1) -> None:
@@ -99,10 +99,7 @@ class Bench:
         if self._handle is None:
             raise BenchError("bench: out of memory")
 
-    def __enter__(self) -> Bench:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __del__(self) -> None:

@@ -10,7 +10,6 @@ docs/faults.md has every kind with its arguments, and which points support it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 from psabench.link.control import HasControl
@@ -36,7 +35,7 @@ class Fault:
     def __enter__(self) -> Fault:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         if self.state():
             self.clear()
 

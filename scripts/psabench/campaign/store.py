@@ -12,11 +12,11 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -92,7 +92,7 @@ def _other(o: Origin) -> tuple[Any, ...]:
     return o.kind, canonical(o.input), o.seed, canonical(o.columns), o.key
 
 
-class Store:
+class Store(AbstractContextManager["Store"]):
     """An open file of results: `with Store(path) as store: ...`; made when there is none.
 
     Raises BadInput for a file that is not a store, a newer one or a damaged one, and where it cannot be written.
@@ -111,10 +111,7 @@ class Store:
             self._db.close()
             raise
 
-    def __enter__(self) -> Store:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -225,8 +222,16 @@ class Store:
 
     # ---- SQLite
 
-    def _transaction(self) -> _Transaction:
-        return _Transaction(self)
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """All of a block, or nothing; takes the right to write at once, so that it cannot be rejected later."""
+        self._do("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._do("ROLLBACK")
+            raise
+        self._do("COMMIT")
 
     def _one(self, sql: str) -> Any:
         return self._do(sql).fetchone()[0]
@@ -238,16 +243,3 @@ class Store:
             raise BadInput(f"{self.path}: {e}") from e
         except sqlite3.DatabaseError as e:
             raise BadInput(expected("a store of results", f"a damaged or other file ({e})", self.path)) from e
-
-
-class _Transaction:
-    """All between enter and exit, or nothing; takes the right to write at once, so that it cannot be rejected later."""
-
-    def __init__(self, store: Store) -> None:
-        self._do = store._do
-
-    def __enter__(self) -> None:
-        self._do("BEGIN IMMEDIATE")
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
-        self._do("COMMIT" if kind is None else "ROLLBACK")

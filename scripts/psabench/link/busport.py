@@ -17,9 +17,9 @@ import select
 import time
 import tty
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 from psabench.errors import CycleRefused, LinkError, expected
 
@@ -67,7 +67,7 @@ class Who:
     t_s: float
 
 
-class BusPort:
+class BusPort(AbstractContextManager["BusPort"]):
     """One end of a bus port. Leaving its context closes it.
 
     advance: lets the bench's time pass, seconds, where it stands still unless told (step pace); None: it passes by
@@ -86,10 +86,7 @@ class BusPort:
         if os.isatty(self._fd):
             tty.setraw(self._fd)
 
-    def __enter__(self) -> BusPort:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -11,8 +11,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from types import TracebackType
+from contextlib import AbstractContextManager, suppress
 from typing import Any, Protocol
 
 import can
@@ -110,7 +109,7 @@ def _receive_all(host: CanHost, sent: int) -> None:
         pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
 
 
-class CanHost:
+class CanHost(AbstractContextManager["CanHost"]):
     """A python-can bus with a clock. `sent` and `received` count frames; listeners get each received one, in order.
 
     shared: frames of other programs may come that have not passed through the emulator (an interface of the kernel).
@@ -123,10 +122,7 @@ class CanHost:
         self.received = self.sent = 0
         self.listeners: list[Listener] = []
 
-    def __enter__(self) -> CanHost:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

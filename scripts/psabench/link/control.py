@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import socket
 from collections import deque
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol
 
 from psabench.errors import ControlError, LinkError, expected
@@ -26,7 +26,7 @@ class Reply:
     result: dict[str, Any]
 
 
-class Control:
+class Control(AbstractContextManager["Control"]):
     """`with Control(path) as ctl: ctl.call("run", for_s=0.1)`.
 
     Raises LinkError when the emulator is not there or goes away, ControlError when it rejects a command. A call that
@@ -46,10 +46,7 @@ class Control:
         self._bytes = bytearray()  # of a line that is not all there yet
         self._id = 0
 
-    def __enter__(self) -> Control:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import IO
 
 from psabench.errors import expected
@@ -16,7 +16,7 @@ from psabench.procedures.head_bench import Reading
 COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
 
 
-class CsvRecorder:
+class CsvRecorder(AbstractContextManager["CsvRecorder"]):
     """`Watch(record=recorder)`. Rows survive Ctrl-C, an exception and the death of the process."""
 
     def __init__(self, path: Path) -> None:
@@ -43,10 +43,7 @@ class CsvRecorder:
         self._file.flush()
         self.rows += 1
 
-    def __enter__(self) -> CsvRecorder:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, err: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
