@@ -57,10 +57,14 @@ class Readings:
 
     def head(self, count: int) -> Readings:
         """The first `count` of them."""
+        return self.part(slice(count))
+
+    def part(self, span: slice) -> Readings:
+        """Those from one on and up to another."""
         return Readings(
-            t_rx_s=self.t_rx_s[:count],
-            t_sample_s=self.t_sample_s[:count],
-            columns={k: v[:count] for k, v in self.columns.items()},
+            t_rx_s=self.t_rx_s[span],
+            t_sample_s=self.t_sample_s[span],
+            columns={k: v[span] for k, v in self.columns.items()},
             units=self.units,
         )
 

@@ -211,9 +211,7 @@ class _Readings(_Stream):
 
     def take(self) -> Readings:
         r = self._all(self._units.bench.now_s)
-        span = self._new(r.t_rx_s)
-        columns = {name: c[span] for name, c in r.columns.items()}
-        return Readings(t_rx_s=r.t_rx_s[span], t_sample_s=r.t_sample_s[span], columns=columns, units=r.units)
+        return r.part(self._new(r.t_rx_s))
 
     def _all(self, until_s: float) -> Readings:
         log = self._units.bench.recording(until_s)
@@ -275,7 +273,7 @@ class _Gyro(Gyro):
         self.node.nmt(NMT_PREOP)
 
     @property
-    def flags(self) -> Flag:
+    def flags(self) -> Flag:  # type: ignore[override]
         """Of the latest reading."""
         r = self._units.readings(self._units.time_s)
         raised = [f for f in Flag if len(r) and r[str(f.name)][-1]]

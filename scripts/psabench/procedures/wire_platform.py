@@ -248,10 +248,7 @@ class WirePlatform:
             m1_per_s=self._m1_per_s,
             latitude_rad=self._latitude_rad,
             lost=lost,
-            saturated=bool(r["SATURATED"].any()),
-            level_lost=bool(r["LEVEL_LOST"].any()),
-            encoder_fault=bool(r["ENCODER_FAULT"].any()),
-            not_settled=bool(r["NOT_SETTLED"].any()),
+            **{str(f.name).lower(): bool(r[str(f.name)].any()) for f in Flag},
         )
 
 

@@ -11,14 +11,17 @@ Angles and rates are as in the protocol: degrees, degrees an hour.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from typing import Any, Generic, TypeVar
 
 from psabench.boards.objects import GyroObjects as OD
 from psabench.boards.readings import ReadingLayout
 from psabench.boards.unit import BusUnit
 from psabench.errors import BadInput, DeviceError, expected
+
+Value = TypeVar("Value")
 
 
 class Mode(IntEnum):
@@ -68,12 +71,10 @@ class Began:
     step: int  # in which it did last, as `Gyro.steps`
 
 
-MODE, PHASE, POSITION, FLAGS = (OD.CONTROL, 1), (OD.CONTROL, 2), (OD.CONTROL, 3), (OD.CONTROL, 4)
+MODE = (OD.CONTROL, 1)
 POSITIONS, POSITIONS_MAX = OD.POSITIONS, 32
 BEGAN, SELF_TEST, SELF_TEST_RESULT = OD.PAST, (OD.SELF_TEST, 1), (OD.SELF_TEST, 2)
-STEP_NS, STEPS = (OD.CLOCK, 1), (OD.CLOCK, 2)
-LATEST_ENCODER, ENCODER_DEG = (OD.LATEST, 3), 180.0 / 2**31
-LATEST_BETA, LEVEL_DEG = (OD.LATEST, 6), 2e-6
+ENCODER_DEG, LEVEL_DEG = 180.0 / 2**31, 2e-6
 
 # Settings by the names that this package gives them: object and sub-index.
 SETTINGS: Mapping[str, tuple[int, int]] = {
@@ -101,8 +102,17 @@ SETTINGS: Mapping[str, tuple[int, int]] = {
     "scale_x_v_per_g": (OD.LEVEL, 4),
     "scale_y_v_per_g": (OD.LEVEL, 5),
 }
-LEVEL_NODE, HEADING = (OD.LEVEL, 1), (OD.HEADING, 2)
 ABORT_RANGE = {0x06090030, 0x06090031, 0x06090032}  # CiA 301, 7.2.4.3.17: value range, too high, too low
+
+
+class _Latest(Generic[Value]):
+    """An attribute that asks the unit each time: an object, and what its value is here."""
+
+    def __init__(self, index: int, sub: int, value: Callable[[Any], Value]) -> None:
+        self._where, self._value = (index, sub), value
+
+    def __get__(self, gyro: Gyro, _: type[Gyro] | None = None) -> Value:
+        return self._value(gyro.node.read(*self._where))
 
 
 class Gyro(BusUnit):
@@ -111,6 +121,16 @@ class Gyro(BusUnit):
     board = "gyro"
     title = "GYRO"
     layout = ReadingLayout(board="gyro", messages=("GYRO_RATES", "GYRO_ANGLES", "GYRO_LEVEL"), counter="STEP")
+
+    phase = _Latest(OD.CONTROL, 2, Phase)
+    position = _Latest(OD.CONTROL, 3, int)  # of the run, from 1; 0: none
+    flags = _Latest(OD.CONTROL, 4, Flag)
+    encoder_deg = _Latest(OD.LATEST, 3, lambda code: int(code) * ENCODER_DEG)  # of the outer gimbal
+    beta_deg = _Latest(OD.LATEST, 6, lambda code: int(code) * LEVEL_DEG)  # level angle about the axis of suspension
+    heading_deg = _Latest(OD.HEADING, 2, float)  # as the unit itself has it in mode 6, of a level vehicle, 0 to 360
+    step_s = _Latest(OD.CLOCK, 1, lambda ns: int(ns) * 1e-9)  # period of the controller's steps, and of the readings
+    steps = _Latest(OD.CLOCK, 2, int)  # of the controller since its last reset
+    level_node = _Latest(OD.LEVEL, 1, int)  # CANopen node of the unit that reads the level sensors; 0: none is fitted
 
     def get(self, name: str) -> float:
         """A setting by its name here."""
@@ -151,19 +171,6 @@ class Gyro(BusUnit):
     def mode(self, mode: Mode) -> None:
         self._write(f"mode {mode.name.lower()}", *MODE, int(mode))
 
-    @property
-    def phase(self) -> Phase:
-        return Phase(int(self.node.read(*PHASE)))
-
-    @property
-    def position(self) -> int:
-        """Of the run, from 1; 0: none."""
-        return int(self.node.read(*POSITION))
-
-    @property
-    def flags(self) -> Flag:
-        return Flag(int(self.node.read(*FLAGS)))
-
     def began(self) -> dict[Flag, Began]:
         """What came since the mode began, gone or not."""
         return {
@@ -181,33 +188,3 @@ class Gyro(BusUnit):
         if int(self.node.read(*SELF_TEST)):
             return None
         return SelfTest(int(self.node.read(*SELF_TEST_RESULT)))
-
-    @property
-    def encoder_deg(self) -> float:
-        """Angle of the outer gimbal as the unit has it now."""
-        return int(self.node.read(*LATEST_ENCODER)) * ENCODER_DEG
-
-    @property
-    def beta_deg(self) -> float:
-        """Level angle about the axis of suspension as the unit has it now."""
-        return int(self.node.read(*LATEST_BETA)) * LEVEL_DEG
-
-    @property
-    def heading_deg(self) -> float:
-        """As the unit itself has it in mode 6, of a level vehicle, 0 to 360."""
-        return float(self.node.read(*HEADING))
-
-    @property
-    def step_s(self) -> float:
-        """Period of the controller's steps, and of the readings."""
-        return int(self.node.read(*STEP_NS)) * 1e-9
-
-    @property
-    def steps(self) -> int:
-        """Steps of the controller since its last reset."""
-        return int(self.node.read(*STEPS))
-
-    @property
-    def level_node(self) -> int:
-        """CANopen node of the unit that reads the level sensors; 0: none is fitted."""
-        return int(self.node.read(*LEVEL_NODE))
