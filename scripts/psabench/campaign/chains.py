@@ -28,7 +28,6 @@ from psabench.native.navlib import library
 ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quality")
 DOUBTS = "doubts"  # how many the host's procedure has of a run; the algebra has none to tell
 HELD = ("end_error_deg", "largest_error_deg")
-KMPH_MPS = 1.0 / 3.6
 KS_P = 0.01  # of two chains that agree, one comparison of a hundred lies below
 
 
@@ -123,50 +122,55 @@ def _seed(w: Wanted) -> int:
 # ---- the algebra of libpsabench-nav
 
 
+# Unit at the end of a field's name, the library's in its place, and what one of the first is in the second.
+_UNITS = (
+    ("_degph_rts", "_radps_rts", nav.DEGPH),
+    ("_degph", "_radps", nav.DEGPH),
+    ("_dps", "_radps", math.radians(1.0)),
+    ("_deg", "_rad", math.radians(1.0)),
+    ("_arcmin", "_rad", nav.ARCMIN),
+    ("_kmph", "_mps", 1.0 / 3.6),
+)
+
+
+def _in_si(value: Setup | Hold) -> dict[str, Any]:
+    """The numbers of a set-up in the library's units, under names that end in them; the rest as it is."""
+    found: dict[str, Any] = {}
+    for f in dataclasses.fields(value):
+        name, x = f.name, getattr(value, f.name)
+        for unit, si, factor in _UNITS:
+            if name.endswith(unit) and isinstance(x, int | float):
+                name, x = name.removesuffix(unit) + si, x * factor
+                break
+        found[name] = x
+    return found
+
+
+def _fields_of(kind: type[Any], found: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that a dataclass has."""
+    return {name: value for name, value in found.items() if name in kind.__dataclass_fields__}
+
+
 def config(setup: Setup) -> nav_mc.McConfig:
     """The library's own configuration; what the estimator believes of the noise is what it is."""
-    arcmin, degph, deg = nav.ARCMIN, nav.DEGPH, math.radians
+    si = _in_si(setup)
     droop_rad = _droop_rad(setup)
-    angle_sys_arcmin = 0.0 if droop_rad and setup.angle_sys == "none" else setup.angle_sys_arcmin
-    return nav_mc.McConfig(
-        latitude_rad=deg(setup.latitude_deg),
-        latitude_error_rad=setup.latitude_error_arcmin * arcmin,
-        tilt_rad=deg(setup.tilt_deg),
-        tilt=nav_mc.Tilt[setup.tilt.upper()],
-        cardan=nav_mc.Cardan[setup.gimbal.upper()],
-        alpha1_rad=math.nan if setup.alpha1_deg is None else deg(setup.alpha1_deg),
-        drift1_radps=setup.drift_degph * degph,
-        gm_sigma_radps=setup.gm_sigma_degph * degph,
-        gm_tau_s=setup.gm_tau_s,
-        gm_from_zero=setup.gm_from_zero,
-        gm_before_s=setup.gm_before_s,
-        torquer_scale=setup.torquer_scale,
-        m1_per_s=setup.m1_per_s,
-        beta_sys_rad=setup.beta_sys_arcmin * arcmin,
-        gamma_sys_rad=setup.gamma_sys_arcmin * arcmin,
-        beta_random_rad=setup.beta_random_arcmin * arcmin,
-        gamma_random_rad=setup.gamma_random_arcmin * arcmin,
-        angle_sys_rad=angle_sys_arcmin * arcmin + droop_rad,
-        angle_random_rad=setup.angle_random_arcmin * arcmin,
-        angle_sys=nav_mc.AngleSys["COMMON" if droop_rad else setup.angle_sys.upper()],
-        random_sign=setup.random_sign,
-        per_sample=setup.per_sample,
-        white_radps_rts=setup.white_degph_rts * degph,
-        angles_rad=tuple(deg(a) for a in setup.angles_deg),
-        window_s=setup.window_s,
-        gap_s=setup.gap_s,
-        slew_radps=deg(setup.slew_dps),
-        settle_s=setup.settle_s + (setup.slew_dps / setup.slew_dps2 if setup.slew_dps2 else 0.0),
-        method=nav.Method[setup.method.upper()],
-        simplified=setup.simplified,
-        noise=nav.Noise(
-            gm_sigma_radps=setup.gm_sigma_degph * degph,
-            gm_tau_s=setup.gm_tau_s,
-            white_radps_rts=setup.white_degph_rts * degph,
-            angle_sd_rad=setup.angle_random_arcmin * arcmin,
-            level_sd_rad=setup.gamma_random_arcmin * arcmin,
+    angle_sys_rad = 0.0 if droop_rad and setup.angle_sys == "none" else si["angle_sys_rad"]
+    own = {
+        "tilt": nav_mc.Tilt[setup.tilt.upper()],
+        "cardan": nav_mc.Cardan[setup.gimbal.upper()],
+        "alpha1_rad": si.get("alpha1_rad", math.nan),
+        "drift1_radps": si["drift_radps"],
+        "angle_sys_rad": angle_sys_rad + droop_rad,
+        "angle_sys": nav_mc.AngleSys["COMMON" if droop_rad else setup.angle_sys.upper()],
+        "angles_rad": tuple(math.radians(a) for a in setup.angles_deg),
+        "settle_s": setup.settle_s + (setup.slew_dps / setup.slew_dps2 if setup.slew_dps2 else 0.0),
+        "method": nav.Method[setup.method.upper()],
+        "noise": nav.Noise(
+            **_fields_of(nav.Noise, si), angle_sd_rad=si["angle_random_rad"], level_sd_rad=si["gamma_random_rad"]
         ),
-    )
+    }
+    return nav_mc.McConfig(**{**_fields_of(nav_mc.McConfig, si), **own})
 
 
 def _droop_rad(setup: Setup) -> float:
@@ -179,20 +183,8 @@ def _droop_rad(setup: Setup) -> float:
 
 def hold_config(setup: Setup, hold: Hold) -> nav_mc.HoldConfig:
     """The library's configuration of the hold."""
-    return nav_mc.HoldConfig(
-        start=config(setup),
-        axis2=nav_mc.Axis2[hold.axis2.upper()],
-        axis2_sd_radps=hold.axis2_sd_degph * nav.DEGPH,
-        heading_rad=math.radians(hold.heading_deg),
-        drift_error_radps=hold.drift_error_degph * nav.DEGPH,
-        hours=hold.hours,
-        step_s=hold.step_s,
-        wait_s=hold.wait_s,
-        level_rad=hold.level_arcmin * nav.ARCMIN,
-        latitude_error_rad=hold.latitude_error_arcmin * nav.ARCMIN,
-        v_east_mps=hold.v_east_kmph * KMPH_MPS,
-        speed_error=hold.speed_error,
-    )
+    own = {"start": config(setup), "axis2": nav_mc.Axis2[hold.axis2.upper()]}
+    return nav_mc.HoldConfig(**{**_fields_of(nav_mc.HoldConfig, _in_si(hold)), **own})
 
 
 def _closed(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:

@@ -191,12 +191,17 @@ def _steps(found: Mapping[Key, Figures]) -> Iterator[Check]:
         yield Check(what=f"each step of 30 to 90 better than the one before, {curve}", value=falls, low=1.0, high=9.0)
 
 
+# Cases of the hold.
+_PLAIN, _EXACT = "0.1 deg and 0.05 deg/h, nothing else", "whole chain, exact drift"
+_ARTICLE = "R5n: 0.02 deg/h from zero, 6' not counted"
+
+
 def _holds(found: Mapping[str, HoldFigures]) -> Iterator[Check]:
-    if f := found.get("0.1 deg and 0.05 deg/h, nothing else"):
+    if f := found.get(_PLAIN):
         yield Check(what="0.1 + 4 h of 0.05 deg/h, deg", value=f.end.p95, low=0.299, high=0.301)
-    if f := found.get("R5n: 0.02 deg/h from zero, 6' not counted"):
+    if f := found.get(_ARTICLE):
         yield Check(what="article, share within 0.3 deg", value=f.within[HOLD_DEG], low=0.99, high=1.0)
-    if f := found.get("whole chain, exact drift"):
+    if f := found.get(_EXACT):
         yield Check(what="exact drift, end rms, deg", value=f.end.rms, low=0.77, high=0.85)
     if f := found.get("whole chain, exact drift from zero"):
         yield Check(what="exact drift from zero, end rms, deg", value=f.end.rms, low=0.34, high=0.38)
@@ -216,37 +221,7 @@ class Claim:
     verdict: str
 
 
-def claims(found: Found) -> list[Claim]:
-    """Those whose cases are there."""
-    made = (
-        _heading(found),
-        _drift(found),
-        _one_run(found),
-        _best_step(found),
-        _ten_seconds(found),
-        _four_hours(found),
-        _several(found),
-    )
-    return [c for c in made if c is not None]
-
-
-def _compass(found: Found, study: str, *names: str) -> list[Figures]:
-    """All of these cases, or none."""
-    there = [found.get((study, n)) for n in names]
-    good = [f for f in there if isinstance(f, Figures)]
-    return good if len(good) == len(names) else []
-
-
-def _hold(found: Found, *names: str) -> list[HoldFigures]:
-    there = [found.get(("hold", n)) for n in names]
-    good = [f for f in there if isinstance(f, HoldFigures)]
-    return good if len(good) == len(names) else []
-
-
-def _heading(found: Found) -> Claim | None:
-    if not (fs := _compass(found, "readings", "R5n", "R0", "improved")):
-        return None
-    reading, honest, ideal = fs
+def _heading(found: Found, reading: Figures, honest: Figures, ideal: Figures) -> Claim:
     kept = reading.heading.p95 <= CLAIM_DEG
     within = f"{reading.within_claim:.1%} within"
     return Claim(
@@ -261,32 +236,28 @@ def _heading(found: Found) -> Claim | None:
 
 def _with_turns(found: Found) -> str:
     """The improved procedure as it can be run."""
-    if not (fs := _compass(found, "improved", "unit", "fast", "4 min, silent")):
+    cases = [found.get(("improved", name)) for name in ("unit", "fast", "4 min, silent")]
+    p95 = [f.platform.p95 for f in cases if isinstance(f, Figures)]
+    if len(p95) < len(cases):
         return ""
-    unit, fast, short = (f.platform.p95 for f in fs)
+    unit, fast, short = p95
     return (
         f"p95 {unit:.3f}° as the unit runs it, {fast:.3f}° with turns of 30 °/s, {short:.3f}° in 4 min of these and "
         "silent level sensors; "
     )
 
 
-def _one_run(found: Found) -> Claim | None:
-    if not (fs := _compass(found, "readings", "R5n", "R0", "R6n")):
-        return None
-    reading, honest, from_zero = (f.within_both for f in fs)
+def _one_run(_: Found, reading: Figures, honest: Figures, from_zero: Figures) -> Claim:
     return Claim(
         says="both figures in one run, the one it shows",
-        reading=f"{reading:.0%} of runs show both: R5n",
-        honest=f"{honest:.0%}: R0; {from_zero:.0%}: R6n, 0.2 °/h from zero, 6′ not counted",
+        reading=f"{reading.within_both:.0%} of runs show both: R5n",
+        honest=f"{honest.within_both:.0%}: R0; {from_zero.within_both:.0%}: R6n, 0.2 °/h from zero, 6′ not counted",
         improved="thousands of runs",
         verdict="one run proves little",
     )
 
 
-def _drift(found: Found) -> Claim | None:
-    if not (fs := _compass(found, "readings", "R5n", "R0", "R6")):
-        return None
-    reading, honest, from_zero = fs
+def _drift(_: Found, reading: Figures, honest: Figures, from_zero: Figures) -> Claim:
     kept = reading.drift.p95 <= DRIFT_DEGPH
     return Claim(
         says="calibration of the drift: 0.05 °/h",
@@ -313,11 +284,8 @@ def _best_step(found: Found) -> Claim | None:
     )
 
 
-def _ten_seconds(found: Found) -> Claim | None:
-    names = [f"exact drift, 10 s apart, {t}" for t in (2, 10, 60)]
-    if not (fs := _compass(found, "time", *names)):
-        return None
-    two, ten, sixty = (f.platform.rms for f in fs)
+def _ten_seconds(_: Found, *of_windows: Figures) -> Claim:
+    two, ten, sixty = (f.platform.rms for f in of_windows)
     return Claim(
         says="averaging over 10 s is enough",
         reading=f"{ten:.3f}° rms at 10 s",
@@ -327,28 +295,17 @@ def _ten_seconds(found: Found) -> Claim | None:
     )
 
 
-def _four_hours(found: Found) -> Claim | None:
-    names = (
-        "0.1 deg and 0.05 deg/h, nothing else",
-        "R5n: 0.02 deg/h from zero, 6' not counted",
-        "whole chain, exact drift",
-    )
-    if not (fs := _hold(found, *names)) or not (better := _hold(found, "R11, azimuth axis' drift measured")):
-        return None
-    plain, article, honest = fs
+def _four_hours(_: Found, plain: HoldFigures, article: HoldFigures, honest: HoldFigures, better: HoldFigures) -> Claim:
     return Claim(
         says="≤ 0.3° in 4 h",
         reading=f"{plain.end.p95:.3f}°: it is 0.1° + 4 h · 0.05 °/h; with 0.02 °/h p95 {article.end.p95:.3f}°",
         honest=f"p95 {honest.end.p95:.2f}°, {honest.within[HOLD_DEG]:.0%} stay within",
-        improved=f"p95 {better[0].end.p95:.3f}°: 0.02 °/h, the azimuth axis' own drift measured on its torquer",
+        improved=f"p95 {better.end.p95:.3f}°: 0.02 °/h, the azimuth axis' own drift measured on its torquer",
         verdict="reproduced as that sum, not as a result",
     )
 
 
-def _several(found: Found) -> Claim | None:
-    if not (fs := _hold(found, "whole chain, exact drift", "R5n: 0.02 deg/h from zero, 6' not counted")):
-        return None
-    honest, article = fs
+def _several(_: Found, article: HoldFigures, honest: HoldFigures) -> Claim:
     return Claim(
         says="0.5° in several hours (abstract)",
         reading=f"{article.within[SEVERAL_HOURS_DEG]:.1%} stay within over 4 h",
@@ -356,6 +313,25 @@ def _several(found: Found) -> Claim | None:
         improved="as above",
         verdict="the abstract's figure is not the text's 0.3°",
     )
+
+
+# Each claim with the study and the cases that it rests on.
+_CLAIMS: tuple[tuple[Callable[..., Claim | None], str, tuple[str, ...]], ...] = (
+    (_heading, "readings", ("R5n", "R0", "improved")),
+    (_drift, "readings", ("R5n", "R0", "R6")),
+    (_one_run, "readings", ("R5n", "R0", "R6n")),
+    (_best_step, "step", ()),
+    (_ten_seconds, "time", tuple(f"exact drift, 10 s apart, {t}" for t in (2, 10, 60))),
+    (_four_hours, "hold", (_PLAIN, _ARTICLE, _EXACT, "R11, azimuth axis' drift measured")),
+    (_several, "hold", (_ARTICLE, _EXACT)),
+)
+
+
+def claims(found: Found) -> list[Claim]:
+    """Those whose cases are there."""
+    there = [(make, [found[study, n] for n in names if (study, n) in found], names) for make, study, names in _CLAIMS]
+    made = [make(found, *figures) for make, figures, names in there if len(figures) == len(names)]
+    return [c for c in made if c is not None]
 
 
 def within_limits(found: Sequence[Check]) -> bool:
