@@ -30,7 +30,7 @@ from psabench.estimate.angles import wrapped_deg
 from psabench.native.nav import DEGPH
 from psabench.places import find_emulator, proto_file
 from psabench.procedures import gyrocompass
-from psabench.procedures.gyrocompass import GyrocompassParams
+from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.host_script import Plates
 from psabench.procedures.platform_bench import PlatformBench

@@ -342,9 +342,9 @@ def _of_all() -> Parameters:
 
 
 def _of_the_platform(name: str) -> Parameters:
-    from psabench.procedures import gyro_params, gyrocompass
+    from psabench.procedures import gyro_params, gyrocompass_params
 
-    return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass.READINGS)
+    return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass_params.READINGS)
 
 
 def _commands() -> Iterator[Command]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from psabench.errors import expected
-from psabench.procedures import gyrocompass, heading_hold
-from psabench.procedures.gyrocompass import GyrocompassParams
+from psabench.procedures import gyrocompass_params, heading_hold
+from psabench.procedures.gyrocompass_params import READINGS, GyrocompassParams
 from psabench.procedures.heading_hold import HoldParams
 from psabench.procedures.result import option
 
@@ -19,22 +19,20 @@ BOTH = "both"
 class ReadingParams:
     """Which reading of the article."""
 
-    reading: str = option(
-        BOTH, "", f"{', '.join(gyrocompass.READINGS)} or {BOTH}; gives the other parameters their values"
-    )
+    reading: str = option(BOTH, "", f"{', '.join(READINGS)} or {BOTH}; gives the other parameters their values")
 
     def __post_init__(self) -> None:
-        if self.reading not in (*gyrocompass.READINGS, BOTH):
-            raise ValueError(expected(f"{', '.join(gyrocompass.READINGS)} or {BOTH}", repr(self.reading), "reading"))
+        if self.reading not in (*READINGS, BOTH):
+            raise ValueError(expected(f"{', '.join(READINGS)} or {BOTH}", repr(self.reading), "reading"))
 
     @property
     def readings(self) -> tuple[str, ...]:
-        return tuple(gyrocompass.READINGS) if self.reading == BOTH else (self.reading,)
+        return tuple(READINGS) if self.reading == BOTH else (self.reading,)
 
 
 # Parameters of each procedure, by their dataclasses.
 PARAMS: Mapping[str, tuple[type[Any], ...]] = {
-    gyrocompass.NAME: (ReadingParams, GyrocompassParams),
+    gyrocompass_params.NAME: (ReadingParams, GyrocompassParams),
     heading_hold.NAME: (ReadingParams, HoldParams, GyrocompassParams),
 }
 

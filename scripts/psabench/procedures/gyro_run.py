@@ -16,7 +16,8 @@ from psabench.boards.gyro.device import Gyro
 from psabench.errors import BadInput, expected
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyro_params import ReadingParams
-from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
+from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
 from psabench.procedures.wire_platform import WirePlatform
@@ -55,7 +56,7 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
     readings: ReadingParams = _made(ReadingParams, options.procedure, options.params)
     for name in readings.readings:
-        gyrocompass.params_of(name, _part(GyrocompassParams, options.params))
+        params_of(name, _part(GyrocompassParams, options.params))
     hold_params = _made(HoldParams, options.procedure, options.params) if _holds(options) else None
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
@@ -81,7 +82,7 @@ def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progr
         if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
             raise BadInput(expected(f"a scenario with a gyro unit, as {SCENARIO}", options.scenario, "--scenario"))
         given = {**_site(options), **_part(GyrocompassParams, options.params)}
-        p = gyrocompass.params_of(label, given)
+        p = params_of(label, given)
         platform = WirePlatform(bench, signals=p.signals)
         truth = _Truth(bench)
         windows = gyrocompass.measure(platform, p, progress, seen=truth.window)

@@ -10,32 +10,18 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from psabench.errors import LinkError, expected
+from psabench.errors import LinkError
 from psabench.estimate.uncertainty import Estimate
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
 from psabench.procedures.gyrocompass_fit import Fit, Row, drift2_of, fit, sensitivity
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
-from psabench.procedures.gyrocompass_params import METHODS, NAME, READINGS, GyrocompassParams, params_of
-from psabench.procedures.gyrocompass_windows import good_calibration, s_of, sorted_out
+from psabench.procedures.gyrocompass_params import NAME, GyrocompassParams
+from psabench.procedures.gyrocompass_windows import good_calibration, sorted_out
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import PlatformBench, Window
-from psabench.procedures.result import DEG, Z95
-
-__all__ = [
-    "METHODS",
-    "NAME",
-    "READINGS",
-    "GyrocompassParams",
-    "GyrocompassResult",
-    "allowance",
-    "estimate",
-    "measure",
-    "params_of",
-    "s_of",
-]
-
+from psabench.procedures.result import DEG, Z95, estimate_named
 
 LEVEL_LIMIT_S = 60.0  # timeout for levelling
 
@@ -90,10 +76,7 @@ class GyrocompassResult:
 
     def get(self, name: str) -> Estimate:
         """The estimate of that name; raises KeyError with the names there are."""
-        for e in self.estimates:
-            if e.name == name:
-                return e
-        raise KeyError(expected(", ".join(e.name for e in self.estimates), name, "estimate"))
+        return estimate_named(self.estimates, name, "estimate")
 
     @property
     def duration_s(self) -> float:

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
@@ -18,6 +19,8 @@ from psabench.native.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass_fit import Fit, again
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.result import DEG
+
+Bools = npt.NDArray[np.bool_]
 
 GRID_RAD = math.radians(0.01)
 STEP_RAD = math.radians(0.01)  # of the derivative
@@ -71,14 +74,12 @@ def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd
     )
 
 
-def _hidden(phi_rad: Floats, f: Fit, quality_limit: float) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _hidden(phi_rad: Floats, f: Fit, quality_limit: float) -> Bools:
     """Where the Earth's horizontal rate is what it is at the latitude given, within the limit."""
     return np.asarray(np.abs(np.cos(phi_rad) / math.cos(f.params.latitude_rad) - 1.0) <= quality_limit)
 
 
-def _passport_allows(
-    phi_rad: Floats, f: Fit, drift2_radps: float, sd_radps: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _passport_allows(phi_rad: Floats, f: Fit, drift2_radps: float, sd_radps: float) -> Bools:
     """Where the drift of the azimuth axis would be what the passport says; everywhere, without one."""
     p = f.params
     if not p.drift2_limit_degph:
@@ -92,7 +93,7 @@ def passport_limit_radps(f: Fit, drift2_sd_radps: float) -> float:
     return f.params.drift2_limit_degph * DEGPH + PASSPORT_SDS * drift2_sd_radps
 
 
-def _run_length(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
+def _run_length(flags: Bools) -> int:
     """How many of the first are true."""
     return int(flags.size if flags.all() else np.argmin(flags))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,6 +39,14 @@ class FaceSeries:
     c_v: Array | None  # (5,), None when the procedure fits no series
 
 
+def estimate_named(estimates: Sequence[Estimate], name: str, where: str) -> Estimate:
+    """The estimate of that name. Raises KeyError with the names there are."""
+    for e in estimates:
+        if e.name == name:
+            return e
+    raise KeyError(expected(", ".join(e.name for e in estimates), name, where))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcedureResult:
     """Estimates with their confidence, and everything a report shows."""
@@ -55,10 +64,7 @@ class ProcedureResult:
 
     def get(self, name: str) -> Estimate:
         """The estimate of that name; raises KeyError with the names there are."""
-        for e in self.estimates:
-            if e.name == name:
-                return e
-        raise KeyError(expected(", ".join(e.name for e in self.estimates), name, f"estimate of {self.procedure}"))
+        return estimate_named(self.estimates, name, f"estimate of {self.procedure}")
 
     @property
     def duration_s(self) -> float:

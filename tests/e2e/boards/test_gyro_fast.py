@@ -15,6 +15,7 @@ from psabench.campaign.setup import Setup
 from psabench.estimate.angles import wrapped_deg
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.wire_platform import WirePlatform
 
@@ -27,7 +28,7 @@ def run(setup: Setup, folder: Path) -> tuple[GyrocompassResult, float]:
     at = emulated.instrument(setup, 1, 0)
     path = folder / "run.yaml"
     path.write_text(json.dumps(emulated.scenario(setup, at)), encoding="utf-8")  # YAML, too
-    p = g.params_of(
+    p = params_of(
         "improved",
         {
             "sequence": ",".join(f"{a:g}" for a in setup.angles_deg),

@@ -14,6 +14,7 @@ from psabench.boards.gyro.device import Gyro
 from psabench.link.protocol_files import message
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.wire_platform import WirePlatform
 from rig import HOST, ROOT, one_line, psa_emu
@@ -45,7 +46,7 @@ def swaying(folder: Path, period_s: float, mg: float = PUSH_MG, name: str = "gyr
 
 
 def compass(path: Path, reading: str) -> GyrocompassResult:
-    p = g.params_of(reading, {"calibrate_s": 0.0})
+    p = params_of(reading, {"calibrate_s": 0.0})
     with Bench.start(path) as bench:
         return g.estimate(g.measure(WirePlatform(bench), p, Silent()), p)
 

@@ -16,7 +16,8 @@ from psabench.boards.psa2.device import Psa2
 from psabench.errors import DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.procedures import gyrocompass as g
-from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
+from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.platform_bench import Table
 from psabench.procedures.wire_platform import WirePlatform
@@ -42,7 +43,7 @@ def ideal(**given: Any) -> GyrocompassParams:
         "level_sd_arcmin": 0.1,
         "calibrate_s": 10.0,
     }
-    return g.params_of("improved", {"repeat": 1, **quiet, **given})
+    return params_of("improved", {"repeat": 1, **quiet, **given})
 
 
 @pytest.mark.parametrize(

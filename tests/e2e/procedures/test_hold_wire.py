@@ -13,6 +13,7 @@ from psabench.boards.gyro.device import Flag, Gyro, Mode, SelfTest
 from psabench.errors import DeviceError, LinkError
 from psabench.places import proto_file
 from psabench.procedures import gyrocompass
+from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import Held, HoldParams, HoldResult, hold
 from psabench.procedures.wire_platform import WirePlatform
@@ -36,7 +37,7 @@ def held(
     errors_deg: list[float] = []
     with Bench.start(scenario) as bench:
         platform = WirePlatform(bench)
-        p = gyrocompass.params_of("article", {"settle_s": 15.0, "calibrate_s": 20.0, **given})
+        p = params_of("article", {"settle_s": 15.0, "calibrate_s": 20.0, **given})
         start = gyrocompass.estimate(gyrocompass.measure(platform, p, Silent()), p)
 
         def watch(h: Held) -> None:

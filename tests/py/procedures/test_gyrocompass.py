@@ -14,7 +14,9 @@ from psabench.estimate.angles import wrapped_deg
 from psabench.native import nav
 from psabench.native.nav import DEGPH
 from psabench.procedures import gyrocompass as g
-from psabench.procedures.gyrocompass import GyrocompassParams, GyrocompassResult
+from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
+from psabench.procedures.gyrocompass_windows import s_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.platform_bench import Window
 
@@ -22,7 +24,7 @@ EARTH_DEG = 2e-5  # the fake's 15.041067 deg/h has 1e-8 less than the library's 
 
 
 def run(bench: FakePlatform, reading: str = "improved", **given: object) -> GyrocompassResult:
-    p = g.params_of(reading, given)
+    p = params_of(reading, given)
     return g.estimate(g.measure(bench, p, Silent()), p)
 
 
@@ -100,9 +102,9 @@ def test_set_angles_err_by_what_was_not_set_and_the_encoder_knows() -> None:
     for k in range(30):
         rng = np.random.default_rng(k)
         bench = FakePlatform(set_sd_arcmin=30.0, rng=rng)
-        windows = g.measure(bench, g.params_of("improved"), Silent())
-        right.append(heading_error_deg(g.estimate(windows, g.params_of("improved")), bench))
-        wrong.append(heading_error_deg(g.estimate(windows, g.params_of("improved", {"angles": "set"})), bench))
+        windows = g.measure(bench, params_of("improved"), Silent())
+        right.append(heading_error_deg(g.estimate(windows, params_of("improved")), bench))
+        wrong.append(heading_error_deg(g.estimate(windows, params_of("improved", {"angles": "set"})), bench))
     assert np.std(right) < 1e-6
     assert np.std(wrong) > 0.05
 
@@ -131,7 +133,7 @@ def test_a_torquer_s_scale_shows_in_the_drift_alone() -> None:
 def test_intervals_cover_what_they_say(reading: str) -> None:
     """200 instruments with a Gauss-Markov drift: 95 % of the errors lie within the interval, within sampling."""
     rng = seeded(f"gyrocompass {reading}")
-    p = g.params_of(reading, {"level_sd_arcmin": 0.0})
+    p = params_of(reading, {"level_sd_arcmin": 0.0})
     angle = p.angle_sd_arcmin
     inside, z = 0, []
     runs = 200
@@ -193,7 +195,7 @@ def test_white_noise_of_the_level_widens_the_interval() -> None:
 )
 def test_what_cannot_work_is_refused_before_anything_moves(given: dict[str, object], why: str) -> None:
     with pytest.raises(BadInput, match=why):
-        g.params_of("article", given)
+        params_of("article", given)
 
 
 def test_a_platform_that_never_settles_is_a_failure() -> None:
@@ -246,7 +248,7 @@ def test_a_drift_that_jumps_in_a_long_run_is_seen() -> None:
 
 
 def test_a_calibration_that_failed_is_told_and_not_used() -> None:
-    p = g.params_of("improved")
+    p = params_of("improved")
     windows = list(g.measure(FakePlatform(), p, Silent()))
     windows[-1] = replace(windows[-1], level_lost=True, u2_radps=windows[-1].u2_radps + 1.0)
     r = g.estimate(windows, p)
@@ -281,8 +283,8 @@ def test_a_window_with_the_servo_off_is_corrected_by_the_encoder() -> None:
         m1_per_s=1.0,
         latitude_rad=0.87,
     )
-    assert g.s_of(w, slope=False, frozen=True) == pytest.approx(s, rel=1e-9, abs=0.0)
-    assert g.s_of(w, slope=False, frozen=False) == pytest.approx(s - rate * math.sin(gamma), rel=1e-9)
+    assert s_of(w, slope=False, frozen=True) == pytest.approx(s, rel=1e-9, abs=0.0)
+    assert s_of(w, slope=False, frozen=False) == pytest.approx(s - rate * math.sin(gamma), rel=1e-9)
 
 
 def test_a_window_needs_readings() -> None:
@@ -295,8 +297,8 @@ def test_a_window_needs_readings() -> None:
 
 
 def test_readings_differ_in_what_they_say() -> None:
-    article, improved = GyrocompassParams(), g.params_of("improved")
+    article, improved = GyrocompassParams(), params_of("improved")
     assert (article.method, article.angles, article.simplified) == ("closed3", "set", True)
     assert (improved.angles, improved.simplified, improved.sequence) == ("encoder", False, "0,180,90,270")
     with pytest.raises(BadInput, match="expected article, improved"):
-        g.params_of("best")
+        params_of("best")

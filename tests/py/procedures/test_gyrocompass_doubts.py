@@ -17,6 +17,7 @@ from fake_platform import FakePlatform
 from psabench.errors import BadInput
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from scipy.signal import lfilter
 
@@ -25,7 +26,7 @@ NOISE_ARCMIN = 0.009  # of beta in a step, as the scenario gyrocompass has it
 
 
 def run(bench: FakePlatform, reading: str = "improved", **given: Any) -> GyrocompassResult:
-    p = g.params_of(reading, given)
+    p = params_of(reading, given)
     return g.estimate(g.measure(bench, p, Silent()), p)
 
 
@@ -89,8 +90,8 @@ def test_a_good_run_is_hardly_ever_in_doubt(reading: str, runs: int, most: int) 
 )
 def test_loops_without_the_time_to_settle_are_refused(given: dict[str, Any], why: str) -> None:
     with pytest.raises(BadInput, match=why):
-        g.params_of("article", given)
-    assert g.params_of("article", {"settle_s": 4.0, "slope": True}).slope, "a slope does not mind what is left of beta"
+        params_of("article", given)
+    assert params_of("article", {"settle_s": 4.0, "slope": True}).slope, "a slope does not mind what is left of beta"
 
 
 @pytest.mark.parametrize("left_arcmin", [-60.0, 60.0])
@@ -99,7 +100,7 @@ def test_levelling_that_still_runs_is_a_doubt_or_does_no_harm(left_arcmin: float
     """Left over in the second position alone, where it moves a heading by up to 0.8 deg."""
     seen = 0
     for heading_deg in HEADINGS_DEG:
-        p = g.params_of("article")
+        p = params_of("article")
         bench = FakePlatform(heading_deg=heading_deg, noise_arcmin=noise_arcmin)
         windows = list(g.measure(bench, p, Silent()))
         after_s = windows[1].step_s * np.arange(len(windows[1].beta_rad))
@@ -135,7 +136,7 @@ def test_a_vehicle_that_turned_between_positions_is_always_a_doubt(sequence: str
 
 
 def test_a_turn_within_a_window_is_seen_as_well() -> None:
-    p = g.params_of("article")
+    p = params_of("article")
     windows = list(g.measure(FakePlatform(), p, Silent()))
     n = len(windows[2].turned_rad)
     late = np.where(np.arange(n) < 0.9 * n, 0.0, math.radians(1.0))
@@ -149,7 +150,7 @@ def test_torquers_may_be_off_by_what_the_passport_says() -> None:
 
 
 def test_readings_lost_in_a_turn_leave_the_vehicle_s_turn_unknown() -> None:
-    p = g.params_of("article")
+    p = params_of("article")
     windows = list(g.measure(FakePlatform(vehicle_turns_deg={1: 3.0}), p, Silent()))
     windows[1:3] = [replace(w, missed=7) for w in windows[1:3]]
     r = g.estimate(windows, p)
@@ -165,7 +166,7 @@ def test_a_vehicle_that_tilts_is_no_one_attitude() -> None:
 @pytest.mark.parametrize("reading", ["article", "improved"])
 def test_a_level_sensor_that_is_stuck_is_a_doubt(reading: str) -> None:
     """gamma stays what it was; the rates alone do not tell, whatever the number of positions."""
-    p = g.params_of(reading)
+    p = params_of(reading)
     windows = g.measure(FakePlatform(heading_deg=50.0, pitch_deg=2.0, roll_deg=-1.5), p, Silent())
     stuck = [replace(w, gamma_rad=np.full_like(w.gamma_rad, windows[0].gamma_rad.mean())) for w in windows]
     assert g.estimate(windows, p).doubts == ()
@@ -185,7 +186,7 @@ def test_windows_that_hardly_any_count_are_a_doubt() -> None:
 
 
 def test_a_calibration_at_another_angle_does_not_count() -> None:
-    p = g.params_of("improved")
+    p = params_of("improved")
     windows = list(g.measure(FakePlatform(), p, Silent()))
     windows[-1] = replace(windows[-1], encoder_rad=windows[-1].encoder_rad + 0.1, u2_radps=windows[-1].u2_radps + 1.0)
     r = g.estimate(windows, p)

@@ -14,6 +14,7 @@ from psabench.errors import LinkError
 from psabench.estimate.angles import wrapped_deg
 from psabench.procedures import gyrocompass
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import Held, HoldParams, HoldResult, hold
 from psabench.procedures.platform_bench import Look
@@ -22,7 +23,7 @@ from psabench.report.gyro_grading import GyroSection, HeldTruth
 
 
 def start(bench: FakePlatform, reading: str = "improved", **given: object) -> GyrocompassResult:
-    p = gyrocompass.params_of(reading, given)
+    p = params_of(reading, given)
     return gyrocompass.estimate(gyrocompass.measure(bench, p, Silent()), p)
 
 
