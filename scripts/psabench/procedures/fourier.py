@@ -41,11 +41,6 @@ class FourierParams(SeriesParams):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FourierResult(ProcedureResult):
-    """Result of `fourier`."""
-
-
 _MEASURED = (
     ("kx_eff_v_per_g", "√(k_x² + k_y²)", "V/g", 1.0),
     ("angle_deg", "α_0 + atan(k_y/k_x)", "deg", DEG),
@@ -55,7 +50,7 @@ _MEASURED = (
 _COEFFICIENTS = tuple((f"c{i}_v", f"C_{i}", "V", 1.0) for i in range(5))
 
 
-def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> FourierResult:
+def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> ProcedureResult:
     """Measure p.realisations x p.positions on the direct face and estimate by eqs (14)-(18).
 
     Raises ValueError when the readings do not suffice, and lets through what the bench raises and
@@ -65,7 +60,7 @@ def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> F
     return estimate_fourier(readings, p, bench.g_mps2)
 
 
-def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: float) -> FourierResult:
+def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: float) -> ProcedureResult:
     """The estimates of `fourier` from its readings. Pure; raises ValueError when they do not suffice."""
     face = fit_face(readings, Face.DIRECT, p.drift)
     c = face.fit.c_v
@@ -75,7 +70,7 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
     table = (*ONE_FACE, *_MEASURED, *_COEFFICIENTS)
     flagged = _flag(estimates_of(table, values, cov, face.fit.dof), p.quadratic_bound_v_per_g2)
     shown = len(ONE_FACE)
-    return FourierResult(
+    return ProcedureResult(
         procedure="fourier",
         axis=p.axis,
         g_mps2=g_mps2,

@@ -196,10 +196,8 @@ def run(scenario: Scenario, for_s: float, bus: str) -> tuple[bytes, float]:
         words = done.stderr.decode(errors="replace").strip()
         if done.returncode:
             raise (BadInput if done.returncode == BadInput.exit_status else BenchError)(words or "the emulator failed")
-        if words:
-            raise LinkError(
-                words
-            )  # a command of the timeline that was rejected, a frame form that the bus cannot carry
+        if words:  # a command of the timeline that was rejected, a frame form that the bus cannot carry
+            raise LinkError(words)
         return _contents(log), _processor_s() - used_s
 
 

@@ -29,17 +29,8 @@ class CsvRecorder(AbstractContextManager["CsvRecorder"]):
 
     def __call__(self, r: Reading) -> None:
         # repr of a float is the shortest text that reads back to the same bits
-        self._csv.writerow(
-            (
-                repr(r.t_s),
-                r.face.value,
-                repr(r.set_deg),
-                repr(r.alpha_deg),
-                r.axis,
-                r.realisation,
-                repr(r.u_v),
-            )
-        )
+        row = (r.face.value if name == "face" else getattr(r, name) for name in COLUMNS)
+        self._csv.writerow([repr(x) if isinstance(x, float) else x for x in row])
         self._file.flush()
         self.rows += 1
 

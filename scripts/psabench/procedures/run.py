@@ -106,10 +106,8 @@ def _bench(condition: Condition, options: RunOptions) -> Bench:
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
     resolved = options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
-    extra: list[str | Path] = [
-        "--resolved",
-        resolved,
-    ]  # every key with its value, and the seed: the run can be repeated from it
+    # Every key with its value, and the seed: the run can be repeated from it.
+    extra: list[str | Path] = ["--resolved", resolved]
     return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
 
 

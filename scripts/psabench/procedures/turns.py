@@ -39,9 +39,8 @@ class Pair:
 PAIRS = (
     Pair(axis="x", face=Face.DIRECT, along_deg=270.0, against_deg=90.0),  # fig. 2; the text prints a_x = -g twice
     Pair(axis="y", face=Face.DIRECT, along_deg=180.0, against_deg=0.0),  # fig. 3
-    Pair(
-        axis="z", face=Face.SIDE, along_deg=180.0, against_deg=0.0
-    ),  # fig. 4: about Oy, which then lies along the head
+    # fig. 4: about Oy, which then lies along the head
+    Pair(axis="z", face=Face.SIDE, along_deg=180.0, against_deg=0.0),
 )
 SEARCH_POINTS = 5
 
@@ -53,11 +52,7 @@ class TurnsParams:
     axis: str = option("x", "", "channel of the board that the accelerometer is wired to: x, y or z")
     realisations: int = option(5, "", "repetitions, n of eqs (4), (5), (8), (11)")
     readings: int = option(16, "", "readings at each position, averaged")
-    search_deg: float = option(
-        0.0,
-        "deg",
-        "search range about the vertical for the extreme output of Ox; 0: no search",
-    )
+    search_deg: float = option(0.0, "deg", "search range about the vertical for the extreme output of Ox; 0: no search")
     dwell_s: float = option(0.0, "s", "extra rest at each position before it is read")
 
     def __post_init__(self) -> None:
@@ -73,12 +68,7 @@ class TurnsParams:
             raise ValueError(expected("0 or more", self.dwell_s, "dwell_s"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TurnsResult(ProcedureResult):
-    """Result of `turns`."""
-
-
-def turns(bench: HeadBench, p: TurnsParams, watch: Watch | None = None) -> TurnsResult:
+def turns(bench: HeadBench, p: TurnsParams, watch: Watch | None = None) -> ProcedureResult:
     """Measure the six positions p.realisations times and estimate. Errors and Ctrl-C as in `fourier`."""
     watch = watch or Watch()
     readings: list[Reading] = []
@@ -110,7 +100,7 @@ class _Halves:
     diff_v: Array  # half the difference: coefficient x g
 
 
-def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -> TurnsResult:
+def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -> ProcedureResult:
     """The estimates of `turns`. Pure.
 
     Pairs that are missing (interrupted run) are left out with a note; raises ValueError when Ox has fewer
@@ -132,7 +122,7 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
         _series(readings, face) for face in (Face.DIRECT, Face.SIDE) if any(r.face is face for r in readings)
     )
     names = tuple(e.name for e in estimates if e.name in ("u0_v", "kx_v_per_g", "ky_v_per_g", "kz_v_per_g"))
-    return TurnsResult(
+    return ProcedureResult(
         procedure="turns",
         axis=p.axis,
         g_mps2=g_mps2,
