@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from psabench.campaign.cases import Case, Study
-from psabench.campaign.claims import CLAIM_DEG, HOLD_DEG, SEVERAL_HOURS_DEG, Figures, HoldFigures
+from psabench.campaign.claims import CLAIM_DEG, HOLD_DEG, SEVERAL_HOURS_DEG, Figures, HoldFigures, Spread
 from psabench.campaign.store import Rows
 from psabench.report import plots as style
 
@@ -77,25 +77,21 @@ def bars(name: str, cases: Sequence[Case], found: Mapping[str, Figures]) -> str:
     spreads = [found[c.name].heading if heading else found[c.name].platform for c in cases]
     labels = [c.name if heading else c.title for c in cases]
     what = "heading" if heading else "the platform"
-    return _dots(
-        name, labels, [("rms", [s.rms for s in spreads]), ("p95", [s.p95 for s in spreads])], what, [CLAIM_DEG]
-    )
+    return _dots(name, labels, spreads, what, [CLAIM_DEG])
 
 
 def held(cases: Sequence[Case], found: Mapping[str, HoldFigures]) -> str:
     """Heading after the hold."""
     spreads = [found[c.name].end for c in cases]
-    values = [("rms", [s.rms for s in spreads]), ("p95", [s.p95 for s in spreads])]
-    return _dots("hold", [c.title for c in cases], values, "heading after the hold", [HOLD_DEG, SEVERAL_HOURS_DEG])
+    return _dots("hold", [c.title for c in cases], spreads, "heading after the hold", [HOLD_DEG, SEVERAL_HOURS_DEG])
 
 
-def _dots(
-    name: str, labels: Sequence[str], values: Sequence[tuple[str, Sequence[float]]], what: str, lines: Sequence[float]
-) -> str:
+def _dots(name: str, labels: Sequence[str], spreads: Sequence[Spread], what: str, lines: Sequence[float]) -> str:
+    values = {"rms": [s.rms for s in spreads], "p95": [s.p95 for s in spreads]}
     with style.drawing(0.9 + ROW * len(labels)) as (figure, ax):
         for at in lines:
             ax.axvline(at, color=style.MUTED, lw=1.0, ls="--")
-        for (label, numbers), colour in zip(values, style.SERIES, strict=False):
+        for (label, numbers), colour in zip(values.items(), style.SERIES, strict=False):
             # What is exactly zero has no place on a logarithmic scale, and needs none.
             there = [(v, -i) for i, v in enumerate(numbers) if v > 1e-7]
             ax.plot(*zip(*there, strict=True), "o", ms=5, color=colour, label=label, ls="none")

@@ -102,11 +102,11 @@ def with_ci(value: float, ci_half: float, most: int = 9) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{ci_half:.1g}" if small else f"{ci_half:.{decimals}f}"
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """A table as lines of text: the first column to the left, the others to the right."""
+def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> list[str]:
+    """A table as lines of text: these columns, the first alone, to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    cells = ([r[0].ljust(widths[0]), *(x.rjust(w) for x, w in zip(r[1:], widths[1:], strict=True))] for r in rows)
-    return ["  ".join(row).rstrip() for row in cells]
+    sides = [str.ljust if i in left else str.rjust for i in range(len(widths))]
+    return ["  ".join(put(x, w) for put, x, w in zip(sides, r, widths, strict=True)).rstrip() for r in rows]
 
 
 def result_dict(section: Section) -> dict[str, object]:
@@ -131,15 +131,13 @@ def result_dict(section: Section) -> dict[str, object]:
 
 
 def _estimate_dict(e: Estimate) -> dict[str, object]:
-    return {
-        "name": e.name,
-        "unit": e.unit,
-        "value": e.value,
-        "sd": e.sd,
-        "ci95": [e.value - e.ci_half, e.value + e.ci_half],
-        "identifiable": e.identifiable,
-        "reason": e.reason,
-    }
+    return {**numbers_of(e), "identifiable": e.identifiable, "reason": e.reason}
+
+
+def numbers_of(e: Estimate) -> dict[str, object]:
+    """An estimate of result.json, for a reading of any procedure."""
+    ci95 = [e.value - e.ci_half, e.value + e.ci_half]
+    return {"name": e.name, "unit": e.unit, "value": e.value, "sd": e.sd, "ci95": ci95}
 
 
 def console_table(section: Section) -> str:
@@ -153,14 +151,10 @@ def console_table(section: Section) -> str:
         error = "" if g.error is None else f"{g.error:+.2g}"
         z = "" if g.z is None else f"{g.z:+.1f}"
         rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, z, _mark(g)))
-    width = [max(len(row[i]) for row in rows) for i in range(8)]
-    lines = [
-        "  " + f"{row[0]:<{width[0]}}  " + "  ".join(f"{row[i]:>{width[i]}}" for i in range(1, 7)) + "  " + row[7]
-        for row in rows
-    ]
+    lines = [f"  {line}" for line in aligned(rows, left=(0, 7))]
     notes = [f"  note: {n}" for n in r.notes]
     why = [f"  {e.name}: {e.reason}" for e in r.estimates if not e.identifiable]
-    return "\n".join([head, *(line.rstrip() for line in lines), *why, *notes])
+    return "\n".join([head, *lines, *why, *notes])
 
 
 def verdict(sections: Sequence[Section]) -> str:

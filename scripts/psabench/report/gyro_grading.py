@@ -14,7 +14,7 @@ from psabench.native.nav import DEGPH
 from psabench.procedures.gyrocompass import GyrocompassResult, allowance
 from psabench.procedures.heading_hold import HoldResult
 from psabench.procedures.result import DEG, LIMIT_CI
-from psabench.report.grading import aligned, with_ci
+from psabench.report.grading import aligned, numbers_of, with_ci
 
 # What the article says that its simulation reaches, and what a hold may be off by.
 CLAIMS: Mapping[str, tuple[float, str]] = {"heading_deg": (0.1, "deg"), "drift1_degph": (0.05, "deg/h")}
@@ -197,11 +197,7 @@ def result_dict(s: GyroSection) -> dict[str, object]:
         "duration_s": r.duration_s,
         "estimates": [
             {
-                "name": g.estimate.name,
-                "unit": g.estimate.unit,
-                "value": g.estimate.value,
-                "sd": g.estimate.sd,
-                "ci95": [g.estimate.value - g.estimate.ci_half, g.estimate.value + g.estimate.ci_half],
+                **numbers_of(g.estimate),
                 "truth": g.truth,
                 "error": g.error,
                 "limit": g.limit,
