@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import can
 import numpy as np
@@ -17,15 +17,16 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import BadInput, expected
+from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
 
 CHUNK = 4096  # samples decoded at once
 
-CAN_COLUMNS = ("t_rx_s", "t_sample_s", "x_v", "y_v", "z_v", "temp_code", "temp_channel", "settled", "clipped")
 SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
 COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole numbers
-LINE_COLUMNS = ("t_int_fall_s", "t_int_rise_s", "word0", "word1", "word2", "word3")
+
+Table = Mapping[str, np.ndarray[Any, np.dtype[Any]]]  # columns by what the CSV calls them
 
 
 def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> FrameReader | ReadingReader:
@@ -38,14 +39,8 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
         raise BadInput(expected(f"an ending of {' '.join(sorted(MESSAGE_READERS))}", path.suffix or "none", path))
     _check_there(path)
     reader, ids = reader_of(board, node), set[int]()
-    table = csv.writer(out, lineterminator="\n")
-    begun = False
-    for frames in _chunks(path, reader, ids):
-        if len(frames) and not begun:
-            table.writerow(CAN_COLUMNS if isinstance(frames, Frames) else _reading_columns(frames))
-            begun = True
-        table.writerows(_rows(frames) if isinstance(frames, Frames) else _reading_rows(frames))
-    if not begun:
+    chunks = _chunks(path, reader, ids)
+    if not _write(out, (_of_frames(f) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
         raise BadInput(expected(f"frames of node {node}", _no_frame(node, _senders(ids, board)), path))
     return reader
 
@@ -88,27 +83,40 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
     yield reader.take()
 
 
-def _rows(f: Frames) -> Iterable[tuple[object, ...]]:
-    columns = [
-        f.t_rx_s,
-        f.t_sample_s,
-        *f.u_v.T,
-        f.temp_code,
-        f.temp_channel,
-        f.settled.astype(int),
-        f.clipped.astype(int),
-    ]
-    return zip(*(np.asarray(c).tolist() for c in columns), strict=True)
+def _of_frames(f: Frames) -> Table:
+    x_v, y_v, z_v = f.u_v.T
+    return {
+        "t_rx_s": f.t_rx_s,
+        "t_sample_s": f.t_sample_s,
+        "x_v": x_v,
+        "y_v": y_v,
+        "z_v": z_v,
+        "temp_code": f.temp_code,
+        "temp_channel": f.temp_channel,
+        "settled": f.settled.astype(int),
+        "clipped": f.clipped.astype(int),
+    }
 
 
-def _reading_columns(r: Readings) -> tuple[str, ...]:
+def _of_readings(r: Readings) -> Table:
     """Names with their units: X_LSB, T_degC; bare where a signal is a number or a bit."""
-    return ("t_rx_s", "t_sample_s", *("_".join(filter(None, (name, r.units[name]))) for name in r.columns))
+    columns = {"t_rx_s": r.t_rx_s, "t_sample_s": r.t_sample_s}
+    for name, c in r.columns.items():
+        unit = r.units[name]
+        columns["_".join(filter(None, (name, unit)))] = c.astype(np.int64) if unit in COUNTED else c
+    return columns
 
 
-def _reading_rows(r: Readings) -> Iterable[tuple[object, ...]]:
-    columns = [c.astype(np.int64) if r.units[name] in COUNTED else c for name, c in r.columns.items()]
-    return zip(*(c.tolist() for c in (r.t_rx_s, r.t_sample_s, *columns)), strict=True)
+def _write(out: IO[str], tables: Iterable[Table]) -> bool:
+    """One CSV of tables with the same columns, their names before the first row; whether there was a row."""
+    csv_file, begun = csv.writer(out, lineterminator="\n"), False
+    for table in tables:
+        rows = list(zip(*(c.tolist() for c in table.values()), strict=True))
+        if rows and not begun:
+            csv_file.writerow(table)
+            begun = True
+        csv_file.writerows(rows)
+    return begun
 
 
 def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
@@ -122,15 +130,13 @@ def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
         stream = path.open("rb")
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
-    table = csv.writer(out, lineterminator="\n")
-    begun = False
     with stream:
-        for frames in decode_stream(stream, decoder):
-            if len(frames) and not begun:
-                table.writerow(LINE_COLUMNS)
-                begun = True
-            fall_s, rise_s = frames.fall / fmt.sample_hz, frames.rise / fmt.sample_hz
-            table.writerows(zip(fall_s.tolist(), rise_s.tolist(), *frames.words.T.tolist(), strict=True))
+        begun = _write(out, (_of_line(f, fmt) for f in decode_stream(stream, decoder)))
     if not begun:
         raise BadInput(expected(f"frames of {fmt.word_bits}-bit words", f"none ({decoder.counts})", path))
     return decoder
+
+
+def _of_line(f: lineport.Frames, fmt: LineFormat) -> Table:
+    words = {f"word{k}": word for k, word in enumerate(f.words.T)}
+    return {"t_int_fall_s": f.fall / fmt.sample_hz, "t_int_rise_s": f.rise / fmt.sample_hz, **words}
