@@ -310,11 +310,8 @@ class Bench(AbstractContextManager["Bench"]):
         if not isinstance(self._clock, StepClock):
             self.wait(dwell_s)
             return
-        left_ns = round(dwell_s * NS)
-        while left_ns > 0:
-            slice_ns = min(left_ns, SERIAL_SLICE_NS if self._serial else SLICE_NS)
-            self._clock.command(None, "run", for_s=slice_ns / NS)
-            left_ns -= slice_ns
+        for slice_s in slices_s(dwell_s, SERIAL_SLICE_NS if self._serial else SLICE_NS):
+            self._clock.command(None, "run", for_s=slice_s)
 
     @property
     def _serial(self) -> bool:
@@ -332,10 +329,8 @@ class Bench(AbstractContextManager["Bench"]):
         self._clock.command(None, "run", for_s=0)  # what we have sent has arrived
         for host in self.hosts.values():
             host.close()
-        left_ns = round(dwell_s * NS)
-        while left_ns > 0:
-            self.control.call("run", for_s=min(left_ns, AWAY_SLICE_NS) / NS)
-            left_ns -= AWAY_SLICE_NS
+        for slice_s in slices_s(dwell_s, AWAY_SLICE_NS):
+            self.control.call("run", for_s=slice_s)
         for name, host in self.hosts.items():
             host.reopen(open_bus(self._specs[name]))
         self._clock = self._set_clock()
@@ -443,6 +438,13 @@ class Bench(AbstractContextManager["Bench"]):
         """Save the whole bench at this instant; `restore` goes on from there. Raises ControlError."""
         self.control.call("snapshot", path=os.path.abspath(path))
         return Path(path)
+
+
+def slices_s(dwell_s: float, slice_ns: int) -> Iterator[float]:
+    """A time in slices of a length, to the nanosecond; the last is what is left."""
+    dwell_ns = round(dwell_s * NS)
+    for begun_ns in range(0, dwell_ns, slice_ns):
+        yield min(slice_ns, dwell_ns - begun_ns) / NS
 
 
 def _endpoints(control: Path) -> list[dict[str, str]]:

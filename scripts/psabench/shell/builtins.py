@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from psabench.bench import NS, Bench
+from psabench.bench import NS, Bench, slices_s
 from psabench.errors import BadInput, BenchError, expected
 from psabench.instruments import KINDS, Instrument
 from psabench.link.can_host import Message
@@ -32,11 +32,8 @@ FRAME_USAGE = "ID#DATA in hexadecimal, as 605#4018100400000000; an FD frame with
 
 def pass_time(session: Context, for_s: float) -> None:
     """Let the bench's time pass, in slices."""
-    left_ns = round(for_s * NS)
-    while left_ns > 0:
-        slice_ns = min(left_ns, SLICE_NS)
-        session.bench.wait(slice_ns / NS)
-        left_ns -= slice_ns
+    for slice_s in slices_s(for_s, SLICE_NS):
+        session.bench.wait(slice_s)
         session.tick()
 
 

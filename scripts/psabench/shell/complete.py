@@ -25,11 +25,7 @@ def candidates(before: str, vocabulary: Vocabulary) -> list[Candidate]:
     if not words or (len(words) == 1 and not before[-1:].isspace()):
         return list(_names(words[0] if words else "", vocabulary))
     command = vocabulary.commands.get(words[0])
-    if command is None:
-        return []
-    command = command.variant(_done(words, before))
-    last = "" if before[-1:].isspace() else words[-1]
-    return list(_values(command, _done(words, before), last))
+    return list(_values(*_typed(command, words, before))) if command else []
 
 
 def argument(before: str, vocabulary: Vocabulary) -> tuple[Command, Arg | None] | None:
@@ -40,16 +36,16 @@ def argument(before: str, vocabulary: Vocabulary) -> tuple[Command, Arg | None] 
         return None
     if len(words) == 1 and not before[-1:].isspace():
         return command, None
-    command = command.variant(_done(words, before))
-    last = "" if before[-1:].isspace() else words[-1]
-    free = _free(command, _done(words, before))
+    command, done, last = _typed(command, words, before)
+    free = _free(command, done)
     named = command.arg(last.split("=")[0]) if "=" in last else None
     return command, named or (free[0] if free else None)
 
 
-def _done(words: list[str], before: str) -> list[str]:
-    """The words after the command's name that are complete."""
-    return words[1:] if before[-1:].isspace() else words[1:-1]
+def _typed(command: Command, words: list[str], before: str) -> tuple[Command, list[str], str]:
+    """The variant that is being typed, the words after its name that are complete, and the one that is not."""
+    done, last = (words[1:], "") if before[-1:].isspace() else (words[1:-1], words[-1])
+    return command.variant(done), done, last
 
 
 def _names(prefix: str, vocabulary: Vocabulary) -> Iterator[Candidate]:

@@ -37,7 +37,7 @@ def changed(converter: str, name: str, value: int, text: str) -> int:
     for part in text.split(","):
         field, equals, digits = part.partition("=")
         if not equals:
-            return _byte(name, text)
+            return word(name, text, 0xFF, "a byte (56h, 0x56, 86) or fields (DR=3,PHASE=0)")
         rows = {b.name: b for b in FIELDS.get((group(converter), name), ())}
         bits = rows.get(field)
         if bits is None:
@@ -49,18 +49,11 @@ def changed(converter: str, name: str, value: int, text: str) -> int:
     return value
 
 
-def _byte(name: str, text: str) -> int:
+def word(name: str, text: str, most: int = 0xFFFF, what: str = "a word (A55Ah, 0xA55A, 42330)") -> int:
+    """What a register is to hold: a number up to that of a register on a bus. Raises Wrong."""
     n = number(text)
-    if n is None or n > 0xFF:
-        raise Wrong(expected("a byte (56h, 0x56, 86) or fields (DR=3,PHASE=0)", repr(text), name))
-    return n
-
-
-def word(name: str, text: str) -> int:
-    """A word for a register on a bus: a number up to FFFFh. Raises Wrong."""
-    n = number(text)
-    if n is None or n > 0xFFFF:
-        raise Wrong(expected("a word (A55Ah, 0xA55A, 42330)", repr(text), name))
+    if n is None or n > most:
+        raise Wrong(expected(what, repr(text), name))
     return n
 
 
