@@ -135,9 +135,7 @@ class Unit:
     def stop(self) -> None:
         """Readings stop; SDO still answers (NMT pre-operational). What was on its way has arrived afterwards."""
         self.node.nmt(NMT_PREOP)
-        self.node.read(
-            ERROR_REGISTER
-        )  # readings go before SDO answers on the bus: this one comes after the last of them
+        self.node.read(ERROR_REGISTER)  # readings go before SDO answers on the bus: this comes after the last of them
         self.frames.forget_half()
 
     def reset(self) -> None:

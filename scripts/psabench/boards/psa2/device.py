@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.frames import Form, FrameReader, Frames
-from psabench.boards.registry import DBC_NODE
 from psabench.boards.unit import Unit
 from psabench.errors import LinkError
-from psabench.link.can_host import CanHost
 from psabench.link.protocol_files import message
 from psabench.link.signals import layout
 
@@ -35,9 +33,6 @@ class Psa2(Unit):
     title = "PSA-2"
     reading_s = 0.004
     frames: FrameReader
-
-    def __init__(self, host: CanHost, node_id: int = DBC_NODE) -> None:
-        super().__init__(host, node_id)
 
     def _reader(self, node_id: int) -> FrameReader:
         return FrameReader(node_id)
