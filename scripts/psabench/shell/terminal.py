@@ -155,8 +155,9 @@ class Terminal:
         elif words[0] == "scpi" and "scpi.send" in self.session.vocabulary.commands:
             self._enter_scpi(words[1:])
         else:
-            why = self.session.vocabulary.absent.get(words[0])
-            raise Wrong(f"{words[0]}: not available: {why}" if why is not None else f"{words[0]} takes no argument")
+            absent = self.session.vocabulary.absent.get(words[0])
+            why = f"{words[0]} takes no argument" if absent is None else f"{words[0]}: not available: {absent}"
+            raise Wrong(why)
         return True
 
     def _enter_scpi(self, words: list[str]) -> None:
