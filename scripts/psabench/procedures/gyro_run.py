@@ -20,6 +20,7 @@ from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.result import made_params
 from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth
 
@@ -45,19 +46,12 @@ def _part(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in given.items() if k in kind.__dataclass_fields__}
 
 
-def _made(kind: type[Any], procedure: str, given: Mapping[str, Any]) -> Any:
-    try:
-        return kind(**_part(kind, given))
-    except ValueError as e:
-        raise BadInput(f"{procedure}: {e}") from e
-
-
 def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
-    readings: ReadingParams = _made(ReadingParams, options.procedure, options.params)
+    readings: ReadingParams = made_params(ReadingParams, options.procedure, options.params)
     for name in readings.readings:
         params_of(name, _part(GyrocompassParams, options.params))
-    hold_params = _made(HoldParams, options.procedure, options.params) if _holds(options) else None
+    hold_params = made_params(HoldParams, options.procedure, options.params) if _holds(options) else None
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import expected
+from psabench.errors import BadInput, expected
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate
 from psabench.procedures.head_bench import Reading
 
+Params = TypeVar("Params")
 Array = npt.NDArray[np.float64]
 
 DEG = 180.0 / math.pi
@@ -25,6 +26,14 @@ LIMIT_CI = 2.0  # an estimate is out of limits beyond this many half widths of i
 def option(default: Any, unit: str, text: str) -> Any:
     """A field of a parameter dataclass, with what `--help` says of it."""
     return field(default=default, metadata={"unit": unit, "help": text})
+
+
+def made_params(kind: type[Params], procedure: str, given: Mapping[str, Any]) -> Params:
+    """A dataclass of parameters with those of `given` that it has. Raises BadInput for a value out of range."""
+    try:
+        return kind(**{k: v for k, v in given.items() if k in kind.__dataclass_fields__})  # type: ignore[attr-defined]
+    except ValueError as e:
+        raise BadInput(f"{procedure}: {e}") from e
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

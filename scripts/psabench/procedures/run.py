@@ -20,7 +20,7 @@ from psabench.instruments import EXAMPLES
 from psabench.procedures.head_bench import Progress, Watch
 from psabench.procedures.recording import CsvRecorder
 from psabench.procedures.registry import PROCEDURES, Procedure
-from psabench.procedures.result import ProcedureResult
+from psabench.procedures.result import ProcedureResult, made_params
 from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration as report
@@ -79,7 +79,7 @@ def _conditions(options: RunOptions) -> list[Condition]:
 
 
 def _one(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
-    params = make_params(procedure, options.params or {})
+    params = made_params(procedure.params, procedure.name, options.params or {})
     average = condition.average if options.average is None else options.average
     g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
@@ -109,15 +109,6 @@ def _bench(condition: Condition, options: RunOptions) -> Bench:
     # Every key with its value, and the seed: the run can be repeated from it.
     extra: list[str | Path] = ["--resolved", resolved]
     return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
-
-
-def make_params(procedure: Procedure, given: Mapping[str, Any]) -> Any:
-    """The procedure's parameters with those fields of `given` that it has. Raises BadInput for a value out of range."""
-    known = {k: v for k, v in given.items() if k in procedure.params.__dataclass_fields__}
-    try:
-        return procedure.params(**known)
-    except ValueError as e:
-        raise BadInput(f"{procedure.name}: {e}") from e
 
 
 def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
