@@ -136,14 +136,10 @@ class BusPort(AbstractContextManager["BusPort"]):
 
     def answer(self, timeout_s: float = TIMEOUT_S) -> Cycle | Who:
         """The answer to the oldest line that has none yet."""
-        return parse(self._line(timeout_s))
+        return parse(self.answered(timeout_s))
 
     def answered(self, timeout_s: float = TIMEOUT_S) -> str:
-        """As `answer`, but the line as it is."""
-        return self._line(timeout_s)
-
-    def _line(self, timeout_s: float) -> str:
-        """One line. timeout_s: of real time, or of the bench's time where we move it."""
+        """As `answer`, but the line as it is. timeout_s: of real time, or of the bench's time where we move it."""
         left_s = timeout_s
         while b"\n" not in self._input:
             if len(self._input) > LINE_MAX:
