@@ -76,11 +76,6 @@ static void watch_again(struct trace *t)
     for (const struct trace_sink *s = t->sinks; s; s = s->next) t->watched |= s->mask;
 }
 
-void trace_init(struct trace *t)
-{
-    memset(t, 0, sizeof *t);
-}
-
 unsigned trace_add(struct trace *t, const char *name, bool level)
 {
     assert(t->count < TRACE_SIGNALS_MAX);

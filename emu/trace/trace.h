@@ -35,7 +35,7 @@ static inline uint64_t trace_after(uint64_t level, const struct trace_step *s)
 
 /* Steps in a row whose `lines` are just what changes, provided that all these lines are low before; they are after. */
 struct trace_run {
-    uint64_t at; /* number of the first, counted since trace_init() */
+    uint64_t at; /* number of the first, counted from the beginning */
     unsigned n;
     uint64_t lines;
 };
@@ -65,6 +65,7 @@ struct trace_source {
     void *ctx;
 };
 
+/* All zero before the first signal is added. */
 struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
@@ -72,7 +73,7 @@ struct trace {
     uint64_t watched; /* union of the sinks' masks */
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
-    struct trace_source source;                   /* after trace_init(), by the board; wake may stay NULL */
+    struct trace_source source;                   /* set by the board; wake may stay NULL */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
     uint64_t gone; /* steps delivered */
@@ -83,8 +84,6 @@ struct trace {
     uint32_t late;    /* reports behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */
     uint32_t dropped; /* reports that found pending full */
 };
-
-void trace_init(struct trace *t);
 
 /* Adds a signal with its level at power-on; returns its number. The name is kept by pointer. */
 unsigned trace_add(struct trace *t, const char *name, bool level);

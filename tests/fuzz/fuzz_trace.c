@@ -110,7 +110,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static const char *const names[LINES] = {"Int", "Data", "CLK", "A", "B"};
     static struct world w;
     struct script s = script_of(data, size);
-    trace_init(&w.t);
+    memset(&w.t, 0, sizeof w.t);
     memset(w.ear, 0, sizeof w.ear);
     w.sampler.head = w.sampler.len = 0;
     w.sampling = false;

@@ -45,7 +45,7 @@ static struct bench *up(void)
 {
     struct bench *r = &bench;
     memset(r, 0, sizeof *r);
-    trace_init(&r->t);
+    memset(&r->t, 0, sizeof r->t);
     (void)trace_add(&r->t, "Int", true);
     (void)trace_add(&r->t, "CLK", false);
     (void)trace_add(&r->t, "Other", false);

@@ -20,7 +20,7 @@ static const struct clk mhz8 = {.t0_ns = 0, .hz = 8000000, .div = 1}; /* 125 ns 
 static int fresh(void **state)
 {
     (void)state;
-    trace_init(&trace);
+    memset(&trace, 0, sizeof trace);
     trace_add(&trace, "Res", true);
     trace_add(&trace, "Data", false);
     trace_add(&trace, "CLK", false);
@@ -116,7 +116,7 @@ static void a_slow_reader_loses_the_newest_samples_and_can_see_it(void **state)
 static void a_trace_without_the_lines_is_refused(void **state)
 {
     (void)state;
-    trace_init(&trace);
+    memset(&trace, 0, sizeof trace);
     trace_add(&trace, "Int", true);
     trace_add(&trace, "CLK", false);
     assert_false(sampler_start(&sampler, &trace, names, &mhz8));
@@ -131,7 +131,7 @@ static void a_board_chooses_up_to_seven_lines(void **state)
     static const char *const back[] = {"g", "f", "e", "d", "c", "b", "a", NULL};
     static const uint8_t want[] = {0x2A, 0x6A, 0x68};
     (void)state;
-    trace_init(&trace);
+    memset(&trace, 0, sizeof trace);
     for (unsigned i = 0; i < 8; i++) trace_add(&trace, eight[i], i % 2);
     assert_false(sampler_start(&sampler, &trace, eight, &mhz8));
     assert_null(trace.sinks);

@@ -49,7 +49,7 @@ static void listen(struct ear *e, uint64_t mask)
 static int fresh(void **state)
 {
     (void)state;
-    trace_init(&trace);
+    memset(&trace, 0, sizeof trace);
     trace_add(&trace, "Int", true);
     trace_add(&trace, "Data", false);
     trace_add(&trace, "CLK", false);
@@ -270,7 +270,7 @@ static void runs_are_what_their_steps_are(void **state)
     struct rng g = rng_stream(rig_seed(3), 0, "runs");
     uint64_t whole = 0;
     for (int i = 0; i < 2; i++) {
-        trace_init(&two[i]);
+        memset(&two[i], 0, sizeof two[i]);
         for (int k = 0; k < 3; k++) trace_add(&two[i], "line", false);
         heard[i] = (struct ear){.sink = {.mask = 7, .steps = hear_steps, .ctx = &heard[i]}};
         trace_attach(&two[i], &heard[i].sink);
@@ -300,7 +300,7 @@ static void all_signals_are_delivered(void **state)
 {
     (void)state;
     static const unsigned look[] = {31, 32, 33, 62, 63};
-    trace_init(&trace);
+    memset(&trace, 0, sizeof trace);
     for (unsigned i = 0; i < TRACE_SIGNALS_MAX; i++) assert_int_equal(trace_add(&trace, "line", i == 40), i);
     listen(&ear, TRACE_FIRST(64));
     assert_int_equal(ear.count, 64); /* the levels */
