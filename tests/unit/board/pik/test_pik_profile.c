@@ -34,7 +34,7 @@ static void figures_of_the_article(void **state)
     struct pik_profile p;
     fields_default(&pik_fields, &p);
     assert_true(near(pik_profile_step_v(&p), 10.0 / 3480.0 / (10e3 * 56e-9), 1e-12));
-    assert_true(near(pik_profile_threshold(&p), 3.75 / 5.1314, 1e-4));
+    assert_true(near(p.uc_v / pik_profile_step_v(&p), 3.75 / 5.1314, 1e-4)); /* pulses at which a reset begins */
     assert_int_equal(pik_profile_period_ns(&p), 10000000);
     p.recovery_ticks = 0;
     assert_true(near(pik_profile_limit_hz(&p), 3480.0, 1e-12));
