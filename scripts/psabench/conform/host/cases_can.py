@@ -196,6 +196,7 @@ def _silence(s: HostBench) -> None:
     s.run(0.2)
     s.clear()
     s.run_to_quiet()
+    s.await_read()  # a host that is late would see less of the silence
     s.mark("silent")
     s.fault("link.drop", "a.can", **STREAM)
     s.run(float(row.limit("told_after_s")), speed=1.0)

@@ -18,7 +18,7 @@ from psabench.conform.host.cases_line import LINE_CASES, LineCase, samples
 from psabench.conform.host.cases_units import UNIT_CASES, load_checks
 from psabench.conform.host.check import CaseCheck, HostCapture, case_checks
 from psabench.conform.host.line_waves import form_of
-from psabench.conform.host.stimulus import READY_S, ByHand, HostBench, Program, drain, expand
+from psabench.conform.host.stimulus import READY_S, ByHand, HostBench, Program, expand
 from psabench.conform.host.stimulus_bus import BusBridge
 from psabench.conform.host.stimulus_line import LinePort
 from psabench.conform.profile import variant
@@ -166,7 +166,8 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
         where = {"bus": str(bridge.path)} if bridge else _places(emulator, play.link)
         host = _host(play, case.name, case.title, {**where, "form": str(case.form)})
         stack.callback(host.kill)
-        bench = HostBench(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge)
+        pty = Path(emulator.endpoint(can="slcan")["pty"]) if play.link == "pty" else None
+        bench = HostBench(emulator, control, host, speed=play.speed, node=NODE, bridge=bridge, pty=pty)
         case.before(bench)
         if bridge:
             bench.run(READY_S, speed=0.0)
@@ -177,10 +178,7 @@ def _perform(play: Play, case: Case, scenario: Path, log: Path) -> tuple[int | N
             case.play(bench)
         if bridge:
             bridge.close()
-        if play.link == "pty":
-            begun_s = time.monotonic()
-            drain(Path(emulator.endpoint(can="slcan")["pty"]))
-            bench.stood_s = max(bench.stood_s, time.monotonic() - begun_s)
+        bench.await_read()
         control.close()
         emulator.stop()
         return host.wait(), bench, streamed

@@ -172,6 +172,7 @@ class HostBench:
     speed: float = 1.0
     node: int = 5
     bridge: Bridge | None = None  # where the host is on the board's parallel bus
+    pty: Path | None = None  # where it is on a pseudo-terminal
     stood_s: float = 0.0  # longest that simulated time has stood still against the wall's
     clock: list[tuple[float, float]] = field(default_factory=list)  # simulated and the wall's time, about each step
     marks: dict[str, float] = field(default_factory=dict)  # instants, simulated s, that a check wants to know
@@ -247,6 +248,13 @@ class HostBench:
             if sent - before > busy:
                 return True
         return False
+
+    def await_read(self) -> None:
+        """Until the host has read what was sent, if it is on a pseudo-terminal; simulated time stands still."""
+        if self.pty:
+            begun_s = time.monotonic()
+            drain(self.pty)
+            self.stood_s = max(self.stood_s, time.monotonic() - begun_s)
 
     def sent(self) -> int:
         """CAN frames of the board so far."""
