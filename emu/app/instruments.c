@@ -100,7 +100,7 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
 static bool open_all(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
 {
     for (unsigned k = 0; scpi_kinds[k].name; k++) {
-        if (!scpi_kinds[k].present(all->control->bench)) continue;
+        if (!scpi_present(&scpi_kinds[k], all->control->bench)) continue;
         if (!open_port(all, &scpi_kinds[k], o, k, true, why, cap)) return false;
     }
     return true;
@@ -119,7 +119,7 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
         const struct scpi_kind *kind = scpi_kind(s->kind);
         if (strcmp(s->kind, "all") == 0) continue;
         if (!kind) return why_expected(why, cap, "--scpi", WHY_TEXT(s->arg), "head, table, chamber, supply or all");
-        if (!kind->present(all->control->bench))
+        if (!scpi_present(kind, all->control->bench))
             return why_fail(why, cap, "--scpi %s: expected a scenario with a %s", s->arg, kind->name);
     }
     return true;

@@ -21,20 +21,6 @@ static bool fail_event(const struct scenario *s, const struct scenario_event *e,
     return false;
 }
 
-/* An instrument's commands want the instrument: the section of the scenario that is missing, or NULL. */
-static const char *missing_section(const struct scenario *s, const char *cmd)
-{
-    const struct {
-        const char *prefix, *section;
-        bool there;
-    } rows[] = {{"table.", "table", s->lab.table.axes > 0},
-                {"chamber.", "chamber", s->lab.chamber.present},
-                {"supply.", "supply", s->lab.supply.present}};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        if (!rows[i].there && strncmp(cmd, rows[i].prefix, strlen(rows[i].prefix)) == 0) return rows[i].section;
-    return NULL;
-}
-
 static bool check_event(const struct scenario *s, const struct control_bench *view, const struct scenario_event *e,
                         const char *what, char *why, size_t cap)
 {
@@ -46,9 +32,11 @@ static bool check_event(const struct scenario *s, const struct control_bench *vi
         return fail_event(s, e, what, text, why, cap);
     }
     if (!row->changes) return fail_event(s, e, what, "expected a command that changes the bench", why, cap);
-    const char *section = missing_section(s, e->cmd);
-    if (section) snprintf(text, sizeof text, "expected a section %s in the scenario, got none", section);
-    if (section) return fail_event(s, e, what, text, why, cap);
+    if (row->missing && row->missing(view)) { /* the section has the name of the instrument, as its commands do */
+        const int len = (int)strcspn(e->cmd, ".");
+        snprintf(text, sizeof text, "expected a section %.*s in the scenario, got none", len, e->cmd);
+        return fail_event(s, e, what, text, why, cap);
+    }
     cJSON *args = cJSON_Parse(e->args);
     const bool ok = control_check(control_tables, view, e->cmd, args, text);
     cJSON_Delete(args);

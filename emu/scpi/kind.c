@@ -5,23 +5,10 @@
 
 #define FAR_S 4e9 /* with as much before it the nanoseconds still fit an int64_t */
 
-static uint16_t no_condition(const struct control_bench *b, int64_t t_ns)
-{
-    (void)b;
-    (void)t_ns;
-    return 0;
-}
-
 /* ---- dividing head */
 
-static bool head_present(const struct control_bench *b)
+static int64_t head_over_ns(const struct control_bench *b)
 {
-    return b->lab != NULL;
-}
-
-static int64_t head_over_ns(const struct control_bench *b, int64_t t_ns)
-{
-    (void)t_ns;
     return head_rest_ns(&b->lab->head);
 }
 
@@ -32,11 +19,6 @@ static uint16_t head_operation(const struct control_bench *b, int64_t t_ns)
 
 /* ---- rate table */
 
-static bool table_present(const struct control_bench *b)
-{
-    return b->lab && b->lab->table.cfg.axes > 0;
-}
-
 /* A rate and a sine never end: they are over, for *OPC?, when the axis has reached them. */
 static int64_t axis_over_ns(const struct motion *m)
 {
@@ -46,9 +28,8 @@ static int64_t axis_over_ns(const struct motion *m)
     return over_s < FAR_S ? p->start_ns + (int64_t)(over_s * 1e9) + 1 : INT64_MAX;
 }
 
-static int64_t table_over_ns(const struct control_bench *b, int64_t t_ns)
+static int64_t table_over_ns(const struct control_bench *b)
 {
-    (void)t_ns;
     int64_t over_ns = 0;
     for (unsigned i = 0; i < b->lab->table.cfg.axes; i++) {
         const int64_t ns = axis_over_ns(&b->lab->table.axis[i]);
@@ -59,7 +40,7 @@ static int64_t table_over_ns(const struct control_bench *b, int64_t t_ns)
 
 static uint16_t table_operation(const struct control_bench *b, int64_t t_ns)
 {
-    unsigned bits = table_over_ns(b, t_ns) > t_ns ? SCPI_OPER_SETTLING : 0;
+    unsigned bits = table_over_ns(b) > t_ns ? SCPI_OPER_SETTLING : 0;
     for (unsigned i = 0; i < b->lab->table.cfg.axes; i++) {
         const struct motion *m = &b->lab->table.axis[i];
         const enum motion_mode mode = motion_mode(m);
@@ -70,14 +51,8 @@ static uint16_t table_operation(const struct control_bench *b, int64_t t_ns)
 
 /* ---- thermal chamber */
 
-static bool chamber_present(const struct control_bench *b)
+static int64_t chamber_over_ns(const struct control_bench *b)
 {
-    return b->lab && b->lab->chamber.cfg.present;
-}
-
-static int64_t chamber_over_ns(const struct control_bench *b, int64_t t_ns)
-{
-    (void)t_ns;
     return chamber_stable_ns(&b->lab->chamber);
 }
 
@@ -93,17 +68,6 @@ static uint16_t chamber_questionable(const struct control_bench *b, int64_t t_ns
 
 /* ---- supply */
 
-static bool supply_present(const struct control_bench *b)
-{
-    return b->lab && b->lab->supply.cfg.present;
-}
-
-static int64_t at_once(const struct control_bench *b, int64_t t_ns)
-{
-    (void)b;
-    return t_ns;
-}
-
 /* Output on, but below what the boards need. */
 static uint16_t supply_questionable(const struct control_bench *b, int64_t t_ns)
 {
@@ -112,11 +76,10 @@ static uint16_t supply_questionable(const struct control_bench *b, int64_t t_ns)
 }
 
 const struct scpi_kind scpi_kinds[] = {
-    {"head", "DIVIDING HEAD", "head.", head_present, head_over_ns, head_operation, no_condition},
-    {"table", "RATE TABLE", "table.", table_present, table_over_ns, table_operation, no_condition},
-    {"chamber", "THERMAL CHAMBER", "chamber.", chamber_present, chamber_over_ns, chamber_operation,
-     chamber_questionable},
-    {"supply", "SUPPLY", "supply.", supply_present, at_once, no_condition, supply_questionable},
+    {"head", "DIVIDING HEAD", "head.", head_over_ns, head_operation, NULL},
+    {"table", "RATE TABLE", "table.", table_over_ns, table_operation, NULL},
+    {"chamber", "THERMAL CHAMBER", "chamber.", chamber_over_ns, chamber_operation, chamber_questionable},
+    {"supply", "SUPPLY", "supply.", NULL, NULL, supply_questionable},
     {0},
 };
 

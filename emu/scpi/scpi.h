@@ -16,12 +16,11 @@
 
 /* A kind of instrument. */
 struct scpi_kind {
-    const char *name;   /* of the option, and of the rows: those whose name begins so */
-    const char *model;  /* of *IDN? */
-    const char *module; /* rows of the table that belong to it: "head." */
-    bool (*present)(const struct control_bench *b);
-    int64_t (*rest_ns)(const struct control_bench *b, int64_t t_ns); /* when what was commanded is over: *OPC, *WAI */
-    uint16_t (*operation)(const struct control_bench *b, int64_t t_ns);
+    const char *name;                                  /* of the option, and of the rows: those whose name begins so */
+    const char *model;                                 /* of *IDN? */
+    const char *module;                                /* rows of the table that belong to it: "head." */
+    int64_t (*rest_ns)(const struct control_bench *b); /* when what was commanded is over, *OPC, *WAI; NULL: at once */
+    uint16_t (*operation)(const struct control_bench *b, int64_t t_ns); /* conditions; NULL: it has none */
     uint16_t (*questionable)(const struct control_bench *b, int64_t t_ns);
 };
 
@@ -80,6 +79,9 @@ const struct scpi_command *scpi_common(unsigned i); /* NULL past the last */
 
 /* Whether a row is one of the instrument's. */
 bool scpi_belongs(const struct scpi_kind *kind, const struct control_command *row);
+
+/* Whether the bench has the instrument: its rows say what they need. */
+bool scpi_present(const struct scpi_kind *kind, const struct control_bench *b);
 
 /* How many arguments of the row are suffixes of the header. */
 unsigned scpi_suffixes(const char *pattern);

@@ -53,16 +53,11 @@ static size_t format_text(const char *text, char *out, size_t cap)
     return n;
 }
 
-/* As many digits as always survive the way through a double: 30 degrees are 30, not 29.999999999999996. */
-static size_t format_number(double x, char *out, size_t cap)
-{
-    return (size_t)snprintf(out, cap, "%.15g", x);
-}
-
+/* Numbers with as many digits as always survive the way through a double: 30 degrees are 30, not 29.999999999999996. */
 static size_t format_item(const cJSON *j, char *out, size_t cap)
 {
     if (cJSON_IsBool(j)) return (size_t)snprintf(out, cap, "%d", cJSON_IsTrue(j));
-    if (cJSON_IsNumber(j)) return format_number(j->valuedouble, out, cap);
+    if (cJSON_IsNumber(j)) return (size_t)snprintf(out, cap, "%.15g", j->valuedouble);
     if (cJSON_IsString(j)) return format_text(j->valuestring, out, cap);
     return (size_t)snprintf(out, cap, "9.91E37"); /* not a number: SCPI-99 volume 1, 7.2.1.5 */
 }
@@ -83,9 +78,9 @@ void scpi_put_fields(struct scpi *s, const cJSON *result, const char *fields)
 
 /* ---- waiting for the end of a motion */
 
-static bool is_over(const struct scpi *s, int64_t t_ns)
+static int64_t rest_ns(const struct scpi *s, int64_t t_ns)
 {
-    return s->kind->rest_ns(s->control->bench, t_ns) <= t_ns;
+    return s->kind->rest_ns ? s->kind->rest_ns(s->control->bench) : t_ns;
 }
 
 /* What has waited for the end: *OPC, *OPC?, *WAI. */
@@ -99,8 +94,8 @@ static void end_wait(struct scpi *s)
 
 void scpi_await(struct scpi *s, int64_t t_ns)
 {
-    if (is_over(s, t_ns)) end_wait(s);
-    else sched_at(s->sched, &s->rest, s->kind->rest_ns(s->control->bench, t_ns));
+    if (rest_ns(s, t_ns) <= t_ns) end_wait(s);
+    else sched_at(s->sched, &s->rest, rest_ns(s, t_ns));
 }
 
 bool scpi_busy(const struct scpi *s)
@@ -111,9 +106,9 @@ bool scpi_busy(const struct scpi *s)
 void scpi_look(struct scpi *s, int64_t t_ns)
 {
     const struct control_bench *b = s->control->bench;
-    scpi_condition(&s->status.operation, s->kind->operation(b, t_ns));
-    scpi_condition(&s->status.questionable, s->kind->questionable(b, t_ns));
-    if (s->opc || scpi_busy(s)) sched_at(s->sched, &s->rest, s->kind->rest_ns(b, t_ns));
+    if (s->kind->operation) scpi_condition(&s->status.operation, s->kind->operation(b, t_ns));
+    if (s->kind->questionable) scpi_condition(&s->status.questionable, s->kind->questionable(b, t_ns));
+    if (s->opc || scpi_busy(s)) sched_at(s->sched, &s->rest, rest_ns(s, t_ns));
 }
 
 /* ---- rows */
@@ -126,6 +121,14 @@ bool scpi_asks(const char *pattern)
 bool scpi_belongs(const struct scpi_kind *kind, const struct control_command *row)
 {
     return strncmp(row->name, kind->module, strlen(kind->module)) == 0;
+}
+
+bool scpi_present(const struct scpi_kind *kind, const struct control_bench *b)
+{
+    const struct control_command *row;
+    for (unsigned i = 0; (row = control_row(control_tables, i)); i++)
+        if (scpi_belongs(kind, row) && row->missing && row->missing(b)) return false;
+    return true;
 }
 
 const struct control_command *scpi_find_row(const struct scpi *s, struct scpi_text header, bool query,
