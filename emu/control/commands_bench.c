@@ -19,8 +19,7 @@ static enum control_outcome do_run(const struct control_call *call)
     const int64_t for_ns = (int64_t)nearbyint(call->v[0].real * 1e9);
     if (call->bench->sim.run(call->bench->ctx, for_ns, call->v[1].count, call->control->error.why))
         return CONTROL_LATER;
-    call->control->error.code = "state";
-    return CONTROL_REJECTED;
+    return control_failed(call->control, "state");
 }
 
 static enum control_outcome do_unit_reset(const struct control_call *call)

@@ -18,9 +18,8 @@ static enum control_outcome submit_cycle(struct control *c, struct control_cycle
     }
     c->started = k;
     if (k->client && control_by_step(b) && !b->sim.run(b->ctx, TIMEOUT_NS, 0, c->error.why)) {
-        c->error.code = "state";
         k->client = NULL; /* it goes its way, no client waits */
-        return CONTROL_REJECTED;
+        return control_failed(c, "state");
     }
     return CONTROL_LATER;
 }

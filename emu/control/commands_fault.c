@@ -1,6 +1,6 @@
 /* Commands of faults: what there is, what is wrong now, and what is to go wrong. */
-#include "command/args.h"
 #include "control/commands.h"
+#include "control/describe.h"
 #include "fault/fault.h"
 
 #include <string.h>
@@ -51,24 +51,6 @@ static enum control_outcome do_clear(const struct control_call *call)
 
 /* ---- what there is */
 
-static void add_arg(cJSON *to, enum fault_arg arg, bool optional)
-{
-    const struct control_arg *a = &fault_args[arg];
-    cJSON *j = cJSON_CreateObject();
-    cJSON_AddItemToArray(to, j);
-    cJSON_AddStringToObject(j, "name", a->name);
-    cJSON_AddStringToObject(j, "type", control_type_name(a->type));
-    cJSON_AddBoolToObject(j, "optional", optional);
-    if (a->unit) cJSON_AddStringToObject(j, "unit", a->unit);
-    if (control_type_numeric(a->type)) {
-        cJSON_AddNumberToObject(j, "min", a->min);
-        cJSON_AddNumberToObject(j, "max", a->max);
-        if (a->least > 0.0) cJSON_AddNumberToObject(j, "least", a->least);
-    }
-    if (a->choices) cJSON_AddItemToObject(j, "choices", cJSON_CreateStringArray(a->choices, 2));
-    cJSON_AddStringToObject(j, "what", a->what);
-}
-
 static void add_kind(const struct control_bench *b, const struct fault_kind *k, cJSON *to)
 {
     struct fault_names names;
@@ -83,7 +65,7 @@ static void add_kind(const struct control_bench *b, const struct fault_kind *k, 
     for (unsigned i = 0; i < names.count; i++) cJSON_AddItemToArray(places, cJSON_CreateString(names.name[i]));
     cJSON *args = cJSON_AddArrayToObject(j, "args");
     for (unsigned i = 0; i < FAULT_ARGS; i++) {
-        if ((k->need | k->may) & FAULT_BIT(i)) add_arg(args, (enum fault_arg)i, !(k->need & FAULT_BIT(i)));
+        if ((k->need | k->may) & FAULT_BIT(i)) describe_arg(&fault_args[i], !(k->need & FAULT_BIT(i)), args);
     }
 }
 

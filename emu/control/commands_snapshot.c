@@ -1,29 +1,25 @@
 /* Commands that save the bench or double it. */
 #include "control/commands.h"
 
-static enum control_outcome reject_unavailable(struct control *c)
-{
-    return control_reject(c, "state", "not available on this bench");
-}
+static const char unavailable[] = "not available on this bench";
 
 static enum control_outcome do_snapshot(const struct control_call *call)
 {
-    if (!call->bench->process.snapshot) return reject_unavailable(call->control);
-    call->control->error.code = "state";
-    return call->bench->process.snapshot(call->bench->ctx, call->v[0].text, call->result, call->control->error.why)
-               ? CONTROL_DONE
-               : CONTROL_REJECTED;
+    const struct control_bench *b = call->bench;
+    if (!b->process.snapshot) return control_reject(call->control, "state", unavailable);
+    const bool done = b->process.snapshot(b->ctx, call->v[0].text, call->result, call->control->error.why);
+    return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
 
 static enum control_outcome do_fork(const struct control_call *call)
 {
-    if (!call->bench->process.fork) return reject_unavailable(call->control);
+    const struct control_bench *b = call->bench;
+    if (!b->process.fork) return control_reject(call->control, "state", unavailable);
     const struct control_fork f = {.control = call->v[0].text,
                                    .can = call->v[1].given ? call->v[1].text : "none",
                                    .truth = call->v[2].given ? call->v[2].text : NULL};
-    call->control->error.code = "machine";
-    return call->bench->process.fork(call->bench->ctx, &f, call->result, call->control->error.why) ? CONTROL_DONE
-                                                                                                   : CONTROL_REJECTED;
+    const bool done = b->process.fork(b->ctx, &f, call->result, call->control->error.why);
+    return done ? CONTROL_DONE : control_failed(call->control, "machine");
 }
 
 // clang-format off

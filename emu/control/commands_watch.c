@@ -4,13 +4,6 @@
 
 #include <math.h>
 
-static enum control_outcome from_bench(struct control *c, bool done)
-{
-    if (done) return CONTROL_DONE;
-    c->error.code = "state";
-    return CONTROL_REJECTED;
-}
-
 static bool check_until(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     unsigned event;
@@ -27,7 +20,7 @@ static enum control_outcome do_until(const struct control_call *call)
     if (!control_event_find(b, call->v[1].unit, "event", call->v[0].text, &event, &call->control->error))
         return CONTROL_REJECTED;
     if (!b->sim.run(b->ctx, (int64_t)nearbyint(limit_s * 1e9), call->v[4].count, call->control->error.why))
-        return from_bench(call->control, false);
+        return control_failed(call->control, "state");
     control_watch_until(call->control, event, call->v[1].unit, count);
     return CONTROL_LATER;
 }
@@ -67,19 +60,21 @@ static enum control_outcome do_vcd_start(const struct control_call *call)
 {
     const struct control_bench *b = call->bench;
     if (!b->recording.start || !b->units) return control_reject(call->control, "state", "no recordings on this bench");
-    return from_bench(call->control,
-                      b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, call->control->error.why));
+    const bool done = b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, call->control->error.why);
+    return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
 
 static enum control_outcome do_vcd_stop(const struct control_call *call)
 {
     if (!call->bench->recording.stop) return control_reject(call->control, "state", "no recording");
-    return from_bench(call->control, call->bench->recording.stop(call->bench->ctx, call->control->error.why));
+    const bool done = call->bench->recording.stop(call->bench->ctx, call->control->error.why);
+    return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
 
 static enum control_outcome do_vcd_flush(const struct control_call *call)
 {
-    return from_bench(call->control, call->bench->recording.flush(call->bench->ctx, call->control->error.why));
+    const bool done = call->bench->recording.flush(call->bench->ctx, call->control->error.why);
+    return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
 
 // clang-format off

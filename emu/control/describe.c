@@ -6,12 +6,12 @@
 
 /* ---- commands */
 
-static void describe_arg(const struct control_arg *a, cJSON *list)
+void describe_arg(const struct control_arg *a, bool optional, cJSON *list)
 {
     cJSON *j = cJSON_CreateObject();
     cJSON_AddStringToObject(j, "name", a->name);
     cJSON_AddStringToObject(j, "type", control_type_name(a->type));
-    cJSON_AddBoolToObject(j, "optional", a->optional);
+    cJSON_AddBoolToObject(j, "optional", optional);
     if (control_type_numeric(a->type)) {
         add_real(j, "min", a->min);
         add_real(j, "max", a->max);
@@ -34,7 +34,7 @@ enum control_outcome describe_commands(const struct control_call *call)
         cJSON_AddStringToObject(j, "name", row->name);
         cJSON_AddStringToObject(j, "what", row->what);
         cJSON *args = cJSON_AddArrayToObject(j, "args");
-        for (unsigned k = 0; k < control_arg_count(row); k++) describe_arg(&row->arg[k], args);
+        for (unsigned k = 0; k < control_arg_count(row); k++) describe_arg(&row->arg[k], row->arg[k].optional, args);
         cJSON *scpi = row->scpi[0].header ? cJSON_AddArrayToObject(j, "scpi") : NULL;
         for (unsigned k = 0; k < CONTROL_SCPI_MAX && row->scpi[k].header; k++) {
             cJSON_AddItemToArray(scpi, cJSON_CreateString(row->scpi[k].header));

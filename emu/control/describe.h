@@ -18,6 +18,7 @@ static inline void add_real(cJSON *to, const char *name, double v)
 enum control_outcome describe_commands(const struct control_call *call);
 enum control_outcome describe_units(const struct control_call *call);
 
+void describe_arg(const struct control_arg *a, bool optional, cJSON *list);
 void describe_clients(const struct control_bench *b, cJSON *to);
 void describe_pace(const struct control_bench *b, cJSON *to);
 void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns);

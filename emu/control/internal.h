@@ -2,11 +2,19 @@
 #ifndef PSABENCH_CONTROL_INTERNAL_H
 #define PSABENCH_CONTROL_INTERNAL_H
 
+#include "command/error.h"
 #include "control/control.h"
 
-/* For handlers: remembers why; returns CONTROL_REFUSED. */
-__attribute__((format(printf, 3, 4))) enum control_outcome control_reject(struct control *c, const char *code,
-                                                                          const char *format, ...);
+/* For handlers: notes the error for the reply; gives CONTROL_REJECTED. */
+#define control_reject(c, code, ...)                                                                                   \
+    ((void)control_reject_in(&(c)->error, (code), __VA_ARGS__), (enum control_outcome)CONTROL_REJECTED)
+
+/* The same where the bench has written why. */
+static inline enum control_outcome control_failed(struct control *c, const char *code)
+{
+    c->error.code = code;
+    return CONTROL_REJECTED;
+}
 
 /* The reply, valid until the next one; takes over id and result (NULL: empty). Not ok: the error in c. */
 const char *control_reply(struct control *c, cJSON *id, bool ok, cJSON *result, int64_t t_ns);

@@ -1,19 +1,8 @@
 #include "control/internal.h"
 
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-enum control_outcome control_reject(struct control *c, const char *code, const char *format, ...)
-{
-    va_list ap;
-    va_start(ap, format);
-    vsnprintf(c->error.why, sizeof c->error.why, format, ap);
-    va_end(ap);
-    c->error.code = code;
-    return CONTROL_REJECTED;
-}
 
 static const char *print_reply(struct control *c, cJSON *reply)
 {

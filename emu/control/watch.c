@@ -20,7 +20,8 @@ static void push_event(const struct control_sub *s, const cJSON *event)
         b->process.push(b->ctx, s->client, line);
 }
 
-void control_notify(struct control *c, enum control_topic topic, cJSON *event)
+/* A line to all who subscribed to the topic; takes over the event. */
+static void notify_topic(struct control *c, enum control_topic topic, cJSON *event)
 {
     for (unsigned i = 0; i < CONTROL_SUBS_MAX; i++) {
         const struct control_sub *s = &c->watch.sub[i];
@@ -48,7 +49,7 @@ void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
     cJSON_AddStringToObject(event, "kind", f->kind->name);
     cJSON_AddStringToObject(event, "point", f->name);
     cJSON_AddStringToObject(event, "state", fault_state_name(f->state));
-    control_notify(c, CONTROL_FAULTS, event);
+    notify_topic(c, CONTROL_FAULTS, event);
 }
 
 /* ---- the boards' events */
@@ -63,7 +64,7 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
         cJSON_AddStringToObject(event, "event", c->bench->unit[observer->unit]->type->events[e]);
         cJSON_AddStringToObject(event, "unit", c->bench->unit_name[observer->unit]);
         cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
-        control_notify(c, CONTROL_EVENTS, event);
+        notify_topic(c, CONTROL_EVENTS, event);
     }
     if (!u->active || u->reached || e != u->event || observer->unit != u->unit) return;
     u->reached = ++u->seen == u->count;

@@ -58,9 +58,6 @@ struct control_until control_watch_end(struct control *c);
 bool control_subscribe(struct control *c, void *client, enum control_topic topic, int64_t every_ns, int64_t t_ns);
 void control_unsubscribe(struct control *c, void *client, enum control_topic topic);
 
-/* A line to all who subscribed to the topic; takes over the event. */
-void control_notify(struct control *c, enum control_topic topic, struct cJSON *event);
-
 /* For fault_engine.changed; ctx is the control. */
 struct fault;
 void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns);
