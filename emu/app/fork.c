@@ -105,8 +105,9 @@ static bool make_options(struct child_options *w, const struct options *parent, 
     return options_cans(o, w->can, why, CONTROL_WHY_MAX);
 }
 
-bool fork_service(struct service *s, const struct control_fork *f, cJSON *result, char *why)
+bool service_fork(void *ctx, const struct control_fork *f, cJSON *result, char *why)
 {
+    struct service *s = ctx;
     char text[REPLY_MAX];
     int pipe_fd[2];
     struct child_options *w = malloc(sizeof *w);

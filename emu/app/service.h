@@ -88,6 +88,6 @@ bool service_reopen(struct service *s, const struct options *o, char *why, size_
  * of the parent. Its files are not the parent's: a recording continues in the parent alone.
  * In the parent: adds pid and endpoints to result and returns true, or false with a sentence in why[CONTROL_WHY_MAX]. The
  * child does not return. */
-bool fork_service(struct service *s, const struct control_fork *f, cJSON *result, char *why);
+bool service_fork(void *ctx, const struct control_fork *f, cJSON *result, char *why);
 
 #endif

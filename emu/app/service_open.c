@@ -1,6 +1,8 @@
 /* A service is put together: what the commands may do, the sockets, what the loop calls. */
 #include "app/service.h"
 
+#include "base/why.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,13 +13,9 @@
 static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
 {
     struct service *s = ctx;
-    if (s->o->pace != PACE_STEP) {
-        snprintf(why, CONTROL_WHY_MAX, "run requires --pace step (current pace: %s)", pace_name(s->o->pace));
-        return false;
-    }
-    if (loop_step(&s->loop, for_ns, after_tx)) return true;
-    snprintf(why, CONTROL_WHY_MAX, "another run is in progress");
-    return false;
+    if (s->o->pace != PACE_STEP)
+        return why_fail(why, CONTROL_WHY_MAX, "run requires --pace step (current pace: %s)", pace_name(s->o->pace));
+    return loop_step(&s->loop, for_ns, after_tx) || why_fail(why, CONTROL_WHY_MAX, "another run is in progress");
 }
 
 static void do_run_stop(void *ctx)
@@ -40,11 +38,6 @@ static void do_reply(void *ctx, void *client, const char *line)
 static void do_quit(void *ctx)
 {
     ((struct service *)ctx)->loop.quit = true;
-}
-
-static bool do_fork(void *ctx, const struct control_fork *f, cJSON *result, char *why)
-{
-    return fork_service(ctx, f, result, why);
 }
 
 static bool do_endpoints(void *ctx, cJSON *result)
@@ -89,7 +82,7 @@ static void make_view(struct service *s)
                                                  .push = do_push,
                                                  .reply = do_reply,
                                                  .snapshot = service_snapshot,
-                                                 .fork = do_fork,
+                                                 .fork = service_fork,
                                                  .endpoints = do_endpoints,
                                                  .journal = service_journal}};
     bench_view(b, &s->view);
@@ -126,12 +119,6 @@ static void on_truth_line(void *ctx, struct ctl_client *c, const char *line, int
 {
     struct service *s = ctx;
     ctl_reply(c, control_line(&s->truth, line, t_ns));
-}
-
-static void on_truth_gone(void *ctx, struct ctl_client *c)
-{
-    (void)ctx;
-    (void)c;
 }
 
 /* ---- what the loop calls */
@@ -199,7 +186,7 @@ static void init_service(struct service *s, struct bench *b, const struct option
     s->ports.scpi.control = &s->control;
     s->ports.scpi.sched = &b->sched;
     s->ports.control = (struct ctl_server){.line = on_control_line, .gone = on_control_gone, .ctx = s};
-    s->ports.truth = (struct ctl_server){.line = on_truth_line, .gone = on_truth_gone, .ctx = s};
+    s->ports.truth = (struct ctl_server){.line = on_truth_line, .ctx = s};
     s->loop = (struct loop){.sched = &b->sched,
                             .pace = &s->pace,
                             .links = &s->ports.links,

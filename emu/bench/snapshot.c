@@ -352,20 +352,16 @@ static bool do_command(struct replay *r, const struct journal_entry *e)
     return why_fail(r->why, WHY_MAX, "%s: %s", e->cmd, e->refused ? "expected an error, got success" : c->error.why);
 }
 
-static bool do_watch(struct replay *r, const struct journal_entry *e)
+/* Lines that are observed, or a cycle on its bus. */
+static bool do_unit(struct replay *r, const struct journal_entry *e)
 {
     struct bench *b = r->w->bench;
     if (e->unit >= b->scenario.unit_count)
         return why_fail(r->why, WHY_MAX, "expected a unit of the scenario, got %u", e->unit);
-    attach_observer(r->w->observers, b, e->unit, e->watch);
-    return true;
-}
-
-static bool do_cycle(struct replay *r, const struct journal_entry *e)
-{
-    struct bench *b = r->w->bench;
-    if (e->unit >= b->scenario.unit_count)
-        return why_fail(r->why, WHY_MAX, "expected a unit of the scenario, got %u", e->unit);
+    if (e->kind == JOURNAL_WATCH) {
+        attach_observer(r->w->observers, b, e->unit, e->watch);
+        return true;
+    }
     if (!b->unit[e->unit].type->bus) return why_fail(r->why, WHY_MAX, "expected a unit with a bus, got %u", e->unit);
     (void)bench_cycle(b, e->unit, &(struct bench_cycle){.cycle = e->cycle}, e->t_ns); /* rejected again, if it was */
     return true;
@@ -376,8 +372,7 @@ static bool do_entry(struct replay *r, const struct journal_entry *e)
     struct sched *s = &r->w->bench->sched;
     if (e->t_ns > s->now_ns || e->ran) run_to(r->w, e->t_ns);
     if (e->kind == JOURNAL_COMMAND) return do_command(r, e);
-    if (e->kind == JOURNAL_CYCLE) return do_cycle(r, e);
-    return e->kind == JOURNAL_WATCH ? do_watch(r, e) : do_client(r, e);
+    return e->kind == JOURNAL_WATCH || e->kind == JOURNAL_CYCLE ? do_unit(r, e) : do_client(r, e);
 }
 
 static bool do_all(struct replay *r, const struct snapshot *s)

@@ -38,7 +38,7 @@ static void on_closed(struct text_link *t, int64_t t_ns)
     struct ctl_client *c = (struct ctl_client *)t;
     (void)t_ns;
     c->server->clients--;
-    c->server->gone(c->server->ctx, c);
+    if (c->server->gone) c->server->gone(c->server->ctx, c);
     t->link.gone = true;
 }
 

@@ -19,7 +19,7 @@ struct ctl_server {
     uint32_t clients;
     /* A line of a client; ctl_reply() answers it, now or later. line is NULL for one that was too long. */
     void (*line)(void *ctx, struct ctl_client *c, const char *line, int64_t t_ns);
-    void (*gone)(void *ctx, struct ctl_client *c); /* forget it: no more replies to it */
+    void (*gone)(void *ctx, struct ctl_client *c); /* forget it: no more replies to it; may be NULL */
     void *ctx;
 };
 

@@ -91,6 +91,7 @@ bool yaml_load_value(struct yaml_file *f, const struct yaml_node *node, const st
 {
     void *at = (char *)section + d->offset;
     if (d->load) return d->load(f, node, section);
+    if (d->type == FIELD_CUSTOM) return true; /* read elsewhere */
     if (d->type == FIELD_SECTION) return load_section(f, node, d, section);
     if (d->type == FIELD_REALS || d->type == FIELD_EACH) return load_reals(f, node, d, at);
     if (d->type != FIELD_CHOICE && !yaml_scalar(node))

@@ -42,9 +42,10 @@ static const struct chapter chapters[] = {
 static void print_kind(FILE *out, const struct field *d)
 {
     static const char *const kinds[] = {
-        [FIELD_REAL] = "number",         [FIELD_U8] = "integer", [FIELD_U32] = "integer",     [FIELD_U64] = "integer",
-        [FIELD_BOOL] = "boolean",        [FIELD_TEXT] = "text",  [FIELD_CHOICE] = "one word", [FIELD_REALS] = "list",
-        [FIELD_EACH] = "number or list", [FIELD_LIST] = "list",  [FIELD_SECTION] = "mapping",
+        [FIELD_REAL] = "number",     [FIELD_U8] = "integer",      [FIELD_U32] = "integer",
+        [FIELD_U64] = "integer",     [FIELD_BOOL] = "boolean",    [FIELD_TEXT] = "text",
+        [FIELD_CHOICE] = "one word", [FIELD_REALS] = "list",      [FIELD_EACH] = "number or list",
+        [FIELD_LIST] = "list",       [FIELD_SECTION] = "mapping", [FIELD_CUSTOM] = "see there",
     };
     const char *unit = yaml_unit(d->key);
     fprintf(out, "%s%s%s", d->load ? "see there" : kinds[d->type], *unit ? ", " : "", unit);

@@ -55,15 +55,6 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
     return find_profile(f, profile, name, u);
 }
 
-/* begin_unit() has. */
-static bool already_loaded(struct yaml_file *f, const struct yaml_node *node, void *section)
-{
-    (void)f;
-    (void)node;
-    (void)section;
-    return true;
-}
-
 static void dump_board(const struct field *d, const void *section, cJSON *to)
 {
     cJSON_AddStringToObject(to, d->key, ((const struct scenario_unit *)section)->board->name);
@@ -140,8 +131,8 @@ static const char *const chains[] = {
 static const struct field unit_rows[] = {
     {.key = "name",   .type = FIELD_TEXT, .offset = UNIT(name), .max = 32, .what = "letters, digits and _; with `count` it includes a number format, `%02u`"},
     {.key = "count",  .type = FIELD_CUSTOM, .min = 1, .max = SCENARIO_UNITS_MAX, .load = load_count, .what = "number of equal units; name, node and serial count up"},
-    {.key = "board",  .type = FIELD_CUSTOM, .load = already_loaded, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
-    {.key = "profile", .type = FIELD_CUSTOM, .load = already_loaded, .what = "name in proto/profiles, or a path, relative to the scenario"},
+    {.key = "board",  .type = FIELD_CUSTOM, .dump = dump_board, .what = "type of the board, or a name of one of its profiles: see below"},
+    {.key = "profile", .type = FIELD_CUSTOM, .what = "name in proto/profiles, or a path, relative to the scenario"},
     {.key = "profile_set", .type = FIELD_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
     {.key = "bus",    .type = FIELD_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of the unit's bus (the first)"},
     {.key = "node",   .type = FIELD_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id, unique on a bus (the board's default, or the next free one)"},
