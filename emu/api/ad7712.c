@@ -93,17 +93,10 @@ static double vin_v(void *ctx, unsigned channel, int64_t t_ns)
     return p->kind->inputs >> (2 * channel + 1) & 1 ? v - api_input(p, 2 * channel + 1, t_ns) : v;
 }
 
-static enum ad7712_part part_of(const struct api_kind *k)
-{
-    if (k == &api_ad7710) return AD7712_PART_7710;
-    if (k == &api_ad7711) return AD7712_PART_7711;
-    return k == &api_ad7711a ? AD7712_PART_7711A : AD7712_PART_7712;
-}
-
 static void open_ad7712(struct psabench_part *p)
 {
     struct part_ad7712 *s = (struct part_ad7712 *)p;
-    s->cfg.part = part_of(p->kind);
+    s->cfg.part = (enum ad7712_part)p->kind->variant;
     s->cfg.cells_max = (uint8_t)(s->looks ? 1u << (s->looks - 1) : 0);
     s->cfg.offset_v[1] = s->cfg.offset_v[0];
     s->cfg.gain_error[1] = s->cfg.gain_error[0];
@@ -158,7 +151,11 @@ static const struct api_counter counters[] = {
     .counters = counters, .counter_count = sizeof counters / sizeof *counters, .spi = API_NO_SPI, .open = open_ad7712, \
     .before_input = before_input, .peek = peek_register
 
-const struct api_kind api_ad7710 = {COMMON, .name = "ad7710", .inputs = 0xF, .fn_inputs = 0xF};
-const struct api_kind api_ad7711 = {COMMON, .name = "ad7711", .inputs = 0x7, .fn_inputs = 0x7};
-const struct api_kind api_ad7711a = {COMMON, .name = "ad7711a", .inputs = 0x3, .fn_inputs = 0x3};
-const struct api_kind api_ad7712 = {COMMON, .name = "ad7712", .inputs = 0x7, .fn_inputs = 0x7};
+const struct api_kind api_ad7710 = {COMMON, .name = "ad7710", .variant = AD7712_PART_7710, .inputs = 0xF,
+                                    .fn_inputs = 0xF};
+const struct api_kind api_ad7711 = {COMMON, .name = "ad7711", .variant = AD7712_PART_7711, .inputs = 0x7,
+                                    .fn_inputs = 0x7};
+const struct api_kind api_ad7711a = {COMMON, .name = "ad7711a", .variant = AD7712_PART_7711A, .inputs = 0x3,
+                                     .fn_inputs = 0x3};
+const struct api_kind api_ad7712 = {COMMON, .name = "ad7712", .variant = AD7712_PART_7712, .inputs = 0x7,
+                                    .fn_inputs = 0x7};

@@ -91,7 +91,7 @@ static double ain_v(void *ctx, unsigned ain, int64_t t_ns)
 static void open_ads1256(struct psabench_part *p)
 {
     struct part_ads1256 *s = (struct part_ads1256 *)p;
-    s->cfg.part = p->kind == &api_ads1255 ? ADS1256_PART_1255 : ADS1256_PART_1256;
+    s->cfg.part = (enum ads1256_part)p->kind->variant;
     s->cfg.cells_max = (uint16_t)s->cells_max;
     const struct ads1256_io io = {.ctx = p, .ain_v = ain_v, .source_ohm = api_source(p)};
     ads1256_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
@@ -122,6 +122,8 @@ static const struct api_counter counters[] = {
     .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256,                   \
     .regs = offsetof(struct part_ads1256, chip.regs)
 
-const struct api_kind api_ads1255 = {COMMON, .name = "ads1255", .pin_count = PINS_1255, .inputs = 0x103,
-                                     .fn_inputs = 0x103};
-const struct api_kind api_ads1256 = {COMMON, .name = "ads1256", .pin_count = PINS, .inputs = 0x1FF, .fn_inputs = 0x1FF};
+const struct api_kind api_ads1255 = {
+    COMMON,          .name = "ads1255", .variant = ADS1256_PART_1255, .pin_count = PINS_1255,
+    .inputs = 0x103, .fn_inputs = 0x103};
+const struct api_kind api_ads1256 = {
+    COMMON, .name = "ads1256", .variant = ADS1256_PART_1256, .pin_count = PINS, .inputs = 0x1FF, .fn_inputs = 0x1FF};

@@ -130,7 +130,7 @@ static void on_mclk_fall(void *ctx, int64_t t_ns)
 static void open_ads1282(struct psabench_part *p)
 {
     struct part_ads1282 *s = (struct part_ads1282 *)p;
-    s->cfg.part = p->kind == &api_ads1281 ? ADS1282_PART_1281 : ADS1282_PART_1282;
+    s->cfg.part = (enum ads1282_part)p->kind->variant;
     const struct ads1282_io io = {.ctx = p, .vin_v = vin_v, .mflag = api_ignore_edge, .modulator = on_modulator};
     sched_ev(&s->mclk_fall, on_mclk_fall, s);
     ads1282_init(&s->chip, &s->cfg, &io, &p->bench->sched, api_noise(p, "adc"));
@@ -162,6 +162,7 @@ static const struct api_counter counters[] = {
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",
+                                     .variant = ADS1282_PART_1281,
                                      .options = options_1281,
                                      .option_count = sizeof options_1281 / sizeof *options_1281,
                                      .options_text = OPTIONS_1281(API_OPTION_TEXT),
@@ -170,6 +171,7 @@ const struct api_kind api_ads1281 = {COMMON,
                                      .fn_inputs = 0x1};
 const struct api_kind api_ads1282 = {COMMON,
                                      .name = "ads1282",
+                                     .variant = ADS1282_PART_1282,
                                      .options = options_1282,
                                      .option_count = sizeof options_1282 / sizeof *options_1282,
                                      .options_text = OPTIONS(API_OPTION_TEXT),

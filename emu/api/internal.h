@@ -63,6 +63,7 @@ struct psabench_part {
 };
 
 struct api_vcd;
+struct psa2_profile;
 
 struct psabench {
     struct sched sched;
@@ -108,6 +109,10 @@ void api_ignore_edge(void *ctx, bool level, int64_t t_ns);
 
 /* Sets the options of a new part: the defaults, then the text. False with a sentence in why. */
 bool api_options(struct psabench_part *p, const char *text, char *why, size_t cap);
+
+/* A built-in board profile of the psa2 by its number in the option "profile". False with a sentence in why if no board can
+ * run it. */
+bool api_psa2_profile(unsigned number, struct psa2_profile *p, char *why, size_t cap);
 
 /* " A B C" into list: names of a table whose rows of the size begin with them. */
 void api_list(const void *rows, size_t size, unsigned count, char list[API_WHY]);

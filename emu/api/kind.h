@@ -77,6 +77,7 @@ enum api_spi { API_NO_SPI, API_SPI_MODE0, API_SPI_MODE1 };
 
 struct api_kind {
     const char *name;
+    int variant; /* of the device: which of its family */
     size_t size; /* of the part's struct, whose first member is struct psabench_part */
     const struct api_option *options;
     unsigned option_count;

@@ -1,20 +1,10 @@
 #include "api/internal.h"
 
-#include <stdarg.h>
-#include <stdio.h>
+#include "base/why.h"
+
 #include <string.h>
 
 enum { KEY = 32, VALUE = 64 };
-
-static bool fail_option(char *why, size_t cap, const char *format, ...) __attribute__((format(printf, 3, 4)));
-static bool fail_option(char *why, size_t cap, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    (void)vsnprintf(why, cap, format, args);
-    va_end(args);
-    return false;
-}
 
 /* Digits of a number, the point left out; their count after the point in *decimals. NULL if there are none or too many to
  * be exact in a double. */
@@ -63,8 +53,8 @@ static bool set_number(void *at, const struct api_option *o, const char *text, c
     double v;
     const bool good = parse_number(text, &v) && v >= o->min && v <= o->max;
     if (!good || (o->type == API_UINT && v != (double)(uint32_t)v))
-        return fail_option(why, cap, "option %s: expected %s from %.10g to %.10g, got %s", o->key,
-                           o->type == API_UINT ? "a whole number" : "a number", o->min, o->max, text);
+        return why_fail(why, cap, "option %s: expected %s from %.10g to %.10g, got %s", o->key,
+                        o->type == API_UINT ? "a whole number" : "a number", o->min, o->max, text);
     const uint32_t u = o->type == API_UINT ? (uint32_t)v : 0;
     if (o->type == API_UINT) memcpy(at, &u, sizeof u);
     else memcpy(at, &v, sizeof v);
@@ -74,7 +64,7 @@ static bool set_number(void *at, const struct api_option *o, const char *text, c
 static bool set_bool(void *at, const struct api_option *o, const char *text, char *why, size_t cap)
 {
     if (strcmp(text, "0") != 0 && strcmp(text, "1") != 0)
-        return fail_option(why, cap, "option %s: expected 0 or 1, got %s", o->key, text);
+        return why_fail(why, cap, "option %s: expected 0 or 1, got %s", o->key, text);
     const bool v = text[0] == '1';
     memcpy(at, &v, sizeof v);
     return true;
@@ -93,7 +83,7 @@ static bool set_choice(void *at, const struct api_option *o, const char *text, c
         }
         c = bar ? bar + 1 : NULL;
     }
-    return fail_option(why, cap, "option %s: expected one of %s, got %s", o->key, o->choices, text);
+    return why_fail(why, cap, "option %s: expected one of %s, got %s", o->key, o->choices, text);
 }
 
 static bool set_option(struct psabench_part *p, const struct api_option *o, const char *text, char *why, size_t cap)
@@ -115,7 +105,7 @@ static bool fail_unknown(const struct api_kind *k, const char *key, char *why, s
 {
     char list[API_WHY];
     api_list(k->options, sizeof *k->options, k->option_count, list);
-    return fail_option(why, cap, "option of %s: expected one of%s, got %s", k->name, list, key);
+    return why_fail(why, cap, "option of %s: expected one of%s, got %s", k->name, list, key);
 }
 
 /* One word "key=value". */
@@ -124,14 +114,12 @@ static bool take_word(struct psabench_part *p, const char *word, size_t len, cha
     char key[KEY];
     char value[VALUE];
     const char *equals = memchr(word, '=', len);
-    if (!equals)
-        return fail_option(why, cap, "option: expected key=value, got %.*s", (int)(len < KEY ? len : KEY), word);
+    if (!equals) return why_fail(why, cap, "option: expected key=value, got %.*s", (int)(len < KEY ? len : KEY), word);
     const size_t n = (size_t)(equals - word);
     const size_t m = len - n - 1;
     if (n >= sizeof key || m >= sizeof value)
-        return fail_option(why, cap,
-                           "option: expected a key of up to %d and a value of up to %d characters, got %.*s...",
-                           KEY - 1, VALUE - 1, KEY - 1, word);
+        return why_fail(why, cap, "option: expected a key of up to %d and a value of up to %d characters, got %.*s...",
+                        KEY - 1, VALUE - 1, KEY - 1, word);
     memcpy(key, word, n);
     key[n] = '\0';
     memcpy(value, equals + 1, m);

@@ -1,6 +1,5 @@
-#include "api/psa2.h"
-
 #include "api/internal.h"
+
 #include "board/psa2/psa2.h"
 
 #include <assert.h>
@@ -325,51 +324,48 @@ static int no_access(psabench_part *p, unsigned group, unsigned address, int64_t
     return api_may_move(p->bench, function);
 }
 
-static int result_of(const struct part_psa2 *s, enum psa2_result result, unsigned group, unsigned address)
+static int fail_request(const struct part_psa2 *s, enum psa2_result result, unsigned group, unsigned address)
 {
     static const struct {
         int code;
         const char *text;
     } row[] = {
-        [PSA2_OK] = {PSABENCH_OK, ""},
         [PSA2_NO_SUCH_REG] = {PSABENCH_BAD_ARGUMENT, "no such register in the converter"},
         [PSA2_READ_ONLY] = {PSABENCH_REFUSED, "read-only"},
         [PSA2_BAD_VALUE] = {PSABENCH_REFUSED, "value rejected by the converter"},
         [PSA2_BUSY] = {PSABENCH_TIMEOUT, "not within the time given"},
         [PSA2_TIMEOUT] = {PSABENCH_TIMEOUT, "no data-ready of the converter"},
     };
-    if (result == PSA2_OK) return PSABENCH_OK;
     return api_fail(s->part.bench, row[result].code, "%s: group %u, register %02Xh: %s", s->part.name, group, address,
                     row[result].text);
 }
 
-static struct psa2_request request_of(struct part_psa2 *s, enum psa2_op op, unsigned group, unsigned address)
+/* r: what to do, and the value; the answer is in the part's request afterwards. */
+static int access_register(psabench_part *p, unsigned group, unsigned address, struct psa2_request r,
+                           int64_t timeout_ns, const char *function)
 {
-    return (struct psa2_request){.group = group < 3 ? PSA2_ACCEL : PSA2_TEMP,
-                                 .op = op,
-                                 .addr = (uint8_t)address,
-                                 .done = on_request_done,
-                                 .ctx = s};
+    const int bad = no_access(p, group, address, timeout_ns, function);
+    if (bad) return bad;
+    struct part_psa2 *s = part_of(p);
+    r.group = group < 3 ? PSA2_ACCEL : PSA2_TEMP;
+    r.addr = (uint8_t)address;
+    r.done = on_request_done;
+    r.ctx = s;
+    const enum psa2_result result = carry_out(s, &r, timeout_ns);
+    return result == PSA2_OK ? PSABENCH_OK : fail_request(s, result, group, address);
 }
 
 int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns)
 {
-    const int bad = no_access(p, group, address, timeout_ns, "psabench_board_read()");
-    if (bad) return bad;
-    struct part_psa2 *s = part_of(p);
-    const struct psa2_request r = request_of(s, PSA2_READ_REG, group, address);
-    const int code = result_of(s, carry_out(s, &r, timeout_ns), group, address);
-    return code ? code : s->request.answer[group % 3];
+    const struct psa2_request r = {.op = PSA2_READ_REG};
+    const int code = access_register(p, group, address, r, timeout_ns, "psabench_board_read()");
+    return code ? code : part_of(p)->request.answer[group % 3];
 }
 
 int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value, int64_t timeout_ns)
 {
-    const int bad = no_access(p, group, address, timeout_ns, "psabench_board_write()");
-    if (bad) return bad;
-    struct part_psa2 *s = part_of(p);
-    struct psa2_request r = request_of(s, PSA2_WRITE_REG, group, address);
-    r.value = value;
-    return result_of(s, carry_out(s, &r, timeout_ns), group, address);
+    const struct psa2_request r = {.op = PSA2_WRITE_REG, .value = value};
+    return access_register(p, group, address, r, timeout_ns, "psabench_board_write()");
 }
 
 int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx)

@@ -129,17 +129,13 @@ static void begin_part(struct psabench_part *p, unsigned first_code)
 
 static void put_scope(struct api_vcd *v, const struct psabench_part *p)
 {
-    char code[8];
-    put_text(v, "$scope module ");
-    put_text(v, p->name);
-    put_text(v, " $end\n");
+    char code[8], line[64];
+    (void)snprintf(line, sizeof line, "$scope module %s $end\n", p->name);
+    put_text(v, line);
     for (unsigned i = 0; i < p->kind->pin_count; i++) {
         code_of(p->first_code + i, code);
-        put_text(v, "$var wire 1 ");
-        put_text(v, code);
-        put_text(v, " ");
-        put_text(v, p->kind->pins[i].name);
-        put_text(v, " $end\n");
+        (void)snprintf(line, sizeof line, "$var wire 1 %s %s $end\n", code, p->kind->pins[i].name);
+        put_text(v, line);
     }
     put_text(v, "$upscope $end\n");
 }

@@ -2,7 +2,7 @@
 #include "api_rig.h"
 #include "psa2_profiles.h"
 
-#include "api/psa2.h"
+#include "api/internal.h"
 #include "board/psa2/psa2.h"
 
 struct frames {
