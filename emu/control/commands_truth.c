@@ -53,14 +53,16 @@ static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
     for (unsigned i = 0; i < UNIT_AXES; i++) add_axis(u, i, cJSON_AddObjectToObject(axes, axis[i]), t_ns);
 }
 
-static void add_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)
+static enum control_outcome do_truth(const struct control_call *call)
 {
+    const struct control_bench *b = call->bench;
+    cJSON *to = call->result;
     cJSON_AddStringToObject(to, "scenario", b->scenario);
     add_count(to, "seed", b->seed);
     cJSON *site = cJSON_AddObjectToObject(to, "site");
     add_real(site, "g_mps2", b->lab->head.site.g_mps2);
     cJSON *head = cJSON_AddObjectToObject(to, "head");
-    add_real(head, "angle_rad", head_angle_rad(&b->lab->head, t_ns));
+    add_real(head, "angle_rad", head_angle_rad(&b->lab->head, call->t_ns));
     add_real(head, "setting_error_arcsec_rms", b->lab->head.cfg.setting_error_arcsec_rms);
     add_real(head, "resolution_arcsec", b->lab->head.cfg.resolution_arcsec);
     add_real(head, "periodic_arcsec", b->lab->head.cfg.periodic_arcsec);
@@ -68,8 +70,9 @@ static void add_truth(const struct control_bench *b, cJSON *to, int64_t t_ns)
     add_real(head, "turn_s", b->lab->head.cfg.turn_s);
     cJSON *units = cJSON_AddObjectToObject(to, "units");
     for (unsigned i = 0; i < b->units; i++) {
-        add_unit_truth(b->unit[i], cJSON_AddObjectToObject(units, b->unit[i]->cfg.name), t_ns);
+        add_unit_truth(b->unit[i], cJSON_AddObjectToObject(units, b->unit[i]->cfg.name), call->t_ns);
     }
+    return CONTROL_DONE;
 }
 
 /* ---- state */
@@ -144,8 +147,11 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
     }
 }
 
-static void add_state(const struct control_bench *b, unsigned unit, cJSON *to, int64_t t_ns)
+static enum control_outcome do_state(const struct control_call *call)
 {
+    const struct control_bench *b = call->bench;
+    const int64_t t_ns = call->t_ns;
+    cJSON *to = call->result;
     cJSON *head = cJSON_AddObjectToObject(to, "head");
     add_real(head, "angle_deg", head_angle_rad(&b->lab->head, t_ns) * deg_of_rad);
     cJSON_AddStringToObject(head, "face", head_face_name(head_face(&b->lab->head, t_ns)));
@@ -153,20 +159,7 @@ static void add_state(const struct control_bench *b, unsigned unit, cJSON *to, i
     if (b->lab->chamber.cfg.present) add_real(to, "air_degc", chamber_air_degc(&b->lab->chamber, t_ns));
     if (b->lab->platform.cfg.present) add_platform(b->lab, to, t_ns);
     if (b->lab->supply.cfg.present) add_real(to, "supply_v", supply_volts(&b->lab->supply, t_ns));
-    if (b->units) add_unit_state(b->unit[unit], cJSON_AddObjectToObject(to, "unit"), t_ns);
-}
-
-/* ---- the commands */
-
-static enum control_outcome do_truth(const struct control_call *call)
-{
-    add_truth(call->bench, call->result, call->t_ns);
-    return CONTROL_DONE;
-}
-
-static enum control_outcome do_state(const struct control_call *call)
-{
-    add_state(call->bench, call->v[0].unit, call->result, call->t_ns);
+    if (b->units) add_unit_state(b->unit[call->v[0].unit], cJSON_AddObjectToObject(to, "unit"), t_ns);
     return CONTROL_DONE;
 }
 

@@ -45,7 +45,6 @@ struct control_watch { /* read-only outside watch.c */
     bool listening;
     struct control_until until;
     struct trace_sink probe[CONTROL_UNITS_MAX]; /* keeps the lines of a unit alive once somebody has looked at them */
-    bool probing[CONTROL_UNITS_MAX];
 };
 
 /* run.until: the bench's run_stop() is called at the very instant of the count-th event from now on. */
