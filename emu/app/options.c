@@ -67,9 +67,13 @@ static size_t bus_prefix(const char *arg)
     return arg[n] == '=' && n > 0 ? n + 1 : 0;
 }
 
-// Long: one kind of adapter after the other.
 static bool set_can(const struct target *t, const char *arg)
 {
+    static const struct {
+        const char *word;
+        bool named; /* has to say which interface or file */
+    } kinds[] = {{"socketcand", false}, {"slcan", false}, {"socketcan", true}, {"log", true}}; /* options_can_kind */
+    enum { KINDS = sizeof kinds / sizeof *kinds };
     struct options *o = t->o;
     o->can_given = true;
     if (strcmp(arg, "none") == 0) return true;
@@ -77,26 +81,19 @@ static bool set_can(const struct target *t, const char *arg)
     struct options_can *c = &o->can[o->can_count];
     const char *kind = arg + bus_prefix(arg);
     const char *colon = strchr(kind, ':');
-    const size_t len = colon ? (size_t)(colon - kind) : strlen(kind);
+    const size_t len = strcspn(kind, ":");
     const char *rest = colon && colon[1] ? colon + 1 : NULL;
     uint64_t port = SOCKETCAND_PORT;
     *c = (struct options_can){.arg = rest};
     if (kind > arg) snprintf(c->bus, sizeof c->bus, "%.*s", (int)(kind - arg) - 1, arg);
-    if (len == 10 && strncmp(kind, "socketcand", 10) == 0) {
-        c->kind = OPTIONS_SOCKETCAND;
-        if (rest && !parse_u64(rest, 65535, &port)) {
-            return expected(t, arg, "a port from 0 (any free port) to 65535");
-        }
-        c->port = (uint16_t)port;
-    } else if (len == 5 && strncmp(kind, "slcan", 5) == 0) {
-        c->kind = OPTIONS_SLCAN;
-    } else if (len == 9 && strncmp(kind, "socketcan", 9) == 0 && rest) {
-        c->kind = OPTIONS_SOCKETCAN;
-    } else if (len == 3 && strncmp(kind, "log", 3) == 0 && rest) {
-        c->kind = OPTIONS_CAN_LOG;
-    } else {
+    unsigned k = 0;
+    while (k < KINDS && !(strlen(kinds[k].word) == len && memcmp(kinds[k].word, kind, len) == 0)) k++;
+    if (k == KINDS || (kinds[k].named && !rest))
         return expected(t, arg, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none");
-    }
+    c->kind = (enum options_can_kind)k;
+    if (c->kind == OPTIONS_SOCKETCAND && rest && !parse_u64(rest, 65535, &port))
+        return expected(t, arg, "a port from 0 (any free port) to 65535");
+    c->port = (uint16_t)port;
     o->can_count++;
     return true;
 }

@@ -16,11 +16,6 @@ static const struct {
     {'d', CAN_FD}, {'D', CAN_FD | CAN_EXT}, {'b', CAN_FD | CAN_BRS}, {'B', CAN_FD | CAN_BRS | CAN_EXT},
 };
 
-uint8_t slcan_len(uint8_t dlc)
-{
-    return dlc_len[dlc & 15];
-}
-
 static int kind_of(char letter)
 {
     for (unsigned i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
@@ -54,7 +49,7 @@ enum slcan_err slcan_decode(const char *line, size_t len, struct can_msg *out)
     if (id > (m.flags & CAN_EXT ? 0x1FFFFFFF : 0x7FF)) return SLCAN_ID;
     if (dlc > 8 && !(m.flags & CAN_FD)) return SLCAN_DLC;
     m.id = (uint32_t)id;
-    m.len = slcan_len((uint8_t)dlc);
+    m.len = dlc_len[dlc];
     const size_t head = 1 + id_digits + 1;
     const enum slcan_err err = decode_data(line + head, len - head, &m);
     if (err == SLCAN_OK) *out = m;

@@ -42,7 +42,4 @@ enum {
 /* Status bits that an error message (can_error.h) sets. */
 uint8_t slcan_error_status(const struct can_msg *m);
 
-/* Data length of a DLC, 0..15. */
-uint8_t slcan_len(uint8_t dlc);
-
 #endif

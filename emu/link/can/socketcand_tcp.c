@@ -1,5 +1,6 @@
 #include "link/can/socketcand_tcp.h"
 
+#include "base/why.h"
 #include "link/can/socketcand.h"
 #include "link/tcp.h"
 #include "link/text_link.h"
@@ -57,12 +58,6 @@ static void send_error(struct client *c, uint32_t class, const char *text, int64
     if (n) text_link_put(&c->io, msg, n);
 }
 
-static void reject_message(struct client *c, const char *text, int64_t t_ns)
-{
-    c->can.refused++;
-    send_error(c, SOCKETCAND_REFUSED, text, t_ns);
-}
-
 /* ---- bus to client */
 
 static void tell_lost(struct client *c, int64_t t_ns)
@@ -114,87 +109,72 @@ static void release_hold(struct client *c)
 }
 
 /* With several buses the channel is the name of one. */
-static bool choose_bus(struct client *c, const char *channel, int64_t t_ns)
+static struct can_hub *find_bus(const struct socketcand_server *s, const char *channel, char *why, size_t cap)
 {
-    const struct socketcand_server *s = c->server;
-    char text[160] = "channel: expected";
+    snprintf(why, cap, "channel: expected");
     for (unsigned i = 0; i < s->hubs; i++) {
-        c->hub = &s->hub[i];
-        if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return true;
-        const size_t at = strlen(text);
-        snprintf(text + at, sizeof text - at, "%s %s", i ? "," : "", s->hub[i].name);
+        if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return &s->hub[i];
+        const size_t at = strlen(why);
+        snprintf(why + at, cap - at, "%s %s", i ? "," : "", s->hub[i].name);
     }
-    c->hub = s->hub;
-    reject_message(c, text, t_ns);
-    return false;
+    return NULL;
 }
 
-static void do_open(struct client *c, const struct socketcand_msg *m, int64_t t_ns)
+static bool do_open(struct client *c, const struct socketcand_msg *m, char *why, size_t cap)
 {
-    if (c->phase != PHASE_HELLO) {
-        reject_message(c, "open: a channel is already open", t_ns);
-        return;
-    }
-    if (!choose_bus(c, m->channel, t_ns)) return;
+    if (c->phase != PHASE_HELLO) return why_fail(why, cap, "open: a channel is already open");
+    struct can_hub *hub = find_bus(c->server, m->channel, why, cap);
+    if (!hub) return false;
+    c->hub = hub;
     memcpy(c->can.name, m->channel, sizeof c->can.name);
     c->phase = PHASE_OPEN;
     send_answer(c, "< ok >");
+    return true;
 }
 
-static void do_rawmode(struct client *c, int64_t t_ns)
+static bool do_rawmode(struct client *c, int64_t t_ns, char *why, size_t cap)
 {
-    if (c->phase != PHASE_OPEN) {
-        reject_message(c, c->phase == PHASE_HELLO ? "rawmode: expected open CHANNEL first" : "rawmode: already active",
-                       t_ns);
-        return;
-    }
+    if (c->phase == PHASE_HELLO) return why_fail(why, cap, "rawmode: expected open CHANNEL first");
+    if (c->phase != PHASE_OPEN) return why_fail(why, cap, "rawmode: already active");
     send_answer(c, "< ok >");
     c->io.link.flush(&c->io.link, t_ns); /* now, as a segment of its own */
-    if (c->phase == PHASE_LEAVING) return;
+    if (c->phase == PHASE_LEAVING) return true;
     c->phase = PHASE_HOLD;
     c->io.hold = true;
     c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
     can_hub_join(c->hub, &c->can);
     log_client(c, "connected");
+    return true;
 }
 
-static void do_send(struct client *c, const struct can_msg *m, int64_t t_ns)
+static bool do_send(struct client *c, const struct can_msg *m, int64_t t_ns, char *why, size_t cap)
 {
-    if (!c->can.up) {
-        reject_message(c, "send: expected open CHANNEL and rawmode first", t_ns);
-        return;
-    }
+    if (!c->can.up) return why_fail(why, cap, "send: expected open CHANNEL and rawmode first");
     can_hub_send(c->hub, &c->can, m, t_ns);
+    return true;
+}
+
+/* False with what is wrong in why. */
+static bool do_message(struct client *c, const char *line, size_t len, int64_t t_ns, char *why, size_t cap)
+{
+    struct socketcand_msg m;
+    const enum socketcand_err err = socketcand_decode(line, len, &m);
+    release_hold(c); /* it speaks, so it has read its < ok > */
+    if (err) return why_fail(why, cap, "%s", socketcand_strerror(err));
+    if (m.verb == SOCKETCAND_OPEN) return do_open(c, &m, why, cap);
+    if (m.verb == SOCKETCAND_RAWMODE) return do_rawmode(c, t_ns, why, cap);
+    if (m.verb == SOCKETCAND_SEND) return do_send(c, &m.frame, t_ns, why, cap);
+    send_answer(c, "< echo >");
+    return true;
 }
 
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
 {
     struct client *c = (struct client *)t;
-    struct socketcand_msg m;
-    if (r == LINES_OVERLONG) {
-        reject_message(c, "message: expected at most 200 characters from bracket to bracket", t_ns);
-        return;
-    }
-    const enum socketcand_err err = socketcand_decode(line, len, &m);
-    release_hold(c); /* it speaks, so it has read its < ok > */
-    if (err) {
-        reject_message(c, socketcand_strerror(err), t_ns);
-        return;
-    }
-    switch (m.verb) {
-    case SOCKETCAND_OPEN:
-        do_open(c, &m, t_ns);
-        break;
-    case SOCKETCAND_RAWMODE:
-        do_rawmode(c, t_ns);
-        break;
-    case SOCKETCAND_SEND:
-        do_send(c, &m.frame, t_ns);
-        break;
-    case SOCKETCAND_ECHO:
-        send_answer(c, "< echo >");
-        break;
-    }
+    char why[160] = "message: expected at most 200 characters from bracket to bracket";
+    if (r == LINES_LINE && do_message(c, line, len, t_ns, why, sizeof why)) return;
+    c->can.refused++;
+    send_error(c, SOCKETCAND_REFUSED, why, t_ns);
 }
 
 static bool on_ready(struct text_link *t)

@@ -126,7 +126,11 @@ static void dlc_and_length_follow_the_fd_table(void **state)
     (void)state;
     static const uint8_t len[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64}; /* ISO 11898-1 */
     for (uint8_t dlc = 0; dlc < 16; dlc++) {
-        assert_int_equal(slcan_len(dlc), len[dlc]);
+        char line[5 + 2 * 64 + 1];
+        struct can_msg m;
+        (void)snprintf(line, sizeof line, "d123%X%0*d", dlc, 2 * len[dlc], 0);
+        assert_int_equal(slcan_decode(line, 5u + 2u * len[dlc], &m), SLCAN_OK);
+        assert_int_equal(m.len, len[dlc]);
         assert_int_equal(can_dlc(len[dlc]), dlc);
     }
     assert_int_equal(can_dlc(9), 9); /* the next larger one */
