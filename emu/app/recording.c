@@ -1,8 +1,6 @@
 /* Recordings: VCD files of lines, the log of the truth. */
 #include "app/service.h"
 
-#include "base/why.h"
-
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,18 +16,23 @@ void service_recording_error(struct service *s, const char *what_now)
 static bool do_vcd_flush(void *ctx, char *why)
 {
     struct service *s = ctx;
-    if (!s->bench->recording)
-        return why_fail(why, CONTROL_WHY_MAX, "no recording; start one with --vcd FILE or vcd.start");
-    vcd_flush(&s->bench->vcd);
-    return true;
+    if (s->bench->recording) vcd_flush(&s->bench->vcd);
+    else snprintf(why, CONTROL_WHY_MAX, "no recording; start one with --vcd FILE or vcd.start");
+    return s->bench->recording;
 }
 
 static bool do_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
 {
     struct service *s = ctx;
-    if (s->bench->recording) return why_fail(why, CONTROL_WHY_MAX, "a recording is running; stop it with vcd.stop");
+    if (s->bench->recording) {
+        snprintf(why, CONTROL_WHY_MAX, "a recording is running; stop it with vcd.stop");
+        return false;
+    }
     FILE *file = fopen(path, "wbe");
-    if (!file) return why_fail(why, CONTROL_WHY_MAX, "%.200s: %s", path, strerror(errno));
+    if (!file) {
+        snprintf(why, CONTROL_WHY_MAX, "%.200s: %s", path, strerror(errno));
+        return false;
+    }
     s->ports.vcd = file;
     snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
     return bench_record(s->bench, unit, file, s->o->vcd_unit_ns);
@@ -38,7 +41,10 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
 static bool do_vcd_stop(void *ctx, char *why)
 {
     struct service *s = ctx;
-    if (!s->bench->recording) return why_fail(why, CONTROL_WHY_MAX, "no recording");
+    if (!s->bench->recording) {
+        snprintf(why, CONTROL_WHY_MAX, "no recording");
+        return false;
+    }
     bench_record_end(s->bench);
     service_recording_error(s, "the recording is incomplete");
     fclose(s->ports.vcd);

@@ -1,8 +1,6 @@
 /* A service is put together: what the commands may do, the sockets, what the loop calls. */
 #include "app/service.h"
 
-#include "base/why.h"
-
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -13,9 +11,13 @@
 static bool do_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
 {
     struct service *s = ctx;
-    if (s->o->pace != PACE_STEP)
-        return why_fail(why, CONTROL_WHY_MAX, "run requires --pace step (current pace: %s)", pace_name(s->o->pace));
-    return loop_step(&s->loop, for_ns, after_tx) || why_fail(why, CONTROL_WHY_MAX, "another run is in progress");
+    if (s->o->pace != PACE_STEP) {
+        snprintf(why, CONTROL_WHY_MAX, "run requires --pace step (current pace: %s)", pace_name(s->o->pace));
+        return false;
+    }
+    if (loop_step(&s->loop, for_ns, after_tx)) return true;
+    snprintf(why, CONTROL_WHY_MAX, "another run is in progress");
+    return false;
 }
 
 static void do_run_stop(void *ctx)

@@ -1,6 +1,5 @@
 #include "link/can/socketcand_tcp.h"
 
-#include "base/why.h"
 #include "link/can/socketcand.h"
 #include "link/tcp.h"
 #include "link/text_link.h"
@@ -108,73 +107,72 @@ static void release_hold(struct client *c)
     c->io.hold = false;
 }
 
-/* With several buses the channel is the name of one. */
-static struct can_hub *find_bus(const struct socketcand_server *s, const char *channel, char *why, size_t cap)
+enum { WHY_MAX = 160 };
+
+/* With several buses the channel is the name of one. NULL with what is wrong in why. */
+static struct can_hub *find_bus(const struct socketcand_server *s, const char *channel, char why[WHY_MAX])
 {
-    snprintf(why, cap, "channel: expected");
+    snprintf(why, WHY_MAX, "channel: expected");
     for (unsigned i = 0; i < s->hubs; i++) {
         if (s->hubs == 1 || strcmp(s->hub[i].name, channel) == 0) return &s->hub[i];
         const size_t at = strlen(why);
-        snprintf(why + at, cap - at, "%s %s", i ? "," : "", s->hub[i].name);
+        snprintf(why + at, WHY_MAX - at, "%s %s", i ? "," : "", s->hub[i].name);
     }
     return NULL;
 }
 
-static bool do_open(struct client *c, const struct socketcand_msg *m, char *why, size_t cap)
+/* ---- what a client says: each returns NULL, or what is wrong */
+
+static const char *do_open(struct client *c, const struct socketcand_msg *m, char why[WHY_MAX])
 {
-    if (c->phase != PHASE_HELLO) return why_fail(why, cap, "open: a channel is already open");
-    struct can_hub *hub = find_bus(c->server, m->channel, why, cap);
-    if (!hub) return false;
+    if (c->phase != PHASE_HELLO) return "open: a channel is already open";
+    struct can_hub *hub = find_bus(c->server, m->channel, why);
+    if (!hub) return why;
     c->hub = hub;
     memcpy(c->can.name, m->channel, sizeof c->can.name);
     c->phase = PHASE_OPEN;
     send_answer(c, "< ok >");
-    return true;
+    return NULL;
 }
 
-static bool do_rawmode(struct client *c, int64_t t_ns, char *why, size_t cap)
+static const char *do_rawmode(struct client *c, int64_t t_ns)
 {
-    if (c->phase == PHASE_HELLO) return why_fail(why, cap, "rawmode: expected open CHANNEL first");
-    if (c->phase != PHASE_OPEN) return why_fail(why, cap, "rawmode: already active");
+    if (c->phase == PHASE_HELLO) return "rawmode: expected open CHANNEL first";
+    if (c->phase != PHASE_OPEN) return "rawmode: already active";
     send_answer(c, "< ok >");
     c->io.link.flush(&c->io.link, t_ns); /* now, as a segment of its own */
-    if (c->phase == PHASE_LEAVING) return true;
+    if (c->phase == PHASE_LEAVING) return NULL;
     c->phase = PHASE_HOLD;
     c->io.hold = true;
     c->io.link.timer_ms = SOCKETCAND_HOLD_MS;
     can_hub_join(c->hub, &c->can);
     log_client(c, "connected");
-    return true;
+    return NULL;
 }
 
-static bool do_send(struct client *c, const struct can_msg *m, int64_t t_ns, char *why, size_t cap)
-{
-    if (!c->can.up) return why_fail(why, cap, "send: expected open CHANNEL and rawmode first");
-    can_hub_send(c->hub, &c->can, m, t_ns);
-    return true;
-}
-
-/* False with what is wrong in why. */
-static bool do_message(struct client *c, const char *line, size_t len, int64_t t_ns, char *why, size_t cap)
+static const char *do_message(struct client *c, const char *line, size_t len, int64_t t_ns, char why[WHY_MAX])
 {
     struct socketcand_msg m;
     const enum socketcand_err err = socketcand_decode(line, len, &m);
     release_hold(c); /* it speaks, so it has read its < ok > */
-    if (err) return why_fail(why, cap, "%s", socketcand_strerror(err));
-    if (m.verb == SOCKETCAND_OPEN) return do_open(c, &m, why, cap);
-    if (m.verb == SOCKETCAND_RAWMODE) return do_rawmode(c, t_ns, why, cap);
-    if (m.verb == SOCKETCAND_SEND) return do_send(c, &m.frame, t_ns, why, cap);
-    send_answer(c, "< echo >");
-    return true;
+    if (err) return socketcand_strerror(err);
+    if (m.verb == SOCKETCAND_OPEN) return do_open(c, &m, why);
+    if (m.verb == SOCKETCAND_RAWMODE) return do_rawmode(c, t_ns);
+    if (m.verb == SOCKETCAND_SEND && !c->can.up) return "send: expected open CHANNEL and rawmode first";
+    if (m.verb == SOCKETCAND_SEND) can_hub_send(c->hub, &c->can, &m.frame, t_ns);
+    else send_answer(c, "< echo >");
+    return NULL;
 }
 
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
 {
     struct client *c = (struct client *)t;
-    char why[160] = "message: expected at most 200 characters from bracket to bracket";
-    if (r == LINES_LINE && do_message(c, line, len, t_ns, why, sizeof why)) return;
+    char why[WHY_MAX];
+    const char *error = r == LINES_OVERLONG ? "message: expected at most 200 characters from bracket to bracket"
+                                            : do_message(c, line, len, t_ns, why);
+    if (!error) return;
     c->can.refused++;
-    send_error(c, SOCKETCAND_REFUSED, why, t_ns);
+    send_error(c, SOCKETCAND_REFUSED, error, t_ns);
 }
 
 static bool on_ready(struct text_link *t)
