@@ -342,7 +342,7 @@ void ports_ready(const struct ports *p, const struct options *o, FILE *out)
     fflush(out);
 }
 
-bool ports_logs_whole(struct ports *p, void (*say)(void *ctx, const char *text))
+bool ports_logs_whole(struct ports *p, void (*say)(const char *text))
 {
     bool whole = true;
     for (unsigned i = 0; i < p->can_count; i++) {
@@ -350,7 +350,7 @@ bool ports_logs_whole(struct ports *p, void (*say)(void *ctx, const char *text))
         const int err = p->can[i]->kind == OPTIONS_CAN_LOG ? can_log_flush(&p->can[i]->log) : 0;
         if (!err) continue;
         snprintf(text, sizeof text, "--can log:%.400s: %s; it is not complete", p->can[i]->log.path, strerror(-err));
-        say(NULL, text);
+        say(text);
         whole = false;
     }
     return whole;

@@ -61,7 +61,7 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
 void ports_ready(const struct ports *p, const struct options *o, FILE *out);
 
 /* What the logs of frames still hold goes into their files; false when one of them is not complete, which is said. */
-bool ports_logs_whole(struct ports *p, void (*say)(void *ctx, const char *text));
+bool ports_logs_whole(struct ports *p, void (*say)(const char *text));
 
 void ports_close(struct ports *p);
 

@@ -14,9 +14,8 @@ static void on_signal(int number)
     stop_signal = number;
 }
 
-void service_say(void *ctx, const char *text)
+void service_say(const char *text)
 {
-    (void)ctx;
     fprintf(stderr, "psa-emu: %s\n", text);
 }
 

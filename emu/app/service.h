@@ -58,8 +58,8 @@ int service_live(struct service *s);
 
 /* ---- for the files of the service */
 
-void service_say(void *ctx, const char *text); /* on stderr */
-void service_power_up(struct service *s);      /* bench, faults and timeline of the scenario */
+void service_say(const char *text);       /* on stderr */
+void service_power_up(struct service *s); /* bench, faults and timeline of the scenario */
 
 /* clients.c */
 extern const struct control_clients service_clients;

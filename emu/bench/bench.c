@@ -62,7 +62,6 @@ static void init_bus(struct bench *b, unsigned i)
 static void switch_units(struct bench *b, bool on, int64_t t_ns)
 {
     b->fed = on;
-    b->brownouts += !on;
     for (unsigned i = 0; i < b->scenario.unit_count; i++) {
         if (on) unit_power_up(&b->unit[i], t_ns);
         else unit_power_down(&b->unit[i], t_ns);

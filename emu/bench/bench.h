@@ -32,7 +32,6 @@ struct bench {
     unsigned buses;
     struct lab lab;
     bool fed;                                                                /* the supply feeds the boards */
-    uint32_t brownouts;                                                      /* times that it ceased to */
     struct sched_ev power;                                                   /* the next change of that */
     struct can_node monitor[SCENARIO_BUSES_MAX];                             /* hear every frame */
     void (*on_frame)(void *ctx, const struct can_msg *m, int64_t t_ns);      /* of the monitor; may be NULL */

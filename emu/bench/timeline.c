@@ -61,8 +61,7 @@ static void carry_out(struct timeline *t, const struct scenario_event *e, const 
     if (control_call(&t->control, e->cmd, args, result, t_ns) == CONTROL_REJECTED) {
         char why[CONTROL_WHY_MAX + 640];
         fail_event(&t->bench->scenario, e, what, t->control.error.why, why, sizeof why);
-        t->refused++;
-        t->say(t->say_ctx, why);
+        t->say(why);
     }
     cJSON_Delete(result);
     cJSON_Delete(args);
@@ -99,7 +98,7 @@ void timeline_start(struct timeline *t, struct bench *b, const struct control_be
     t->bench = b;
     t->view = *view;
     t->view.process.journal = NULL;
-    t->next = t->refused = 0;
+    t->next = 0;
     control_init(&t->control, control_tables, &t->view);
     put_in_order(t);
     for (unsigned i = 0; i < s->faults.count; i++) carry_out(t, &s->faults.event[i], "faults", 0);

@@ -15,15 +15,13 @@ struct timeline {
     struct sched_ev ev;
     unsigned order[SCENARIO_EVENTS_MAX]; /* by time, then as written */
     unsigned next;
-    uint32_t refused;
-    void (*say)(void *ctx, const char *text); /* an entry was rejected: one line */
-    void *say_ctx;
+    void (*say)(const char *text); /* an entry was rejected: one line */
 };
 
 /* Whether the entries are commands that change the bench, with such arguments. False with file:line:column in why. */
 bool timeline_check(struct bench *b, char *why, size_t cap);
 
-/* At power-on, after bench_power_up(): gives the faults and arms the first entry. say and say_ctx have been filled in. */
+/* At power-on, after bench_power_up(): gives the faults and arms the first entry. say has been filled in. */
 void timeline_start(struct timeline *t, struct bench *b, const struct control_bench *view);
 
 #endif

@@ -45,9 +45,8 @@ struct world {
 
 /* ---- what the adapters call ---- */
 
-static void say(void *ctx, const char *text)
+static void say(const char *text)
 {
-    (void)ctx;
     assert(text[0] && !strchr(text, '\n'));
 }
 

@@ -51,8 +51,7 @@ struct can_hub {
     uint32_t *connections; /* counter of all hubs of the bench; NULL: this is the only hub */
     bool lossless;    /* step and free pace: output is kept and time waits; wall pace: a slow client loses frames */
     int64_t epoch_ns; /* added to the simulated time in time stamps */
-    void (*say)(void *ctx, const char *text); /* a line for the log: a client joined, left, lost frames */
-    void *say_ctx;
+    void (*say)(const char *text); /* a line for the log: a client joined, left, lost frames */
     struct can_hub_tap tap;
     /* read-only outside can/can_hub.c */
     struct can_client *clients; /* detached ones included */

@@ -17,7 +17,7 @@ static void send_reply(struct slcan_pty *s, const char *text)
 
 static void log_line(const struct slcan_pty *s, const char *text)
 {
-    s->hub->say(s->hub->say_ctx, text);
+    s->hub->say(text);
 }
 
 /* ---- bus to client */

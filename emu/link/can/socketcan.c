@@ -18,7 +18,7 @@ static void log_line(const struct socketcan *s, const char *what)
 {
     char line[128];
     snprintf(line, sizeof line, "socketcan: %s: %s", s->can.name, what);
-    s->hub->say(s->hub->say_ctx, line);
+    s->hub->say(line);
 }
 
 /* ---- our frame and the kernel's */

@@ -40,7 +40,7 @@ static void log_client(const struct client *c, const char *what)
 {
     char line[160];
     snprintf(line, sizeof line, "socketcand: client %s: %s", c->can.name[0] ? c->can.name : "(no channel)", what);
-    c->hub->say(c->hub->say_ctx, line);
+    c->hub->say(line);
 }
 
 /* Before rawmode a client compares answers for equality: no padding. */

@@ -14,7 +14,6 @@ static void reject_request(struct bus_pty *p, const struct bus_request *r, unsig
                            int64_t t_ns)
 {
     char text[BUS_TEXT_MAX];
-    p->refused++;
     put_text(p, text, bus_text_refused(r, fields, code, t_ns, text));
 }
 
@@ -64,7 +63,6 @@ void bus_pty_done(struct bus_pty *p, uint16_t data, int64_t t_ns)
     char text[BUS_TEXT_MAX];
     if (!p->busy) return;
     p->busy = false;
-    p->cycles++;
     if (!p->orphan) put_text(p, text, bus_text_done(&p->request, data, t_ns, text));
 }
 

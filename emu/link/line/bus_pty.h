@@ -28,8 +28,7 @@ struct bus_pty {
     struct bus_pty_ops ops;
     struct bus_request request; /* under way */
     bool busy;
-    bool orphan;              /* its client has left: another one gets no answer to it */
-    uint32_t cycles, refused; /* carried out; answered with E */
+    bool orphan; /* its client has left: another one gets no answer to it */
 };
 
 /* 0, or -errno. The struct must not move afterwards. name: symbolic link, may be NULL; kept by pointer. */

@@ -23,7 +23,6 @@ static void on_flush(struct link *l, int64_t t_ns)
         const ssize_t n = write(l->fd, p->buf + p->pos, p->len - p->pos);
         if (n <= 0) break; /* full: POLLOUT tells when to go on */
         p->pos += (size_t)n;
-        p->sent += (uint64_t)n;
     }
     refresh_link(p);
 }
@@ -41,7 +40,6 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     struct line_pty *p = ctx;
     if (p->sampling) p->source.stop(p->source.ctx);
     p->pos = p->len = 0;
-    p->sent = 0;
     pty_discard(&p->pty);
     p->sampling = open && p->source.start(p->source.ctx, t_ns);
     refresh_link(p);
@@ -54,7 +52,6 @@ int line_pty_open(struct line_pty *p, struct links *links, const struct line_sou
     p->source = *source;
     p->sampling = false;
     p->pos = p->len = 0;
-    p->sent = 0;
     p->link = (struct link){.fd = p->pty.master, .want_read = true, .readable = on_readable, .flush = on_flush};
     p->pty.opened = on_opened;
     p->pty.ctx = p;

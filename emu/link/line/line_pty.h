@@ -22,7 +22,6 @@ struct line_pty {
     struct pty pty;
     struct line_source source;
     bool sampling;
-    uint64_t sent;      /* bytes handed to the kernel since the port was opened */
     uint8_t buf[65536]; /* taken from the source, not yet written */
     size_t pos, len;
 };

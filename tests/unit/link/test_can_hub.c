@@ -28,9 +28,8 @@ struct bench {
 
 static struct bench bench;
 
-static void say(void *ctx, const char *text)
+static void say(const char *text)
 {
-    (void)ctx;
     (void)text;
 }
 
