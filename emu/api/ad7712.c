@@ -146,9 +146,8 @@ static const struct api_counter counters[] = {
 #undef G
 
 #define COMMON                                                                                                         \
-    .size = sizeof(struct part_ad7712), .options = options, .option_count = sizeof options / sizeof *options,          \
-    .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .pin_count = sizeof pins / sizeof *pins,                   \
-    .counters = counters, .counter_count = sizeof counters / sizeof *counters, .spi = API_NO_SPI, .open = open_ad7712, \
+    .size = sizeof(struct part_ad7712), .options = API_ROWS(options), .options_text = OPTIONS(API_OPTION_TEXT),        \
+    .pins = API_ROWS(pins), .counters = API_ROWS(counters), .spi = API_NO_SPI, .open = open_ad7712,                    \
     .before_input = before_input, .peek = peek_register
 
 const struct api_kind api_ad7710 = {COMMON, .name = "ad7710", .variant = AD7712_PART_7710, .inputs = 0xF,

@@ -117,9 +117,8 @@ static const struct api_counter counters[] = {
 #undef R
 
 #define COMMON                                                                                                         \
-    .size = sizeof(struct part_ads1256), .options = options, .option_count = sizeof options / sizeof *options,         \
-    .options_text = OPTIONS(API_OPTION_TEXT), .pins = pins, .counters = counters,                                      \
-    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE1, .open = open_ads1256,                   \
+    .size = sizeof(struct part_ads1256), .options = API_ROWS(options), .options_text = OPTIONS(API_OPTION_TEXT),       \
+    .pins = pins, .counters = API_ROWS(counters), .spi = API_SPI_MODE1, .open = open_ads1256,                          \
     .regs = offsetof(struct part_ads1256, chip.regs)
 
 const struct api_kind api_ads1255 = {

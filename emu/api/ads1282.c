@@ -156,15 +156,13 @@ static const struct api_counter counters[] = {
 #undef R
 
 #define COMMON                                                                                                         \
-    .size = sizeof(struct part_ads1282), .pins = pins, .counters = counters,                                           \
-    .counter_count = sizeof counters / sizeof *counters, .spi = API_SPI_MODE0, .open = open_ads1282,                   \
-    .before_input = before_input, .regs = offsetof(struct part_ads1282, chip.regs)
+    .size = sizeof(struct part_ads1282), .pins = pins, .counters = API_ROWS(counters), .spi = API_SPI_MODE0,           \
+    .open = open_ads1282, .before_input = before_input, .regs = offsetof(struct part_ads1282, chip.regs)
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",
                                      .variant = ADS1282_PART_1281,
-                                     .options = options_1281,
-                                     .option_count = sizeof options_1281 / sizeof *options_1281,
+                                     .options = API_ROWS(options_1281),
                                      .options_text = OPTIONS_1281(API_OPTION_TEXT),
                                      .pin_count = PINS,
                                      .inputs = 0x1,
@@ -172,8 +170,7 @@ const struct api_kind api_ads1281 = {COMMON,
 const struct api_kind api_ads1282 = {COMMON,
                                      .name = "ads1282",
                                      .variant = ADS1282_PART_1282,
-                                     .options = options_1282,
-                                     .option_count = sizeof options_1282 / sizeof *options_1282,
+                                     .options = API_ROWS(options_1282),
                                      .options_text = OPTIONS(API_OPTION_TEXT),
                                      .pin_count = PINS_1282,
                                      .inputs = 0x3,

@@ -73,6 +73,9 @@ struct api_counter {
         .name = #member, .get = (member)                                                                               \
     }
 
+/* A table, and how many rows it has in the member after it. */
+#define API_ROWS(rows) (rows), sizeof(rows) / sizeof *(rows)
+
 enum api_spi { API_NO_SPI, API_SPI_MODE0, API_SPI_MODE1 };
 
 struct api_kind {

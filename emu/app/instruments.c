@@ -97,19 +97,15 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
 }
 
 /* `all` are those that the scenario has, each at an offset of its own whatever else there is. */
-static bool open_all(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
+static bool open_ports(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
 {
+    const bool many = strcmp(o->kind, "all") == 0;
     for (unsigned k = 0; scpi_kinds[k].name; k++) {
-        if (!scpi_present(&scpi_kinds[k], all->control->bench)) continue;
-        if (!open_port(all, &scpi_kinds[k], o, k, true, why, cap)) return false;
+        const struct scpi_kind *kind = &scpi_kinds[k];
+        const bool wanted = many ? scpi_present(kind, all->control->bench) : strcmp(kind->name, o->kind) == 0;
+        if (wanted && !open_port(all, kind, o, many ? k : 0, many, why, cap)) return false;
     }
     return true;
-}
-
-static bool open_one(struct instruments *all, const struct options_scpi *o, char *why, size_t cap)
-{
-    if (strcmp(o->kind, "all") == 0) return open_all(all, o, why, cap);
-    return open_port(all, scpi_kind(o->kind), o, 0, false, why, cap);
 }
 
 bool instruments_check(const struct instruments *all, const struct options *o, char *why, size_t cap)
@@ -128,7 +124,7 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
 bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap)
 {
     for (unsigned i = 0; i < o->scpi_count; i++) {
-        if (!open_one(all, &o->scpi[i], why, cap)) return false;
+        if (!open_ports(all, &o->scpi[i], why, cap)) return false;
     }
     return true;
 }

@@ -5,20 +5,12 @@
 
 #include <string.h>
 
-static bool is_among(const char *const *names, unsigned n, const char *name)
-{
-    for (unsigned i = 0; i < n; i++) {
-        if (strcmp(names[i], name) == 0) return true;
-    }
-    return false;
-}
-
 /* Whether a type before this one in the list has an event of that name. */
 static bool met_before(const struct board_type *const *type, const char *name)
 {
-    for (const struct board_type *const *t = board_types; t < type; t++) {
-        if (is_among((*t)->events, (*t)->event_count, name)) return true;
-    }
+    for (const struct board_type *const *t = board_types; t < type; t++)
+        for (unsigned i = 0; i < (*t)->event_count; i++)
+            if (strcmp((*t)->events[i], name) == 0) return true;
     return false;
 }
 
