@@ -54,8 +54,7 @@ static enum control_outcome do_clear(const struct control_call *call)
 static void add_kind(const struct control_bench *b, const struct fault_kind *k, cJSON *to)
 {
     struct fault_names names;
-    cJSON *j = cJSON_CreateObject();
-    cJSON_AddItemToArray(to, j);
+    cJSON *j = add_object(to);
     cJSON_AddStringToObject(j, "kind", k->name);
     cJSON_AddStringToObject(j, "what", k->what);
     cJSON_AddStringToObject(j, "seen", k->seen);
@@ -138,9 +137,7 @@ static enum control_outcome do_list(const struct control_call *call)
             if (f->id > last && (!next || f->id < next->id)) next = f;
         }
         if (!next) break;
-        cJSON *j = cJSON_CreateObject();
-        fault_describe(next, j);
-        cJSON_AddItemToArray(faults, j);
+        fault_describe(next, add_object(faults));
     }
     return CONTROL_DONE;
 }

@@ -84,11 +84,10 @@ static void add_table(const struct lab *l, cJSON *to, int64_t t_ns)
     cJSON *list = cJSON_AddArrayToObject(to, "table");
     for (unsigned i = 0; i < l->table.cfg.axes; i++) {
         const struct motion_state s = table_axis(&l->table, i, t_ns);
-        cJSON *j = cJSON_CreateObject();
+        cJSON *j = add_object(list);
         add_real(j, "angle_deg", s.angle_rad * deg_of_rad);
         add_real(j, "rate_dps", s.rate_radps * deg_of_rad);
         add_real(j, "accel_dps2", s.accel_radps2 * deg_of_rad);
-        cJSON_AddItemToArray(list, j);
     }
 }
 

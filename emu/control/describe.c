@@ -8,7 +8,7 @@
 
 void describe_arg(const struct control_arg *a, bool optional, cJSON *list)
 {
-    cJSON *j = cJSON_CreateObject();
+    cJSON *j = add_object(list);
     cJSON_AddStringToObject(j, "name", a->name);
     cJSON_AddStringToObject(j, "type", control_type_name(a->type));
     cJSON_AddBoolToObject(j, "optional", optional);
@@ -22,7 +22,6 @@ void describe_arg(const struct control_arg *a, bool optional, cJSON *list)
     cJSON *choices = word ? cJSON_AddArrayToObject(j, "choices") : NULL;
     for (unsigned i = 1; word; word = control_choice(a, i++)) cJSON_AddItemToArray(choices, cJSON_CreateString(word));
     cJSON_AddStringToObject(j, "what", a->what);
-    cJSON_AddItemToArray(list, j);
 }
 
 enum control_outcome describe_commands(const struct control_call *call)
@@ -30,7 +29,7 @@ enum control_outcome describe_commands(const struct control_call *call)
     cJSON *list = cJSON_AddArrayToObject(call->result, "commands");
     const struct control_command *row;
     for (unsigned i = 0; (row = control_row(call->control->tables, i)); i++) {
-        cJSON *j = cJSON_CreateObject();
+        cJSON *j = add_object(list);
         cJSON_AddStringToObject(j, "name", row->name);
         cJSON_AddStringToObject(j, "what", row->what);
         cJSON *args = cJSON_AddArrayToObject(j, "args");
@@ -39,7 +38,6 @@ enum control_outcome describe_commands(const struct control_call *call)
         for (unsigned k = 0; k < CONTROL_SCPI_MAX && row->scpi[k].header; k++) {
             cJSON_AddItemToArray(scpi, cJSON_CreateString(row->scpi[k].header));
         }
-        cJSON_AddItemToArray(list, j);
     }
     return CONTROL_DONE;
 }
@@ -60,12 +58,11 @@ void describe_clients(const struct control_bench *b, cJSON *to)
     struct control_client k;
     cJSON *list = cJSON_AddArrayToObject(to, "clients");
     for (unsigned i = 0; b->clients.nth(b->ctx, i, &k); i++) {
-        cJSON *j = cJSON_CreateObject();
+        cJSON *j = add_object(list);
         cJSON_AddStringToObject(j, "adapter", k.adapter);
         cJSON_AddStringToObject(j, "name", k.name);
         add_count(j, "came", k.connection);
         add_client(&k, j);
-        cJSON_AddItemToArray(list, j);
     }
     b->clients.gone(b->ctx, &k);
     add_client(&k, cJSON_AddObjectToObject(to, "gone"));
@@ -106,9 +103,7 @@ void describe_bus(const struct control_bench *b, cJSON *to, int64_t t_ns)
     if (b->buses < 2) return;
     cJSON *list = cJSON_AddArrayToObject(to, "buses");
     for (unsigned i = 0; i < b->buses; i++) {
-        cJSON *j = cJSON_CreateObject();
-        add_bus(b->bus[i], j, t_ns);
-        cJSON_AddItemToArray(list, j);
+        add_bus(b->bus[i], add_object(list), t_ns);
     }
 }
 
@@ -127,7 +122,7 @@ enum control_outcome describe_units(const struct control_call *call)
     cJSON *list = cJSON_AddArrayToObject(call->result, "units");
     for (unsigned i = 0; i < b->units; i++) {
         const struct unit *u = b->unit[i];
-        cJSON *j = cJSON_CreateObject();
+        cJSON *j = add_object(list);
         cJSON_AddStringToObject(j, "name", u->cfg.name);
         cJSON_AddStringToObject(j, "board", u->type->name);
         add_count(j, "serial", u->cfg.board.serial);
@@ -135,7 +130,6 @@ enum control_outcome describe_units(const struct control_call *call)
         add_bus_name(b, b->node[i], j);
         cJSON_AddStringToObject(j, "profile", u->profile);
         cJSON_AddBoolToObject(j, "ready", u->type->ready(u->board));
-        cJSON_AddItemToArray(list, j);
     }
     return CONTROL_DONE;
 }

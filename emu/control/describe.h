@@ -4,6 +4,14 @@
 
 #include "control/control.h"
 
+/* One more, empty, in a list. */
+static inline cJSON *add_object(cJSON *list)
+{
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddItemToArray(list, j);
+    return j;
+}
+
 static inline void add_count(cJSON *to, const char *name, uint64_t n)
 {
     cJSON_AddNumberToObject(to, name, (double)n);

@@ -20,13 +20,7 @@ static void ask_reg(const struct scpi_call *call)
 
 static void set_reg(const struct scpi_call *call)
 {
-    *status_reg(call) = call->value & 0x7FFF; /* bit 15 is always 0: SCPI-99 volume 1, 9.1 */
-}
-
-static void set_sre(const struct scpi_call *call)
-{
-    const unsigned enabled = call->value & ~(unsigned)SCPI_STB_MSS; /* bit 6 is not to be enabled: 488.2 11.3.2.3 */
-    call->s->status.sre = (uint16_t)enabled;
+    *status_reg(call) = (uint16_t)(call->value & ~call->row->zeros);
 }
 
 /* Event registers are cleared by reading. */
@@ -127,6 +121,8 @@ static void do_preset(const struct scpi_call *call)
 
 #define REG(field) offsetof(struct scpi_status, field)
 
+enum { BIT_15 = 0x8000 }; /* of the registers of SCPI-99: always 0, volume 1, 9.1 */
+
 // clang-format off
 static const struct scpi_command rows[] = {
     {"*CLS", "Clear status: event registers and error queue.", .run = do_cls},
@@ -137,7 +133,7 @@ static const struct scpi_command rows[] = {
     {"*OPC", "Operation complete: sets bit 0 of the event status register at the end of the motion.", .run = do_opc},
     {"*OPC?", "Operation complete query: returns 1 at the end of the motion.", .run = do_opc_query},
     {"*RST", "Resets the instrument to its power-on settings.", .run = do_rst},
-    {"*SRE", "Service request enable register.", .run = set_sre, .max = 255, .offset = REG(sre)},
+    {"*SRE", "Service request enable register.", .run = set_reg, .max = 255, .offset = REG(sre), .zeros = SCPI_STB_MSS}, /* not to be enabled: 488.2 11.3.2.3 */
     {"*SRE?", "Service request enable register.", .run = ask_reg, .offset = REG(sre)},
     {"*STB?", "Status byte.", .run = do_stb},
     {"*TST?", "Self-test: 0, passed.", put_answer, .answer = "0"},
@@ -148,11 +144,11 @@ static const struct scpi_command rows[] = {
     {"SYSTem:VERSion?", "SCPI version.", put_answer, .answer = "1999.0"},
     {"STATus:OPERation[:EVENt]?", "Operation event register (bit 1 settling, bit 3 sweeping); cleared by reading.", .run = take_reg, .offset = REG(operation.event)},
     {"STATus:OPERation:CONDition?", "Operation condition register.", .run = ask_reg, .offset = REG(operation.condition)},
-    {"STATus:OPERation:ENABle", "Operation enable register: event bits summed in bit 7 of the status byte.", .run = set_reg, .max = 65535, .offset = REG(operation.enable)},
+    {"STATus:OPERation:ENABle", "Operation enable register: event bits summed in bit 7 of the status byte.", .run = set_reg, .max = 65535, .zeros = BIT_15, .offset = REG(operation.enable)},
     {"STATus:OPERation:ENABle?", "Operation enable register.", .run = ask_reg, .offset = REG(operation.enable)},
     {"STATus:QUEStionable[:EVENt]?", "Questionable event register (bit 0 voltage, bit 4 temperature); cleared by reading.", .run = take_reg, .offset = REG(questionable.event)},
     {"STATus:QUEStionable:CONDition?", "Questionable condition register.", .run = ask_reg, .offset = REG(questionable.condition)},
-    {"STATus:QUEStionable:ENABle", "Questionable enable register: event bits summed in bit 3 of the status byte.", .run = set_reg, .max = 65535, .offset = REG(questionable.enable)},
+    {"STATus:QUEStionable:ENABle", "Questionable enable register: event bits summed in bit 3 of the status byte.", .run = set_reg, .max = 65535, .zeros = BIT_15, .offset = REG(questionable.enable)},
     {"STATus:QUEStionable:ENABle?", "Questionable enable register.", .run = ask_reg, .offset = REG(questionable.enable)},
     {"STATus:PRESet", "Clears the operation and questionable enable registers.", .run = do_preset},
 };

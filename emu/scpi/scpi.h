@@ -71,6 +71,7 @@ struct scpi_command {
     const char *what;
     void (*run)(const struct scpi_call *call);
     unsigned max;       /* of its one parameter, an integer from 0; 0: it takes none */
+    unsigned zeros;     /* bits of it that stay 0 */
     size_t offset;      /* of the register it is about, in struct scpi_status */
     const char *answer; /* always the same */
 };
