@@ -3,6 +3,7 @@
 #include "fuzz.h"
 #include "listener.h"
 
+#include "base/detmath.h"
 #include "board/gyro/board.h"
 #include "board/gyro/gyro.h"
 
@@ -43,7 +44,7 @@ static void mix_real(struct world *w, double v)
 static void torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
 {
     struct world *w = ctx;
-    const double limit = w->b.profile.torquer_limit_dps * GYRO_RAD_PER_DEG * (1.0 + 1e-12);
+    const double limit = w->b.profile.torquer_limit_dps * RAD_PER_DEG * (1.0 + 1e-12);
     assert(t_ns == w->s.now_ns && fabs(u1_radps) <= limit && fabs(u2_radps) <= limit);
     w->rate_radps = u2_radps;
     mix_real(w, u1_radps);

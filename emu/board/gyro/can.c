@@ -1,5 +1,6 @@
 #include "board/gyro/board.h"
 
+#include "base/detmath.h"
 #include "board/gyro/gyro.h"
 #include "gen/gyro_od.h"
 #include "gen/psabench_can.h"
@@ -9,9 +10,9 @@
 
 enum { XY_COB = 0x180 };
 #define PI             3.141592653589793238
-#define RATE_LSB_RADPS (GYRO_RAD_PER_DEG / 3600.0 * 1e-4)
+#define RATE_LSB_RADPS (RAD_PER_DEG / 3600.0 * 1e-4)
 #define ANGLE_LSB_RAD  (PI / 2147483648.0)
-#define LEVEL_LSB_RAD  (GYRO_RAD_PER_DEG * 2e-6)
+#define LEVEL_LSB_RAD  (RAD_PER_DEG * 2e-6)
 
 /* ---- readings ---- */
 

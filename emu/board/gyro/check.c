@@ -6,6 +6,8 @@
  * for that there is the nod. Limits: E0. docs/boards/gyro.md has what cannot be seen. */
 #include "board/gyro/internal.h"
 
+#include "base/detmath.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -13,19 +15,19 @@
 
 /* A block of navigation is so much asked of the azimuth torquer. The sensor runs against all of it but a quarter, twice in a
  * row: dead. */
-#define BLOCK_RAD   (0.25 * GYRO_RAD_PER_DEG)
+#define BLOCK_RAD   (0.25 * RAD_PER_DEG)
 #define BLOCK_PART  0.25
 #define BLOCKS_DEAD 2u
 
 /* Aiding: a reported track that changed by so much, at so much speed, and an angle sensor that has not left its degree. A turn
  * reported late is reported by LATE_NS after it; a turn reported ahead is over by then, too. */
 #define ALOFT_MPS 20.0
-#define STILL_RAD (1.0 * GYRO_RAD_PER_DEG)
+#define STILL_RAD (1.0 * RAD_PER_DEG)
 #define TOLD_DEG  20.0
 #define LATE_NS   INT64_C(600000000000)
 #define AHEAD_NS  INT64_C(120000000000)
 
-#define NOD_RADPS   (0.2 * GYRO_RAD_PER_DEG)
+#define NOD_RADPS   (0.2 * RAD_PER_DEG)
 #define NOD_NS      INT64_C(500000000) /* there, and the same back */
 #define NOD_REST_NS INT64_C(700000000) /* before the next: not in step with a sway */
 #define NODS        3u
@@ -74,8 +76,8 @@ static bool servo_fails(struct gyro *b)
     c->turned_rad += b->u_radps[1] * (1e-9 * b->profile.step_ns);
     if ((int64_t)++c->steps * b->profile.step_ns < CHECK_NS) return false;
     const double moved_rad = gyro_wrap_rad(b->servo_rad - c->from_rad);
-    const bool dead = fabs(c->turned_rad) > b->profile.stuck_turn_deg * GYRO_RAD_PER_DEG &&
-                      fabs(moved_rad) < b->profile.stuck_moved_deg * GYRO_RAD_PER_DEG;
+    const bool dead = fabs(c->turned_rad) > b->profile.stuck_turn_deg * RAD_PER_DEG &&
+                      fabs(moved_rad) < b->profile.stuck_moved_deg * RAD_PER_DEG;
     *c = (struct gyro_check){.from_rad = b->servo_rad};
     return dead;
 }
@@ -96,7 +98,7 @@ void gyro_check_begin(struct gyro *b, int64_t t_ns)
 
 static double told_rad(double to_deg, double from_deg)
 {
-    return gyro_wrap_rad((to_deg - from_deg) * GYRO_RAD_PER_DEG);
+    return gyro_wrap_rad((to_deg - from_deg) * RAD_PER_DEG);
 }
 
 /* The torquer: what the sensor moved by, less the reported turn, against what was asked; of a nod nothing is left. */
@@ -124,7 +126,7 @@ static void check_aided(struct gyro *b, int64_t t_ns)
         w->still_ns = t_ns;
     }
     if (t_ns - w->still_ns < LATE_NS) w->told_deg = b->set.track_deg;
-    const bool told = fabs(told_rad(b->set.track_deg, w->told_deg)) > TOLD_DEG * GYRO_RAD_PER_DEG;
+    const bool told = fabs(told_rad(b->set.track_deg, w->told_deg)) > TOLD_DEG * RAD_PER_DEG;
     if (!told) w->told_ns = t_ns;
     else if (t_ns - w->told_ns >= AHEAD_NS) gyro_report_encoder_fault(b, t_ns);
 }
@@ -132,7 +134,7 @@ static void check_aided(struct gyro *b, int64_t t_ns)
 /* The horizon: as long off the level as a run would wait for it. */
 static void check_level(struct gyro *b, int64_t t_ns)
 {
-    const double tolerance_rad = b->set.tolerance_arcmin / 60.0 * GYRO_RAD_PER_DEG;
+    const double tolerance_rad = b->set.tolerance_arcmin / 60.0 * RAD_PER_DEG;
     if (fabs(b->level.beta_rad) <= tolerance_rad) b->watch.level_ns = t_ns;
     const double off_s = 1e-9 * (double)(t_ns - b->watch.level_ns);
     if (off_s > b->set.settle_s + b->set.settle_limit_s) gyro_condition(b, GYRO_NOT_SETTLED, true, t_ns);
@@ -184,7 +186,7 @@ double gyro_nod_radps(struct gyro *b, int64_t t_ns)
     struct gyro_nod *n = &b->nod;
     const int64_t age_ns = t_ns - n->begun_ns;
     if (n->way == GYRO_NOD_REST && age_ns >= NOD_REST_NS) {
-        const double most_radps = 0.5 * b->profile.torquer_limit_dps * GYRO_RAD_PER_DEG;
+        const double most_radps = 0.5 * b->profile.torquer_limit_dps * RAD_PER_DEG;
         n->way = GYRO_NOD_THERE;
         n->begun_ns = t_ns;
         n->from_rad = b->servo_rad;

@@ -15,10 +15,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define GYRO_POSITIONS   32u
-#define GYRO_RUN_MAX     127u                   /* positions of a run, repeats included */
-#define GYRO_VOLTS       1.1920928955078125e-06 /* of a code of the level unit: 10 V / 2^23 at the load */
-#define GYRO_RAD_PER_DEG 0.017453292519943295
+#define GYRO_POSITIONS 32u
+#define GYRO_RUN_MAX   127u                   /* positions of a run, repeats included */
+#define GYRO_VOLTS     1.1920928955078125e-06 /* of a code of the level unit: 10 V / 2^23 at the load */
 
 enum gyro_mode { GYRO_OFF, GYRO_LEVEL, GYRO_HOLD, GYRO_SLEW, GYRO_COMPASS, GYRO_CALIBRATE, GYRO_NAVIGATE, GYRO_MODES };
 enum gyro_phase { GYRO_IDLE, GYRO_SLEWING, GYRO_SETTLING, GYRO_WINDOW };

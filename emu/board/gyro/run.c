@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-#define RADPS_PER_DPH (GYRO_RAD_PER_DEG / 3600.0)
+#define RADPS_PER_DPH (RAD_PER_DEG / 3600.0)
 #define TURN_MARGIN   0.9 /* of the torquers' limit: the rest is for the servo */
 #define MEAN_NS       1000000000
 
@@ -39,10 +39,9 @@ void gyro_run_stop(struct gyro *b, enum gyro_mode mode)
 
 static void begin_turn(struct gyro *b, double to_deg, int64_t t_ns)
 {
-    const double limit_radps = TURN_MARGIN * b->profile.torquer_limit_dps * GYRO_RAD_PER_DEG;
-    b->run.turn =
-        gyro_turn_of(b->run.q_ref_rad, to_deg * GYRO_RAD_PER_DEG, fmin(b->set.slew_dps * GYRO_RAD_PER_DEG, limit_radps),
-                     b->set.slew_dps2 * GYRO_RAD_PER_DEG, t_ns);
+    const double limit_radps = TURN_MARGIN * b->profile.torquer_limit_dps * RAD_PER_DEG;
+    b->run.turn = gyro_turn_of(b->run.q_ref_rad, to_deg * RAD_PER_DEG, fmin(b->set.slew_dps * RAD_PER_DEG, limit_radps),
+                               b->set.slew_dps2 * RAD_PER_DEG, t_ns);
     if (b->base.io.platform) b->base.io.platform->reposition(b->base.io.ctx, t_ns);
     enter_phase(b, GYRO_SLEWING, t_ns);
     board_notify(&b->base, GYRO_EV_SLEW, t_ns);

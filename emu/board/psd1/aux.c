@@ -2,12 +2,12 @@
  * them and no more: scales, errors and registers are ours (E0). */
 #include "board/psd1/internal.h"
 
+#include "base/detmath.h"
+
 #include <math.h>
 
-#define RAD_PER_DEG    0.017453292519943295
-#define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
-#define WALK_POINTS    8u /* of the grid: the angle's random walk takes a step */
-#define CODE12(code)   ((uint16_t)((uint32_t)(code)&0xFFFu))
+#define WALK_POINTS  8u /* of the grid: the angle's random walk takes a step */
+#define CODE12(code) ((uint16_t)((uint32_t)(code)&0xFFFu))
 
 /* To the nearest code, clipped; halves away from zero. */
 static int32_t code_of(double value, double per_code, int32_t low, int32_t high)

@@ -54,16 +54,6 @@ double earth_gravity_mps2(double latitude_rad, double height_m)
     return sqrt(down * down + along * along) / sqrt((u2 + FOCAL2_M2 * sin_beta * sin_beta) / v2);
 }
 
-struct site earth_site(double latitude_rad, double longitude_rad, double height_m, double azimuth_rad)
-{
-    return (struct site){.g_mps2 = earth_gravity_mps2(latitude_rad, height_m),
-                         .latitude_rad = latitude_rad,
-                         .longitude_rad = longitude_rad,
-                         .height_m = height_m,
-                         .azimuth_rad = azimuth_rad,
-                         .placed = true};
-}
-
 void earth_rate_n(const struct site *s, double w_ie_n_radps[3])
 {
     const double rate_radps = s->placed ? EARTH_RATE_RADPS : 0.0;

@@ -21,9 +21,6 @@ struct site {
  * ellipsoid it is Somigliana's formula with the published constants, to 1e-10. */
 double earth_gravity_mps2(double latitude_rad, double height_m);
 
-/* A placed site with its normal gravity. */
-struct site earth_site(double latitude_rad, double longitude_rad, double height_m, double azimuth_rad);
-
 /* Rate of the Earth relative to inertial space, in n: zero for a site that is not placed. */
 void earth_rate_n(const struct site *s, double w_ie_n_radps[3]);
 

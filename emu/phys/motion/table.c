@@ -149,7 +149,7 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
 
 /* ---- truth */
 
-bool table_at_rest(const struct table *t, int64_t t_ns)
+static bool all_at_rest(const struct table *t, int64_t t_ns)
 {
     for (unsigned i = 0; i < t->cfg.axes; i++) {
         if (!motion_at_rest(&t->axis[i], t_ns)) return false;
@@ -210,7 +210,7 @@ const struct pose *table_pose(struct table *t, int64_t t_ns)
     if (t_ns < t->cached_from_ns || t_ns > t->cached_to_ns) {
         set_pose(t, t_ns, &t->cached);
         t->cached_from_ns = t_ns;
-        t->cached_to_ns = table_at_rest(t, t_ns) ? INT64_MAX : t_ns;
+        t->cached_to_ns = all_at_rest(t, t_ns) ? INT64_MAX : t_ns;
     }
     return &t->cached;
 }

@@ -73,8 +73,6 @@ enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, 
 /* Pure: the same instant shows the same noise. The axis exists. */
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns);
 
-bool table_at_rest(const struct table *t, int64_t t_ns); /* all axes */
-
 /* Truth. */
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns);
 

@@ -41,7 +41,8 @@ void mems_init(struct mems *m, const struct mems_cfg *cfg, struct rng noise)
     noise_init(&m->slow, &cfg->slow, rng_stream(rng_u64(&seed), 0, "slow"));
 }
 
-double mems_model_v(const struct mems_cfg *cfg, const double a_mps2[3], int64_t t_ns)
+/* At the reference temperature. */
+static double model_v(const struct mems_cfg *cfg, const double a_mps2[3], int64_t t_ns)
 {
     const double ax = a_mps2[0];
     const double ay = a_mps2[1];
@@ -68,7 +69,7 @@ static double noise_v(struct mems *m, int64_t t_ns)
 /* Without limits. Terms that are not there are not added: zero coefficients leave every bit as the model gives it. */
 static double warm_v(const struct mems *m, const double a_mps2[3], int64_t t_ns)
 {
-    const double u_v = mems_model_v(&m->cfg, a_mps2, t_ns);
+    const double u_v = model_v(&m->cfg, a_mps2, t_ns);
     if (m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return u_v;
     const double warmer_k = m->temp_degc - MEMS_REFERENCE_DEGC;
     const double *k = m->cfg.k_v_per_mps2;

@@ -67,10 +67,7 @@ double mems_density_v_rthz(double reading_noise_v, double data_hz);
 
 void mems_init(struct mems *m, const struct mems_cfg *cfg, struct rng noise);
 
-/* Model at the reference temperature, without noise and limits, pure: volts at acceleration a_mps2 and time t_ns. */
-double mems_model_v(const struct mems_cfg *cfg, const double a_mps2[3], int64_t t_ns);
-
-/* The same at the temperature of the element, within the limits of the output: what it would give without noise. */
+/* The model at the temperature of the element, within the limits of the output: what it would give without noise. */
 double mems_true_v(const struct mems *m, const double a_mps2[3], int64_t t_ns);
 
 /* Output voltage; t_ns never earlier than the last call. */

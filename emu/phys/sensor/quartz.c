@@ -35,7 +35,8 @@ void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, st
                          .t_ns = -1};
 }
 
-double quartz_zero_ug(const struct quartz_g *cfg, double felt_degc)
+/* At the temperature that is felt. */
+static double zero_ug_at(const struct quartz_g *cfg, double felt_degc)
 {
     const double line_ug = cfg->zero_ug + cfg->slope_ug_per_k * (felt_degc - QUARTZ_REFERENCE_DEGC);
     if (cfg->curve_ug == 0.0 || cfg->curve_width_k <= 0.0) return line_ug;
@@ -56,7 +57,7 @@ static double load_g(const struct quartz *q, const double a_mps2[3])
     const struct quartz_g *c = &q->cfg;
     const double x_g = a_mps2[0] / q->g_mps2;
     const double across_g = (c->tilt_y_mrad * a_mps2[1] + c->tilt_z_mrad * a_mps2[2]) * 1e-3 / q->g_mps2;
-    const double zero_ug = quartz_zero_ug(c, felt_degc(q)) + c->gradient_ug_per_k * (q->case_degc - q->element_degc);
+    const double zero_ug = zero_ug_at(c, felt_degc(q)) + c->gradient_ug_per_k * (q->case_degc - q->element_degc);
     return x_g + across_g + (c->square_ug_per_g2 * x_g * x_g + zero_ug) * 1e-6;
 }
 

@@ -54,9 +54,6 @@ struct quartz_g quartz_default(void);
 /* g is the site's: a scale per g means per this g. */
 void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct rng noise);
 
-/* Zero signal at the temperature that is felt, in millionths of g, pure. */
-double quartz_zero_ug(const struct quartz_g *cfg, double felt_degc);
-
 /* What it would give at rest without noise: truth. */
 double quartz_true_a(const struct quartz *q, const double a_mps2[3]);
 

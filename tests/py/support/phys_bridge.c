@@ -18,7 +18,13 @@ EXPORT struct lab *bridge_lab(const double site[5], unsigned axes, const double 
 {
     struct lab *l = malloc(sizeof *l);
     struct lab_cfg c = lab_default();
-    c.site = site[4] != 0.0 ? earth_site(site[1], 0.0, site[2], site[3]) : (struct site){.g_mps2 = site[0]};
+    c.site = (struct site){.g_mps2 = site[0]};
+    if (site[4] != 0.0)
+        c.site = (struct site){.g_mps2 = earth_gravity_mps2(site[1], site[2]),
+                               .latitude_rad = site[1],
+                               .height_m = site[2],
+                               .azimuth_rad = site[3],
+                               .placed = true};
     c.table = table_default(axes);
     c.head.turn_s = turn_s;
     c.table.base_tilt_x_arcsec = tilt_arcsec[0];
@@ -123,9 +129,11 @@ EXPORT double bridge_accelerometer(struct lab *l, const double mounting[7], cons
 {
     const struct lab_mounting s = mounting_of(mounting);
     const struct mems_cfg c = {.u0_v = u0_v, .k_v_per_mps2 = {k[0], k[1], k[2]}};
+    struct mems m;
     double a_mps2[3];
     lab_sensor_mps2(l, &s, at_m, 1.0, 0.0, t_ns, a_mps2);
-    return mems_model_v(&c, a_mps2, t_ns);
+    mems_init(&m, &c, rng_stream(0, 0, "mems"));
+    return mems_true_v(&m, a_mps2, t_ns);
 }
 
 struct oven {

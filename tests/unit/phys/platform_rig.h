@@ -3,6 +3,7 @@
 #define PSABENCH_TESTS_PLATFORM_RIG_H
 
 #include "rig.h"
+#include "site.h"
 
 #include "base/sched.h"
 #include "phys/motion/platform.h"
@@ -26,7 +27,7 @@ static inline int64_t ns(double t_s)
 
 static inline struct site at_latitude(double latitude_deg)
 {
-    return earth_site(latitude_deg * RAD_PER_DEG, 0.0, 0.0, 0.0);
+    return site_at(latitude_deg * RAD_PER_DEG, 0.0, 0.0);
 }
 
 static inline struct platform_cfg ideal(void)

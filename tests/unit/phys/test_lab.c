@@ -1,5 +1,6 @@
 /* The laboratory: what a unit feels on each mount. Kinematics with lever arms: tests/py/lab/test_physics.py. */
 #include "rig.h"
+#include "site.h"
 
 #include "base/detmath.h"
 #include "base/sched.h"
@@ -25,7 +26,7 @@ static struct lab up(void)
 {
     struct lab l;
     struct lab_cfg c = lab_default();
-    c.site = earth_site(55.7 * RAD_PER_DEG, 0.65, 150.0, 20.0 * RAD_PER_DEG);
+    c.site = site_at(55.7 * RAD_PER_DEG, 150.0, 20.0 * RAD_PER_DEG);
     c.head.turn_s = 2.0;
     c.head.mount_error_arcsec_rms = 5.0;
     c.table = table_default(3);

@@ -58,7 +58,8 @@ static void a_turning_table_turns_what_is_on_it(void **state)
     const struct pose *p = table_pose(&t, 20 * NS_PER_S);
     near(p->w_ib_b_radps[2] / RAD_PER_DEG, 50.0, 1e-12);
     near(p->C_nb[0][2], 1.0, 1e-12); /* z lies level, to the north */
-    assert_false(table_at_rest(&t, 20 * NS_PER_S));
+    assert_true(table_read(&t, 0, 20 * NS_PER_S).at_rest);
+    assert_false(table_read(&t, 1, 20 * NS_PER_S).at_rest);
 }
 
 static void the_readout_has_zero_resolution_and_delay(void **state)
@@ -190,7 +191,7 @@ static void a_table_has_the_axes_it_has(void **state)
     assert_int_equal(table_stop(&t, 1, 0), MOTION_NO_AXIS);
     assert_int_equal(table_zero(&t, 1, 0.0, 0), MOTION_NO_AXIS);
     assert_int_equal(table_rate(&t, 0, 1001.0, 0), MOTION_RATE_LIMIT);
-    assert_true(table_at_rest(&t, 0));
+    assert_true(table_read(&t, 0, 0).at_rest);
 }
 
 int main(void)

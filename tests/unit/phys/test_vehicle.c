@@ -1,5 +1,6 @@
 /* The vehicle under the platform: attitude, rates and accelerations against differences and against Newton in inertial space. */
 #include "rig.h"
+#include "site.h"
 
 #include "base/rng.h"
 #include "base/sched.h"
@@ -24,7 +25,7 @@ static int64_t ns(double t_s)
 static struct vehicle at_latitude(double latitude_deg, const struct vehicle_cfg *cfg)
 {
     struct vehicle v;
-    const struct site site = earth_site(latitude_deg * RAD_PER_DEG, 0.0, 0.0, 1.0);
+    const struct site site = site_at(latitude_deg * RAD_PER_DEG, 0.0, 1.0);
     vehicle_init(&v, cfg, &site);
     return v;
 }

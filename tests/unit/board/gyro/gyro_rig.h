@@ -3,7 +3,9 @@
 #define PSABENCH_TESTS_GYRO_RIG_H
 
 #include "rig.h"
+#include "site.h"
 
+#include "base/detmath.h"
 #include "board/gyro/board.h"
 #include "board/gyro/gyro.h"
 #include "phys/motion/platform.h"
@@ -14,8 +16,8 @@
 #define GAIN         100.0
 #define FRAME_NS     4000000 /* 250 a second */
 #define STEP_NS      10000000
-#define DEGPH        (GYRO_RAD_PER_DEG / 3600.0)
-#define ARCMIN       (GYRO_RAD_PER_DEG / 60.0)
+#define DEGPH        (RAD_PER_DEG / 3600.0)
+#define ARCMIN       (RAD_PER_DEG / 60.0)
 #define RIG_READINGS 40000u
 
 struct rig {
@@ -117,7 +119,7 @@ static inline void rig_up(struct rig *r, const struct platform_cfg *platform, do
 {
     const struct board_cfg cfg = {.seed = 7, .serial = 3, .level_node = 5};
     const struct board_io io = {.ctx = r, .event = rig_event, .platform = &rig_platform_io};
-    const struct site site = earth_site(latitude_deg * GYRO_RAD_PER_DEG, 0.0, 0.0, 0.0);
+    const struct site site = site_at(latitude_deg * RAD_PER_DEG, 0.0, 0.0);
     struct vehicle_cfg vehicle = vehicle_default();
     struct gyro_profile profile;
     vehicle.heading_deg = 40.0;

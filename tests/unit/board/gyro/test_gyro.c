@@ -51,13 +51,13 @@ static void a_run_goes_through_its_positions_phase_by_phase(void **state)
     assert_int_equal(r.events[GYRO_EV_WINDOW_END], 6);
     assert_int_equal(rig_last(&r)->mode, GYRO_HOLD);
     assert_int_equal(rig_last(&r)->position, 0);
-    assert_true(fabs(rig_last(&r)->encoder_rad - 180.0 * GYRO_RAD_PER_DEG) < 1.0 * ARCMIN);
+    assert_true(fabs(rig_last(&r)->encoder_rad - 180.0 * RAD_PER_DEG) < 1.0 * ARCMIN);
 }
 
 static void windows_tell_the_rate_of_the_earth_and_the_drift(void **state)
 {
     (void)state;
-    const double we_degph = 15.041067 * cos(LATITUDE_DEG * GYRO_RAD_PER_DEG);
+    const double we_degph = 15.041067 * cos(LATITUDE_DEG * RAD_PER_DEG);
     double sum = 0.0;
     unsigned n = 0;
     rig_mode(&r, GYRO_COMPASS);
@@ -138,24 +138,24 @@ static void navigation_keeps_the_azimuth_in_flight_as_well(void **state)
         vehicle_fly(platform_vehicle(&r.p, r.s.now_ns), rows[i].speed_mps, rows[i].track_deg, r.s.now_ns);
         rig_run(&r, 120.0); /* at its speed, and level again */
         const double alpha_rad = truth().alpha_rad;
-        r.b.set.azimuth_deg = alpha_rad / GYRO_RAD_PER_DEG;
+        r.b.set.azimuth_deg = alpha_rad / RAD_PER_DEG;
         r.b.set.drift1_degph = r.b.set.drift2_degph = 25.0;
         rig_mode(&r, GYRO_NAVIGATE);
         for (unsigned k = 0; k < 900; k++) { /* the host aids */
             struct vehicle_state v;
             vehicle_at(&r.p.vehicle, r.s.now_ns, &v);
             r.b.set.speed_mps = v.speed_mps;
-            r.b.set.track_deg = v.heading_rad / GYRO_RAD_PER_DEG;
-            r.b.set.latitude_deg = v.latitude_rad / GYRO_RAD_PER_DEG;
+            r.b.set.track_deg = v.heading_rad / RAD_PER_DEG;
+            r.b.set.latitude_deg = v.latitude_rad / RAD_PER_DEG;
             gyro_settings_changed(&r.b);
             rig_run(&r, 1.0);
         }
-        const double off_deg = (truth().alpha_rad - alpha_rad) / GYRO_RAD_PER_DEG;
+        const double off_deg = (truth().alpha_rad - alpha_rad) / RAD_PER_DEG;
         if (fabs(off_deg) > 0.01) fail_msg("row %u: %.4f deg in a quarter of an hour", i, off_deg);
         struct vehicle_state v;
         vehicle_at(&r.p.vehicle, r.s.now_ns, &v);
-        const double heading_deg = gyro_heading_deg(&r.b) - v.heading_rad / GYRO_RAD_PER_DEG;
-        assert_true(fabs(gyro_wrap_rad(heading_deg * GYRO_RAD_PER_DEG)) < 0.5 * GYRO_RAD_PER_DEG);
+        const double heading_deg = gyro_heading_deg(&r.b) - v.heading_rad / RAD_PER_DEG;
+        assert_true(fabs(gyro_wrap_rad(heading_deg * RAD_PER_DEG)) < 0.5 * RAD_PER_DEG);
     }
 }
 
@@ -165,13 +165,13 @@ static void a_wrong_drift_turns_the_azimuth_away_by_as_much(void **state)
     rig_mode(&r, GYRO_LEVEL);
     rig_run(&r, 15.0);
     const double alpha_rad = truth().alpha_rad;
-    r.b.set.azimuth_deg = alpha_rad / GYRO_RAD_PER_DEG;
+    r.b.set.azimuth_deg = alpha_rad / RAD_PER_DEG;
     r.b.set.drift1_degph = 25.0;
     r.b.set.drift2_degph = 26.0;
     gyro_settings_changed(&r.b);
     rig_mode(&r, GYRO_NAVIGATE);
     rig_run(&r, 360.0);
-    assert_true(fabs((truth().alpha_rad - alpha_rad) / GYRO_RAD_PER_DEG - 0.1) < 0.002);
+    assert_true(fabs((truth().alpha_rad - alpha_rad) / RAD_PER_DEG - 0.1) < 0.002);
 }
 
 /* ---- what is refused */
@@ -307,7 +307,7 @@ static void rates_are_limited_and_say_so(void **state)
     rig_run(&r, 5.0);
     assert_true(rig_last(&r)->flags & GYRO_SATURATED);
     assert_true(r.conditions & GYRO_SATURATED);
-    assert_true(fabs(r.torque_radps[1]) <= 0.1 * GYRO_RAD_PER_DEG + 1e-15);
+    assert_true(fabs(r.torque_radps[1]) <= 0.1 * RAD_PER_DEG + 1e-15);
     assert_true(r.b.counters.saturated > 100);
 }
 

@@ -248,7 +248,7 @@ static void a_reading_is_three_pdos_of_one_step(void **state)
         assert_int_equal(a.mode, GYRO_LEVEL);
         assert_int_equal(a.phase, GYRO_IDLE);
         assert_true(fabs(l.beta * 2e-6 * 60.0 - 1.0) < 0.01 && fabs(l.gamma * 2e-6 * 60.0 + 30.0) < 0.01);
-        const double beta = l.beta * 2e-6 * GYRO_RAD_PER_DEG, gamma = l.gamma * 2e-6 * GYRO_RAD_PER_DEG;
+        const double beta = l.beta * 2e-6 * RAD_PER_DEG, gamma = l.gamma * 2e-6 * RAD_PER_DEG;
         const double up = gyro_place_of(50.0, 0.0, 0.0).up_radps;
         assert_true(fabs(u.u1 * 1e-4 * DEGPH + beta + up * cos(beta) * sin(gamma)) < 0.02 * DEGPH);
         assert_true(fabs(u.u2 * 1e-4 * DEGPH - up * cos(beta) * cos(gamma)) < 1e-3 * DEGPH);

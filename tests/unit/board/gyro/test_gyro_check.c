@@ -23,7 +23,7 @@ static double alpha_deg(void)
 {
     struct platform_state s;
     platform_at(&r.p, r.s.now_ns, &s);
-    return s.alpha_rad / GYRO_RAD_PER_DEG;
+    return s.alpha_rad / RAD_PER_DEG;
 }
 
 static struct vehicle *vehicle(void)
@@ -44,7 +44,7 @@ static void aid(void)
 {
     struct vehicle_state v;
     vehicle_at(&r.p.vehicle, r.s.now_ns, &v);
-    tell(v.latitude_rad / GYRO_RAD_PER_DEG, v.speed_mps, v.heading_rad / GYRO_RAD_PER_DEG);
+    tell(v.latitude_rad / RAD_PER_DEG, v.speed_mps, v.heading_rad / RAD_PER_DEG);
 }
 
 /* Level, then navigating with what is right. */
@@ -144,7 +144,7 @@ static void a_turn_of_the_vehicle_at_the_rate_of_a_dead_torquer_has_to_be_told(v
         (void)up(state);
         navigate();
         on_for(1.0);
-        vehicle()->cfg.turn_dps = rig_last(&r)->u2_radps / GYRO_RAD_PER_DEG;
+        vehicle()->cfg.turn_dps = rig_last(&r)->u2_radps / RAD_PER_DEG;
         vehicle_attitude(vehicle(), 20.0, 5.0, -4.0, r.s.now_ns);
         for (unsigned i = 0; i < 120; i++) {
             on_for(5.0);
@@ -263,7 +263,7 @@ static void a_vehicle_that_is_towed_and_a_wrong_drift_are_no_faults(void **state
     }
     assert_int_equal(r.b.counters.encoder_faults, 0);
     for (double off_degph = -60.0; off_degph <= 60.0; off_degph += 7.0) {
-        const double asked_degph = 15.041067 * sin(LATITUDE_DEG * GYRO_RAD_PER_DEG) + DRIFT_DEGPH + off_degph;
+        const double asked_degph = 15.041067 * sin(LATITUDE_DEG * RAD_PER_DEG) + DRIFT_DEGPH + off_degph;
         const double part = -off_degph / asked_degph;
         r.b.set.drift2_degph = DRIFT_DEGPH + off_degph;
         rig_mode(&r, GYRO_NAVIGATE);
