@@ -6,13 +6,15 @@
 #include <math.h>
 #include <string.h>
 
-#define PI         3.14159265358979323846
 #define CELLS_HZ   4000.0 /* looks a second at 10 MHz that leave no mains harmonic of note to the first alias */
 #define NOMINAL_HZ (1e7 / AD7712_MOD_TAU)
 
 /* Sources 3.5, gain 1 to 128; the last of a row represents those that are not printed. */
 // clang-format off
-const struct ad7712_noise_row ad7712_noise[AD7712_NOISE_ROWS] = {
+static const struct noise_row {
+    double notch_hz; /* at 10 MHz */
+    double uv[AD7712_GAINS];
+} noise[] = {
     {10,   {1.0,  .78,  .48, .33, .25, .25, .25, .25}},
     {25,   {1.8,  1.1,  .63, .5,  .44, .41, .38, .38}},
     {30,   {2.5,  1.31, .84, .57, .46, .43, .4,  .4}},
@@ -41,10 +43,11 @@ unsigned ad7712_cells(unsigned code, unsigned max)
 double ad7712_noise_v(unsigned code, unsigned gain_log2)
 {
     const double hz = NOMINAL_HZ / code;
+    const unsigned rows = sizeof noise / sizeof *noise;
     unsigned i = 0;
-    while (i < AD7712_NOISE_ROWS && ad7712_noise[i].notch_hz <= hz) i++;
-    if (i == 0 || i == AD7712_NOISE_ROWS) return ad7712_noise[i ? i - 1 : 0].uv[gain_log2] * 1e-6;
-    const struct ad7712_noise_row *lo = &ad7712_noise[i - 1], *hi = &ad7712_noise[i];
+    while (i < rows && noise[i].notch_hz <= hz) i++;
+    if (i == 0 || i == rows) return noise[i ? i - 1 : 0].uv[gain_log2] * 1e-6;
+    const struct noise_row *lo = &noise[i - 1], *hi = &noise[i];
     const double part = det_log(hz / lo->notch_hz) / det_log(hi->notch_hz / lo->notch_hz);
     return lo->uv[gain_log2] * 1e-6 * det_exp(part * det_log(hi->uv[gain_log2] / lo->uv[gain_log2]));
 }
@@ -118,26 +121,6 @@ void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n)
         x += take;
         n -= take;
     }
-}
-
-double ad7712_sinc3_gain(const struct ad7712_sinc3 *f, double freq)
-{
-    double re = 0.0, im = 0.0;
-    for (unsigned k = 0; k < 3 * f->cells; k++) {
-        const double phase = 2.0 * PI * freq * k / f->cells;
-        const double w = f->weight[2 - k / f->cells][k % f->cells];
-        re += w * det_cos(phase);
-        im += w * det_sin(phase);
-    }
-    return sqrt(re * re + im * im);
-}
-
-double ad7712_sinc3_ideal(unsigned code, double freq)
-{
-    const double below = code * det_sin(PI * freq / code);
-    if (fabs(below) < 1e-9) return 1.0;
-    const double h = fabs(det_sin(PI * freq) / below);
-    return h * h * h;
 }
 
 static double limit_coefficient(double v, double max, bool *beyond)

@@ -14,15 +14,8 @@
 
 enum {
     AD7712_SETTLE = 3, /* output periods from a start to the first settled word */
-    AD7712_GAINS = 8,
-    AD7712_NOISE_ROWS = 9
+    AD7712_GAINS = 8
 };
-
-struct ad7712_noise_row {
-    double notch_hz; /* at 10 MHz */
-    double uv[AD7712_GAINS];
-};
-extern const struct ad7712_noise_row ad7712_noise[AD7712_NOISE_ROWS];
 
 /* Filter code that the chip uses for FS11..0. */
 unsigned ad7712_code_of(unsigned fs);
@@ -56,10 +49,6 @@ bool ad7712_sinc3_push(struct ad7712_sinc3 *f, double x);
 
 /* n looks in a row, with the same result. */
 void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n);
-
-/* |H| at f times the output rate: of the weights above, and of the silicon's filter. */
-double ad7712_sinc3_gain(const struct ad7712_sinc3 *f, double freq);
-double ad7712_sinc3_ideal(unsigned code, double freq);
 
 /* Word of 24 bits for x; *clipped is set, never cleared. */
 uint32_t ad7712_code(double x, uint32_t zero, uint32_t full, bool unipolar, bool *clipped);

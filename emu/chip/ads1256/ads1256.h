@@ -111,8 +111,7 @@ void ads1256_cs_pin(struct ads1256 *a, bool level, int64_t t_ns);    /* active l
  * judged and the reset pattern is seen. */
 void ads1256_sclk_pin(struct ads1256 *a, bool level, int64_t t_ns);
 void ads1256_din_pin(struct ads1256 *a, bool level, int64_t t_ns);
-bool ads1256_dout(const struct ads1256 *a);        /* level on the wire; low in high impedance */
-bool ads1256_dout_driven(const struct ads1256 *a); /* false: high impedance */
+bool ads1256_dout(const struct ads1256 *a); /* level on the wire; low in high impedance, where not a->pins.driven */
 
 /* D0..D3 (ADS1255: D0, D1; others are ignored and read low). */
 void ads1256_gpio_pin(struct ads1256 *a, unsigned d, bool level, int64_t t_ns); /* what drives an input; at first low */

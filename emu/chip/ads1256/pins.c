@@ -150,8 +150,3 @@ bool ads1256_dout(const struct ads1256 *a)
 {
     return a->pins.dout;
 }
-
-bool ads1256_dout_driven(const struct ads1256 *a)
-{
-    return a->pins.driven;
-}

@@ -65,7 +65,6 @@ void ads1282_sample_until(struct ads1282 *a, int64_t t_ns);
  * controller can read that knows no other mode. */
 bool ads1282_models(uint8_t config0);
 
-bool ads1282_running(const struct ads1282 *a); /* powered, not in reset nor STANDBY, CONFIG0 without reserved codes */
 int64_t
 ads1282_settle_ns(const struct ads1282 *a); /* restart to first settled DRDY with the present CONFIG0; 0: none */
 int64_t ads1282_period_ns(const struct ads1282 *a); /* DRDY to DRDY with the present CONFIG0, rounded down; 0: none */

@@ -329,11 +329,6 @@ bool ads1282_drdy(const struct ads1282 *a)
     return chip_fault_level(a->fault.drdy, a->drdy);
 }
 
-bool ads1282_running(const struct ads1282 *a)
-{
-    return a->running;
-}
-
 static bool has_words(const struct ads1282 *a)
 {
     return has_known_delay(a) && !ads1282_bits_only(a);

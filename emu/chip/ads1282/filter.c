@@ -16,7 +16,7 @@ static int64_t ramp5(int64_t m, int64_t n)
 }
 
 /* Five combs, and a sixth difference between the ends of a block. */
-void ads1282_sinc_taps(unsigned sinc_ratio, int32_t tap[ADS1282_SINC_TAPS])
+static void compute_taps(unsigned sinc_ratio, int32_t tap[ADS1282_SINC_TAPS])
 {
     static const int comb6[ADS1282_SINC_TAPS] = {1, -6, 15, -20, 15};
     for (int j = 0; j < ADS1282_SINC_TAPS; j++) {
@@ -58,7 +58,7 @@ void ads1282_filter_init(struct ads1282_filter *f, unsigned sinc_ratio, enum ads
 {
     assert(sinc_ratio >= 8 && sinc_ratio <= 128 && (sinc_ratio & (sinc_ratio - 1)) == 0);
     *f = (struct ads1282_filter){.sinc_ratio = sinc_ratio, .phase = phase};
-    ads1282_sinc_taps(sinc_ratio, f->sinc_tap);
+    compute_taps(sinc_ratio, f->sinc_tap);
     f->noise_gain = noise_gain(f);
 }
 
@@ -84,7 +84,7 @@ static void shift_line(int64_t *line, unsigned fresh, unsigned taps)
     memmove(line, line + fresh, (taps - 1) * sizeof *line);
 }
 
-void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS])
+static void sinc_stage(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS])
 {
     const int64_t t0 = f->sinc_tap[0], t1 = f->sinc_tap[1], t2 = f->sinc_tap[2], t3 = f->sinc_tap[3],
                   t4 = f->sinc_tap[4];
@@ -156,7 +156,7 @@ int64_t ads1282_filter_fir(struct ads1282_filter *f, const int64_t sinc[ADS1282_
 
 int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS])
 {
-    ads1282_filter_sinc(f, block, f->fir1 + ads1282_fir[f->phase][0].taps - 1);
+    sinc_stage(f, block, f->fir1 + ads1282_fir[f->phase][0].taps - 1);
     return fir_stages(f);
 }
 

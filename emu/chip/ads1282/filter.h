@@ -29,6 +29,7 @@ enum ads1282_phase { ADS1282_LINEAR, ADS1282_MINIMUM };
 struct ads1282_filter {
     unsigned sinc_ratio; /* N: 8, 16, 32, 64, 128 */
     enum ads1282_phase phase;
+    /* The five weights of a held block, divided by N (they all are multiples of it); newest first; their sum is N^4. */
     int32_t sinc_tap[ADS1282_SINC_TAPS];
     double noise_gain;
     int64_t sinc[4 + 32], fir1[10 + 32], fir2[14 + 16], fir3[52 + 8], fir4[108 + 2];
@@ -44,17 +45,13 @@ void ads1282_filter_clear(struct ads1282_filter *f);
  * on the last 1971 (linear) or 1963 (minimum phase) blocks, those given here included. */
 int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS]);
 
-/* Its two halves, one in place of the other and not mixed with it: the sinc alone (the sinc-only mode), 32 outputs of full
- * scale 2^34; and the FIR stages alone, from 32 sinc outputs got elsewhere (the bit-true modulator). */
-void ads1282_filter_sinc(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS]);
+/* Its second half in its place, and not mixed with it: the FIR stages alone, from 32 sinc outputs of full scale 2^34 got
+ * elsewhere (the bit-true modulator). */
 int64_t ads1282_filter_fir(struct ads1282_filter *f, const int64_t sinc[ADS1282_BLOCKS]);
 
 /* Output rms for white input blocks of unit rms, both in units of full scale: sqrt of the sum of squares of the composite
  * impulse response of the exact chain. */
 double ads1282_filter_noise_gain(const struct ads1282_filter *f);
-
-/* The five weights of a held block, divided by N (they all are multiples of it); newest first; their sum is N^4. */
-void ads1282_sinc_taps(unsigned sinc_ratio, int32_t tap[ADS1282_SINC_TAPS]);
 
 /* Offset and gain correction, data sheet eq. 7: (y - OFC/2 LSB) FSC / 400000h, OFC in its own LSB of 2^-23 full scale,
  * rounded to nearest, not clipped. |y| < 2^33. */

@@ -71,7 +71,7 @@ struct ads1282 {
     unsigned rest_periods;    /* since SCLK last moved */
 
     /* converter column */
-    bool running;  /* the modulator runs */
+    bool running;  /* the modulator runs: powered, not in reset nor STANDBY, CONFIG0 without reserved codes */
     bool delivers; /* and data periods end with words: not in modulator output mode */
     bool special;  /* they need more than the plain FIR word: on_due_special() */
     bool in_phase; /* continuous sync: the last restart was a SYNC */

@@ -115,7 +115,7 @@ static void check(struct w1256 *w)
     assert(ads1256_drdy(a) == w->drdy);
     assert(a->word >= -0x800000 && a->word <= 0x7FFFFF);
     assert(ads1256_clkout_hz(a) <= a->clkin.hz);
-    assert(ads1256_dout_driven(a) || ads1256_dout(a) == ADS1256_DOUT_IDLE);
+    assert(a->pins.driven || ads1256_dout(a) == ADS1256_DOUT_IDLE);
 }
 
 /* ---- operations ---- */

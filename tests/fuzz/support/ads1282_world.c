@@ -30,7 +30,7 @@ static void fell(struct w1282 *w, int64_t t_ns)
 {
     const struct ads1282 *a = &w->a;
     const bool converted = a->count.conversions > w->conversions;
-    assert(ads1282_running(a));
+    assert(a->running);
     assert(converted || (a->config0 & ADS1282_CONFIG0_SYNC));
     assert(!w->fallen || t_ns - w->fall_ns >= ads1282_period_ns(a) - 1);
     assert(!converted || t_ns - w->restart_ns >= ads1282_settle_ns(a) - 1);

@@ -45,10 +45,10 @@ static void dout_changes_with_the_rise_and_never_with_the_fall(void **state)
     pin_xfer(&r, 0x1A); /* FSC2 = 3Ah of 100 SPS */
     pin_xfer(&r, 0x00);
     wait_ns(&r, T6_NS);
-    assert_false(ads1256_dout_driven(&r.a));
+    assert_false(r.a.pins.driven);
     for (int b = 7; b >= 0; b--) {
         ads1256_sclk_pin(&r.a, true, r.s.now_ns); /* t7 at most 50 ns, t8 at least 0: at once */
-        assert_true(ads1256_dout_driven(&r.a));
+        assert_true(r.a.pins.driven);
         assert_int_equal(ads1256_dout(&r.a), 0x3A >> b & 1);
         assert_int_equal(r.dout, ads1256_dout(&r.a)); /* told as well */
         wait_ns(&r, 300);
@@ -71,12 +71,12 @@ static void dout_is_released_after_the_last_bit(void **state)
         wait_ns(&r, T6_NS);
         assert_false(r.dout);
         assert_int_equal(pin_xfer(&r, 0), 0xFF);
-        assert_true(ads1256_dout(&r.a) && ads1256_dout_driven(&r.a));
+        assert_true(ads1256_dout(&r.a) && r.a.pins.driven);
         wait_ns(&r, tau_ns(6));
         assert_true(ads1256_dout(&r.a) && r.dout);
         if (by_cs) ads1256_cs_pin(&r.a, true, r.s.now_ns);
         else wait_ns(&r, tau_ns(4) + 2);
-        assert_false(ads1256_dout(&r.a) || ads1256_dout_driven(&r.a) || r.dout);
+        assert_false(ads1256_dout(&r.a) || r.a.pins.driven || r.dout);
         assert_int_equal(r.dout_calls, 2);
     }
 }
@@ -91,10 +91,10 @@ static void dout_stays_driven_between_the_bytes_of_a_word(void **state)
     for (int i = 0; i < 3; i++) {
         pin_xfer(&r, 0);
         wait_ns(&r, tau_ns(20));
-        assert_int_equal(ads1256_dout_driven(&r.a), i < 2);
+        assert_int_equal(r.a.pins.driven, i < 2);
     }
     pin_xfer(&r, 0x00); /* no data without a command */
-    assert_false(ads1256_dout_driven(&r.a));
+    assert_false(r.a.pins.driven);
 }
 
 /* One SCLK pulse and the low time after it. */

@@ -247,7 +247,7 @@ static void without_power_or_in_reset_the_chip_is_dead(void **state)
         assert_int_equal(r.samples, 0);
         hex_is(reg_peek(&r.a.regs, 1), 0x52);
         assert_int_equal(r.a.count.restarts, 0);
-        assert_false(ads1282_running(&r.a));
+        assert_false(r.a.running);
         const int64_t t_ns = r.s.now_ns;
         if (in_reset) ads1282_reset_pin(&r.a, true, t_ns);
         else ads1282_power_up(&r.a, t_ns);
@@ -304,8 +304,7 @@ static void reserved_rates_stop_the_converter_and_are_counted(void **state)
         powered(&r, &quiet);
         to_fall(&r);
         wreg(&r, 1, config0[k]);
-        if (to_fall(&r) || r.a.count.refused != 1 || ads1282_running(&r.a) || ads1282_period_ns(&r.a) ||
-            ads1282_settle_ns(&r.a))
+        if (to_fall(&r) || r.a.count.refused != 1 || r.a.running || ads1282_period_ns(&r.a) || ads1282_settle_ns(&r.a))
             fail_msg("CONFIG0 %02X was not refused", config0[k]);
         assert_true(ads1282_drdy(&r.a));
         SEND(&r, 0x11);

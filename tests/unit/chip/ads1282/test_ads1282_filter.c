@@ -48,13 +48,20 @@ static int64_t cic_block(struct cic *c, unsigned n, int64_t held)
     return (int64_t)y;
 }
 
+static void sinc_taps(unsigned ratio, int32_t tap[ADS1282_SINC_TAPS])
+{
+    static struct ads1282_filter f;
+    ads1282_filter_init(&f, ratio, ADS1282_LINEAR);
+    memcpy(tap, f.sinc_tap, sizeof f.sinc_tap);
+}
+
 static void five_weights_are_the_sinc_at_the_modulator_rate(void **state)
 {
     (void)state;
     struct rng r = rng_stream(rig_seed(1), 0, "sinc");
     for (unsigned k = 0; k < COUNT(ratios); k++) {
         int32_t tap[ADS1282_SINC_TAPS];
-        ads1282_sinc_taps(ratios[k], tap);
+        sinc_taps(ratios[k], tap);
         struct cic cic = {{0}, {0}};
         int64_t held[ADS1282_SINC_TAPS] = {0};
         for (int block = 0; block < 200; block++) {
@@ -72,7 +79,7 @@ static void sinc_weights_sum_to_the_fourth_power(void **state)
     (void)state;
     for (unsigned k = 0; k < COUNT(ratios); k++) {
         int32_t tap[ADS1282_SINC_TAPS];
-        ads1282_sinc_taps(ratios[k], tap);
+        sinc_taps(ratios[k], tap);
         int64_t sum = 0;
         for (int j = 0; j < ADS1282_SINC_TAPS; j++) sum += tap[j];
         const int64_t n2 = (int64_t)ratios[k] * ratios[k];
@@ -125,7 +132,7 @@ static void coefficients_are_the_published_ones(void **state)
 static unsigned composite(unsigned ratio, enum ads1282_phase phase, double g[G_MAX])
 {
     int32_t sinc[ADS1282_SINC_TAPS];
-    ads1282_sinc_taps(ratio, sinc);
+    sinc_taps(ratio, sinc);
     memset(g, 0, G_MAX * sizeof *g);
     for (int j = 0; j < ADS1282_SINC_TAPS; j++) g[j] = sinc[j] / pow(ratio, 4);
     unsigned len = ADS1282_SINC_TAPS;
@@ -200,7 +207,7 @@ static void each_word_is_the_plain_convolution(void **state)
         const enum ads1282_phase phase = row & 1 ? ADS1282_MINIMUM : ADS1282_LINEAR;
         static struct ads1282_filter f;
         int32_t sinc[ADS1282_SINC_TAPS];
-        ads1282_sinc_taps(ratio, sinc);
+        sinc_taps(ratio, sinc);
         for (unsigned i = 0; i < BLOCKS; i++) block[i] = random_block(&r, (int)(row / 2 % 4));
         unsigned log2_ratio = 3;
         while (1u << log2_ratio < ratio) log2_ratio++;

@@ -80,7 +80,7 @@ static void standby_keeps_registers_and_wakeup_settles_in_t_dr(void **state)
     wreg(&r, ADS1282_OFC0, 0x33);
     to_fall(&r);
     SEND(&r, 0x11, 0x02);
-    assert_false(ads1282_running(&r.a));
+    assert_false(r.a.running);
     const unsigned samples = r.samples;
     assert_int_equal(to_fall(&r), 0);
     assert_int_equal(r.samples, samples);
@@ -91,7 +91,7 @@ static void standby_keeps_registers_and_wakeup_settles_in_t_dr(void **state)
     assert_int_equal(to_fall(&r), 0);
     SEND(&r, 0x10, 0x00);
     const int64_t edge = r.tclk;
-    assert_true(ads1282_running(&r.a));
+    assert_true(r.a.running);
     assert_int_equal(to_fall(&r), clk_edge_ns(&r.clk, edge + T_DR_1000));
     hex_is(read_bytes(&r, 4), 0xFFFFCD01); /* OFC is still there */
 }
@@ -122,7 +122,7 @@ static void power_up_takes_65536_tclk_before_t_dr(void **state)
     hex_is(reg_peek(&r.a.regs, 1), 0x52);
     ads1282_reset_pin(&r.a, false, r.s.now_ns);
     ads1282_reset_pin(&r.a, true, r.s.now_ns + 1000);
-    assert_false(ads1282_running(&r.a));
+    assert_false(r.a.running);
     assert_int_equal(to_fall(&r), clk_edge_ns(&r.clk, 65536 + T_DR_1000));
 }
 
@@ -152,7 +152,7 @@ static void pwdn_forgets_everything_and_its_rise_is_a_power_up(void **state)
         to_fall(&r);
         ads1282_pwdn_pin(&r.a, false, at_tclk(&r, r.tclk + 100));
         assert_true(ads1282_drdy(&r.a));
-        assert_false(ads1282_running(&r.a));
+        assert_false(r.a.running);
         const unsigned samples = r.samples;
         wreg(&r, ADS1282_OFC0, 0x33);
         ads1282_sync_pin(&r.a, true, r.s.now_ns);

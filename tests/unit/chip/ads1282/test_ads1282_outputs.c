@@ -82,8 +82,7 @@ static void a_step_passes_the_sinc_in_five_words(void **state)
         at_tclk(&r, r.tclk + step - latency);
         ads1282_sample_until(&r.a, r.s.now_ns);
         r.v = 1.25;
-        int32_t tap[ADS1282_SINC_TAPS];
-        ads1282_sinc_taps(sinc_rates[k].n, tap);
+        const int32_t *const tap = r.a.filter.sinc_tap;
         int64_t sum = 0;
         const double n4 = pow(sinc_rates[k].n, 4);
         for (int m = -1 - (int)(264 / step); m < 8; m++) {
@@ -139,7 +138,7 @@ static void modulator_bits_come_each_4_tclk_and_without_drdy(void **state)
         assert_int_equal(b.last_ns, clk_edge_ns(&b.r.clk, from + 4 * 4000));
         assert_int_equal(b.r.falls, 0);
         assert_true(ads1282_drdy(&b.r.a));
-        assert_true(ads1282_running(&b.r.a));
+        assert_true(b.r.a.running);
         assert_int_equal(ads1282_period_ns(&b.r.a), 0);
     }
 }
