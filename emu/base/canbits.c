@@ -120,31 +120,20 @@ static unsigned most_stuff(unsigned bits)
     return (bits - 1u) / 4u;
 }
 
-static struct can_bits frame_bound(uint8_t flags, uint8_t len, bool stuffed)
+struct can_bits can_bits_worst(uint8_t flags, uint8_t len)
 {
     const unsigned id = flags & CAN_EXT ? 33u : 14u; /* SOF .. IDE, or .. RTR of an extended frame */
     const unsigned data = flags & CAN_RTR ? 0u : 8u * len;
     if (!(flags & CAN_FD)) {
         const unsigned bits = id + (flags & CAN_EXT ? 2u : 1u) + 4u + data + 15u;
-        return (struct can_bits){bits + (stuffed ? most_stuff(bits) : 0) + TAIL_BITS, 0};
+        return (struct can_bits){bits + most_stuff(bits) + TAIL_BITS, 0};
     }
     const unsigned arbitration = id + 3u;
     const unsigned dynamic = arbitration + 5u + data;
-    const unsigned stuff = stuffed ? most_stuff(dynamic) : 0;
-    const unsigned stuff_nominal = stuffed ? most_stuff(arbitration) : 0;
+    const unsigned stuff_nominal = most_stuff(arbitration);
     const unsigned nominal = arbitration + stuff_nominal + TAIL_BITS;
-    const unsigned fast = dynamic - arbitration + stuff - stuff_nominal + fd_crc_bits(len);
+    const unsigned fast = dynamic - arbitration + most_stuff(dynamic) - stuff_nominal + fd_crc_bits(len);
     return flags & CAN_BRS ? (struct can_bits){nominal, fast} : (struct can_bits){nominal + fast, 0};
-}
-
-struct can_bits can_bits_least(uint8_t flags, uint8_t len)
-{
-    return frame_bound(flags, len, false);
-}
-
-struct can_bits can_bits_worst(uint8_t flags, uint8_t len)
-{
-    return frame_bound(flags, len, true);
 }
 
 static int64_t bits_ns(unsigned bits, uint32_t hz)

@@ -21,9 +21,8 @@ struct can_bits {
 /* Of this very frame; it must be can_valid(). */
 struct can_bits can_bits_exact(const struct can_msg *m);
 
-/* Bounds over all identifiers and contents for flags (CAN_EXT, CAN_RTR, CAN_FD, CAN_BRS) and a valid len: no stuff bit at
- * all, and a stuff bit wherever the stuffing rule allows one. */
-struct can_bits can_bits_least(uint8_t flags, uint8_t len);
+/* Bound over all identifiers and contents for flags (CAN_EXT, CAN_RTR, CAN_FD, CAN_BRS) and a valid len: a stuff bit wherever
+ * the stuffing rule allows one. */
 struct can_bits can_bits_worst(uint8_t flags, uint8_t len);
 
 /* Time they take, each phase rounded to the nearest nanosecond; 0 on an ideal bus. */

@@ -50,12 +50,6 @@ static double load_v(const struct afe_cfg *c, const struct afe_scale *s, double 
     return clip_v(signal * s->load + c->buffer_offset_v + s->drift_v, c->clip_v);
 }
 
-double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc)
-{
-    const struct afe_scale s = scale_at(cfg, temp_degc);
-    return load_v(cfg, &s, signal) / s.divider;
-}
-
 /* Constants of a step of dt: they change only when the converter changes its pace. */
 static void set_step(struct afe *a, int64_t dt_ns)
 {

@@ -72,11 +72,8 @@ void afe_fault_remove(struct afe *a, struct afe_fault *f);
 /* Ideal chain, all tolerances and errors zero: 1 kohm (10 V at 10 mA), 1 : 8, 10 kHz, clipping at 10.5 V. */
 struct afe_cfg afe_nominal(enum afe_input input);
 
-/* Static transfer, pure: volts at the converter for a signal (A or V by cfg.input) at a board temperature. */
-double afe_static_v(const struct afe_cfg *cfg, double signal, double temp_degc);
-
-/* Volts at the converter at t_ns (never earlier than the last call; the same instant gives the same volts), filter and
- * noise included. The filter takes the signal as held since the last call. */
+/* Volts at the converter for a signal (A or V by cfg.input) at a board temperature, filter and noise included; t_ns never earlier
+ * than the last call, the same instant gives the same volts. The filter takes the signal as held since the last call. */
 double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns);
 
 /* The same for n samples in a row, in place: signals in, volts out. */

@@ -303,16 +303,12 @@ void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, 
     if (t_ns - n->drop_ns >= BOARD_NODE_CALM_NS) co_node_error_end(&n->node, CAN_OVERRUN, t_ns);
 }
 
-void board_node_notify_reject(struct board_node *n, const char *why)
-{
-    if (strcmp(n->refusal, why) == 0) return;
-    (void)snprintf(n->refusal, sizeof n->refusal, "%s", why);
-    if (n->cfg.refused) n->cfg.refused(n->cfg.ctx, n->cfg.name, n->refusal);
-}
-
 void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns)
 {
-    board_node_notify_reject(n, why);
+    if (strcmp(n->refusal, why) != 0) {
+        (void)snprintf(n->refusal, sizeof n->refusal, "%s", why);
+        if (n->cfg.refused) n->cfg.refused(n->cfg.ctx, n->cfg.name, n->refusal);
+    }
     co_node_error(&n->node, STREAM_REFUSED, REG_DEVICE, SOURCE_STREAM, t_ns);
 }
 

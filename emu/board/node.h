@@ -91,9 +91,8 @@ struct co_node *board_node_co(void *can);
 /* A reading: m[i] (data and len) goes as TPDO first + i, all or none. Counted also where nothing is sent. */
 void board_node_stream(struct board_node *n, unsigned first, struct can_msg *m, unsigned frames, int64_t t_ns);
 
-/* A setting of the board was rejected: object 2031h has the reason. _notify_: with a notification of the bench, once. */
+/* A setting of the board was rejected: object 2031h has the reason. */
 void board_node_reject(struct board_node *n, const char *why);
-void board_node_notify_reject(struct board_node *n, const char *why);
 
 /* The bus cannot carry the stream, or can again: 2031h, EMCY FF03h; the bench is notified once. */
 void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns);

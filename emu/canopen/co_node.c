@@ -67,14 +67,6 @@ static struct co_error *find_error(struct co_node *n, uint16_t code)
     return NULL;
 }
 
-bool co_node_has_error(const struct co_node *n, uint16_t code)
-{
-    for (unsigned i = 0; i < CO_ERRORS_MAX; i++) {
-        if (n->error[i].code == code) return code != 0;
-    }
-    return false;
-}
-
 static void send_emcy(struct co_node *n, uint16_t code, uint8_t source, int64_t t_ns)
 {
     if (n->state != CO_OPERATIONAL && n->state != CO_PRE_OPERATIONAL) return;
@@ -96,7 +88,7 @@ static void add_history(struct co_node *n, uint16_t code, uint8_t source)
 void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source, int64_t t_ns)
 {
     assert(code != 0);
-    if (co_node_has_error(n, code)) return;
+    if (find_error(n, code)) return;
     struct co_error *slot = find_error(n, 0);
     if (slot) *slot = (struct co_error){code, reg};
     add_history(n, code, source);

@@ -86,6 +86,5 @@ void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source
 
 /* The error ends, if it was active; the last one to end sends EMCY 0000h. */
 void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns);
-bool co_node_has_error(const struct co_node *n, uint16_t code);
 
 #endif

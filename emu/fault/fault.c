@@ -8,15 +8,15 @@
 
 /* ---- kinds: a new table is named here, a new kind is a row of its layer's file */
 
-const struct fault_table *const fault_tables[] = {&fault_sensor,     &fault_analog,   &fault_chip,
-                                                  &fault_controller, &fault_line,     &fault_link,
-                                                  &fault_supply,     &fault_platform, NULL};
+static const struct fault_table *const tables[] = {&fault_sensor,     &fault_analog,   &fault_chip,
+                                                   &fault_controller, &fault_line,     &fault_link,
+                                                   &fault_supply,     &fault_platform, NULL};
 
 const struct fault_kind *fault_kind(unsigned i)
 {
-    for (unsigned t = 0; fault_tables[t]; t++) {
-        if (i < fault_tables[t]->count) return &fault_tables[t]->kind[i];
-        i -= fault_tables[t]->count;
+    for (unsigned t = 0; tables[t]; t++) {
+        if (i < tables[t]->count) return &tables[t]->kind[i];
+        i -= tables[t]->count;
     }
     return NULL;
 }

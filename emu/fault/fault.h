@@ -1,6 +1,6 @@
 /* Faults: what goes wrong where, when and for how long.
  *
- * A kind of fault is a row of a table (fault_tables): its layer, the places it can happen at, the arguments it takes, and
+ * A kind of fault is a row of a table: its layer, the places it can happen at, the arguments it takes, and
  * how it is injected and cleared. A fault is a kind at a point, `a.sensor.x`, begun at an instant of simulated time or
  * by an event of a board, and lifted after a time or by command. Random ones draw from rng_stream(seed, id, "fault").
  * What a point does not support is rejected with the reason. Several faults may be at one point. One thread; owned by the
@@ -86,8 +86,6 @@ struct fault_engine {
     void (*changed)(void *ctx, const struct fault *f, int64_t t_ns); /* it began or ended; may be NULL */
     void *ctx;
 };
-
-extern const struct fault_table *const fault_tables[]; /* up to NULL */
 
 void fault_init(struct fault_engine *e, const struct control_bench *bench, struct sched *s);
 

@@ -6,6 +6,7 @@
 
 #include "base/bits.h"
 #include "base/can.h"
+#include "canopen/co_node.h"
 
 #include <string.h>
 
@@ -32,6 +33,13 @@ static inline void host_asks(struct can_bus *bus, struct can_node *host, uint8_t
     frame[3] = sub;
     bits_put_le(&frame[4], data, 4);
     host_put(bus, host, 0x600u + node, sizeof frame, frame);
+}
+
+static inline bool error_active(const struct co_node *n, uint16_t code)
+{
+    for (unsigned i = 0; i < CO_ERRORS_MAX; i++)
+        if (n->error[i].code == code) return true;
+    return false;
 }
 
 #endif

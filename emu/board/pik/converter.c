@@ -121,14 +121,3 @@ void pik_axis_look(struct pik_axis *a, int64_t tick, const struct pik_drive *d)
     }
     a->drive = *d;
 }
-
-double pik_axis_level(const struct pik_axis *a)
-{
-    double charge = (double)a->charge;
-    if (pik_axis_resetting(a)) {
-        const double weight = a->begun_sign > 0 ? (double)a->drive.plus : -(double)a->drive.minus;
-        const double to_come = (double)(a->begun_tick + a->drive.pulse_ticks - a->tick);
-        charge += weight * to_come / (double)a->drive.pulse_ticks;
-    }
-    return charge / (double)PIK_PULSE;
-}

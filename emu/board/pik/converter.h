@@ -48,19 +48,10 @@ void pik_axis_advance(struct pik_axis *a, int64_t tick);
 /* A look: up to tick with the drive that held so far, then the other. What is beyond the rail is lost. */
 void pik_axis_look(struct pik_axis *a, int64_t tick, const struct pik_drive *d);
 
-/* Up minus down. */
-static inline int64_t pik_axis_count(const struct pik_axis *a)
-{
-    return (int64_t)(a->plus - a->minus);
-}
-
 /* Whether a reset is under way at a->tick. */
 static inline bool pik_axis_resetting(const struct pik_axis *a)
 {
     return a->begun_sign != 0 && a->tick < a->begun_tick + a->drive.pulse_ticks;
 }
-
-/* Output of the integrator at a->tick in pulses, a reset under way counted as far as it has gone. */
-double pik_axis_level(const struct pik_axis *a);
 
 #endif

@@ -42,9 +42,8 @@ def canbits(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     lib = ctypes.CDLL(str(out))
     lib.can_bits_exact.argtypes = [ctypes.POINTER(Msg)]
     lib.can_bits_exact.restype = Bits
-    for name in ("can_bits_least", "can_bits_worst"):
-        getattr(lib, name).argtypes = [ctypes.c_uint8, ctypes.c_uint8]
-        getattr(lib, name).restype = Bits
+    lib.can_bits_worst.argtypes = [ctypes.c_uint8, ctypes.c_uint8]
+    lib.can_bits_worst.restype = Bits
     return lib
 
 

@@ -144,12 +144,12 @@ static void a_board_says_in_words_why_it_refused_a_setting(void **state)
 {
     (void)state;
     struct rig *r = rig_up();
-    board_node_notify_reject(&r->can, "refused: no such gain");
-    board_node_notify_reject(&r->can, "refused: no such gain");
+    board_node_reject_stream(&r->can, "refused: no such gain", r->s.now_ns);
+    board_node_reject_stream(&r->can, "refused: no such gain", r->s.now_ns);
     assert_string_equal(upload_text(r, PSD1_OD_REFUSAL), "refused: no such gain");
     assert_string_equal(r->told, "unit refused: no such gain");
     assert_int_equal(r->refusals, 1);
-    board_node_notify_reject(&r->can, "refused: no such rate");
+    board_node_reject_stream(&r->can, "refused: no such rate", r->s.now_ns);
     assert_int_equal(r->refusals, 2);
 }
 

@@ -154,7 +154,7 @@ static void samples_the_bus_does_not_take_are_counted_and_told(void **state)
         board_sends(r, 1);
     }
     assert_true(r->can.node.dropped > 80);
-    assert_true(co_node_has_error(&r->can.node.node, PSA2_EMCY_CAN_OVERRUN));
+    assert_true(error_active(&r->can.node.node, PSA2_EMCY_CAN_OVERRUN));
     can_detach(&r->bus, &jammer);
     settle(r);
     assert_int_equal(count_id(r, 0x085), 1);

@@ -116,11 +116,11 @@ static void a_port_fault_of_the_board_is_told_and_ends_with_data(void **state)
     struct psa2_frame f = sample(r);
     f.status = PSA2_ST_SETTLED;
     psa2_can_frame(&r->can, &f, r->s.now_ns);
-    assert_false(co_node_has_error(&r->can.node.node, PSA2_EMCY_ACCEL_PORT));
-    assert_true(co_node_has_error(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
+    assert_false(error_active(&r->can.node.node, PSA2_EMCY_ACCEL_PORT));
+    assert_true(error_active(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
     f.status |= PSA2_ST_TEMP_NEW;
     psa2_can_frame(&r->can, &f, r->s.now_ns);
-    assert_false(co_node_has_error(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
+    assert_false(error_active(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
 }
 
 /* ---- resets, mirrors, several units ---- */

@@ -288,7 +288,7 @@ static void a_bus_too_slow_is_told(void **state)
     wire.count = 0;
     rig_run(&rig, 10000000);
     assert_int_equal(wire.count, 0);
-    assert_true(co_node_has_error(&wire.can.node.node, PSD1_EMCY_STREAM_REFUSED));
+    assert_true(error_active(&wire.can.node.node, PSD1_EMCY_STREAM_REFUSED));
 }
 
 static void every_part_and_counter_has_its_place(void **state)
