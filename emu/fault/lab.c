@@ -1,0 +1,97 @@
+/* Faults of the instruments: the supply; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
+ * angle sensor. */
+#include "fault/internal.h"
+
+#include <stdio.h>
+
+/* ---- supply */
+
+_Static_assert(SUPPLY_DIPS_MAX >= FAULTS_MAX, "each brown-out that was accepted has room in the supply");
+
+static bool reaches_brownout(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct supply *s = b->lab ? &b->lab->supply : NULL;
+    if (!s || !s->cfg.present) {
+        snprintf(why, CONTROL_WHY_MAX, "%s: this scenario has none (section supply): the boards are always fed",
+                 f->name);
+        return false;
+    }
+    if (s->set_v - f->value[FAULT_DROP_V] < s->cfg.brownout_v) return true;
+    snprintf(why, CONTROL_WHY_MAX, "drop_v: %.10g: %.10g V less that is not below the threshold of the boards, %.10g V",
+             f->value[FAULT_DROP_V], s->set_v, s->cfg.brownout_v);
+    return false;
+}
+
+static bool dip_supply(struct fault *f, int64_t t_ns)
+{
+    const struct control_bench *b = f->engine->bench;
+    char why[CONTROL_WHY_MAX];
+    if (!reaches_brownout(b, f, why)) return false; /* it has been set higher meanwhile */
+    if (supply_dip(&b->lab->supply, f->value[FAULT_DROP_V], t_ns, f->for_ns, t_ns) != SUPPLY_OK) return false;
+    if (b->sim.supply_changed) b->sim.supply_changed(b->ctx, t_ns);
+    return true;
+}
+
+/* It ends by itself; one that is cleared ends now. */
+static void lift_supply(struct fault *f, int64_t t_ns)
+{
+    const struct control_bench *b = f->engine->bench;
+    supply_dip_end(&b->lab->supply, f->value[FAULT_DROP_V], f->began_ns, f->for_ns, t_ns);
+    if (b->sim.supply_changed) b->sim.supply_changed(b->ctx, t_ns);
+}
+
+/* ---- platform */
+
+static struct platform *platform_of(const struct fault *f)
+{
+    return &f->engine->bench->lab->platform;
+}
+
+/* What is active of the kind at the point: its number, and the sum of its value. */
+static unsigned count_active(const struct fault *f, enum fault_arg arg, double *sum)
+{
+    unsigned n = 0;
+    *sum = 0.0;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        if (other->kind != f->kind || !fault_lasts_at(f, other)) continue;
+        n++;
+        *sum += other->value[arg];
+    }
+    return n;
+}
+
+static void refresh_torquer(struct fault *f, int64_t t_ns)
+{
+    double unused;
+    const double gain = count_active(f, FAULT_ID, &unused) ? 0.0 : 1.0;
+    platform_set_torquer(platform_of(f), (enum platform_axis)f->point.index, gain, t_ns);
+}
+
+static void refresh_drift(struct fault *f, int64_t t_ns)
+{
+    double degph;
+    (void)count_active(f, FAULT_DRIFT_DEGPH, &degph);
+    platform_step_drift(platform_of(f), (enum platform_axis)f->point.index, degph, t_ns);
+}
+
+static void refresh_sensor(struct fault *f, int64_t t_ns)
+{
+    double unused;
+    platform_stick(platform_of(f), count_active(f, FAULT_ID, &unused) > 0, t_ns);
+}
+
+// clang-format off
+static const struct fault_kind lab[] = {
+    {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off; after the supply returns: boot-up message, set-up, frame numbers from 0",
+     .places = FAULT_BIT(FAULT_AT_SUPPLY), .need = FAULT_BIT(FAULT_DROP_V) | FAULT_BIT(FAULT_FOR_S), .nonzero = FAULT_BIT(FAULT_FOR_S),
+     .unless = "the scenario has no supply; the voltage stays above the threshold of the boards", .fits = reaches_brownout, .apply = dip_supply, .lift = lift_supply},
+    {"platform.torquer", "The torquer of the axis gives no torque.", "the gyro unit gives no windows. Level: it does not settle (EMCY FF23h). Azimuth: the angle sensor does not follow (EMCY FF22h)",
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .lift = refresh_torquer},
+    {"platform.drift_step", "The gyroscope drift about the axis changes by drift_degph.", "the levelling rate (azimuth: the rate of the azimuth torquer) changes by drift_degph",
+     .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .lift = refresh_drift},
+    {"platform.encoder_stuck", "The angle sensor of the outer gimbal freezes at its last value.", "ENCODER is constant; during a turn the unit reports it (EMCY FF22h)",
+     .places = FAULT_BIT(FAULT_AT_ENCODER), .lift = refresh_sensor},
+};
+// clang-format on
+const struct fault_table fault_lab = {lab, sizeof lab / sizeof *lab};
