@@ -24,30 +24,6 @@ void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f)
     if (*list) *list = f->next;
 }
 
-static double apply_stuck(struct sensor_fault *f, double out, int64_t t_ns)
-{
-    (void)out;
-    (void)t_ns;
-    return f->value;
-}
-
-static double apply_bias(struct sensor_fault *f, double out, int64_t t_ns)
-{
-    (void)t_ns;
-    return out + f->value;
-}
-
-static double apply_drift(struct sensor_fault *f, double out, int64_t t_ns)
-{
-    return out + f->value * ((double)(t_ns - f->from_ns) / (double)NS_PER_S);
-}
-
-static double apply_scale(struct sensor_fault *f, double out, int64_t t_ns)
-{
-    (void)t_ns;
-    return out + f->value * (out - f->zero);
-}
-
 /* White noise of one-sided density d, averaged over dt, has the variance d^2 / (2 dt), as in phys/sensor/mems.c. */
 static double apply_noise(struct sensor_fault *f, double out, int64_t t_ns)
 {
@@ -59,20 +35,28 @@ static double apply_noise(struct sensor_fault *f, double out, int64_t t_ns)
     return out + f->held;
 }
 
-static double apply_saturation(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_fault(struct sensor_fault *f, double out, int64_t t_ns)
 {
-    (void)t_ns;
-    return out < f->value ? f->value : out > f->value_high ? f->value_high : out;
+    switch (f->kind) {
+    case SENSOR_STUCK:
+        return f->value;
+    case SENSOR_BIAS:
+        return out + f->value;
+    case SENSOR_DRIFT:
+        return out + f->value * ((double)(t_ns - f->from_ns) / (double)NS_PER_S);
+    case SENSOR_SCALE:
+        return out + f->value * (out - f->zero);
+    case SENSOR_NOISE:
+        return apply_noise(f, out, t_ns);
+    default: /* SENSOR_SATURATION */
+        return out < f->value ? f->value : out > f->value_high ? f->value_high : out;
+    }
 }
 
 double sensor_fault_out(struct sensor_fault *list, double out, int64_t t_ns)
 {
-    static double (*const effect[SENSOR_FAULTS])(struct sensor_fault *, double, int64_t) = {
-        [SENSOR_STUCK] = apply_stuck, [SENSOR_BIAS] = apply_bias,   [SENSOR_DRIFT] = apply_drift,
-        [SENSOR_SCALE] = apply_scale, [SENSOR_NOISE] = apply_noise, [SENSOR_SATURATION] = apply_saturation,
-    };
     for (struct sensor_fault *f = list; f; f = f->next) {
-        if (t_ns >= f->from_ns) out = effect[f->kind](f, out, t_ns);
+        if (t_ns >= f->from_ns) out = apply_fault(f, out, t_ns);
     }
     return out;
 }
