@@ -1,5 +1,7 @@
 #include "base/reg.h"
 
+#include "base/bits.h"
+
 #include <assert.h>
 
 static bool is_hole(const struct reg_file *f, unsigned addr)
@@ -42,6 +44,16 @@ void reg_poke(struct reg_file *f, unsigned addr, uint8_t v)
 {
     assert(!is_hole(f, addr));
     f->value[addr] = v;
+}
+
+uint32_t reg_peek24(const struct reg_file *f, unsigned addr)
+{
+    return (uint32_t)bits_get_le(&f->value[addr], 3);
+}
+
+void reg_poke24(struct reg_file *f, unsigned addr, uint32_t v)
+{
+    bits_put_le(&f->value[addr], v, 3);
 }
 
 bool reg_flip(struct reg_file *f, unsigned addr, uint8_t mask, int64_t t_ns)

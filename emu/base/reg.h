@@ -36,6 +36,10 @@ void reg_write(struct reg_file *f, unsigned addr, uint8_t v, int64_t t_ns);
 uint8_t reg_peek(const struct reg_file *f, unsigned addr);
 void reg_poke(struct reg_file *f, unsigned addr, uint8_t v);
 
+/* Three registers in a row as one of 24 bits, lowest byte first: peek and poke. */
+uint32_t reg_peek24(const struct reg_file *f, unsigned addr);
+void reg_poke24(struct reg_file *f, unsigned addr, uint32_t v);
+
 /* A fault inverts bits, read-only ones too; the hook runs, for the logic sees what is stored. False: a hole. */
 bool reg_flip(struct reg_file *f, unsigned addr, uint8_t mask, int64_t t_ns);
 

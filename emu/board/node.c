@@ -19,9 +19,7 @@ enum { CAN_OVERRUN = 0x8110, STREAM_REFUSED = 0xFF03, SOURCE_STREAM = 3, REG_COM
 
 double board_node_default(const struct board_node *n, uint16_t index, uint8_t sub)
 {
-    uint32_t abort = CO_OK;
-    const struct co_entry *e = co_find(n->type->device->od, index, sub, &abort);
-    return e ? e->value : 0.0;
+    return co_default_number(n->type->device->od, index, sub, 0);
 }
 
 /* ---- bus cycles ---- */
@@ -141,6 +139,14 @@ static uint8_t at_most_255(unsigned n)
     return (uint8_t)(n < 255 ? n : 255);
 }
 
+int64_t board_node_load(struct board_node *n, int64_t t_ns)
+{
+    const int64_t from_ns = n->load_from_ns, was_ns = n->load_busy_ns;
+    n->load_from_ns = t_ns;
+    n->load_busy_ns = can_busy_ns(n->bus, t_ns);
+    return t_ns > from_ns ? (n->load_busy_ns - was_ns) * 1000 / (t_ns - from_ns) : 0;
+}
+
 /* The first sub-indices of 2030h, in the order of proto/unit.yaml. */
 static uint32_t read_counter(struct board_node *n, const struct co_entry *e, struct co_value *v, int64_t t_ns)
 {
@@ -160,7 +166,7 @@ static uint32_t read_counter(struct board_node *n, const struct co_entry *e, str
                               n->cycles_refused};
     assert(d->counter_sub == sizeof value / sizeof value[0]);
     if (e->sub >= d->counter_sub) v->number = board_counter_value(n, (unsigned)e->sub - d->counter_sub);
-    else v->number = e->sub == LOAD ? (double)can_load_since(&n->load, n->bus, t_ns) : value[e->sub];
+    else v->number = e->sub == LOAD ? (double)board_node_load(n, t_ns) : value[e->sub];
     return CO_OK;
 }
 
@@ -171,6 +177,18 @@ static double read_serial(const struct board_node *n, const struct co_entry *e)
 }
 
 /* ---- whether the bus can carry the stream ---- */
+
+bool board_node_load_fits(const struct can_bus_cfg *bus, const char *what, unsigned frames, int64_t need_ns,
+                          int64_t have_ns, char why[BOARD_NODE_TEXT])
+{
+    if (have_ns <= 0 || need_ns <= have_ns) return true;
+    (void)snprintf(why, BOARD_NODE_TEXT,
+                   "refused: %s is %u frame%s, at worst %.3f us at %lu bit/s, and due every %.3f us (%.0f /s): "
+                   "%.1f %% of the bus",
+                   what, frames, frames > 1 ? "s" : "", 1e-3 * (double)need_ns, (unsigned long)bus->bitrate_hz,
+                   1e-3 * (double)have_ns, 1e9 / (double)have_ns, 100.0 * (double)need_ns / (double)have_ns);
+    return false;
+}
 
 /* Bit k: TPDO k + 1 goes with each reading; those that wait for SYNC have the host's pace. */
 static unsigned flowing_tpdos(const struct board_node *n)
@@ -189,7 +207,7 @@ static bool stream_fits(const struct board_node *n, unsigned tpdos, int64_t peri
         frames++;
         need_ns += can_bits_ns(can_bits_worst(0, n->type->device->tpdo_len[k]), &n->bus->cfg);
     }
-    return can_load_fits(&n->bus->cfg, "a reading", frames, need_ns, period_ns, why, BOARD_NODE_TEXT);
+    return board_node_load_fits(&n->bus->cfg, "a reading", frames, need_ns, period_ns, why);
 }
 
 /* ---- texts ---- */

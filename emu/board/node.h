@@ -19,7 +19,6 @@
 #define PSABENCH_BOARD_NODE_H
 
 #include "board/board.h"
-#include "board/can_load.h"
 #include "canopen/co_device.h"
 #include "canopen/co_node.h"
 
@@ -71,8 +70,8 @@ struct board_node {
     struct board_cycle cycle;
     bool cycle_busy;
     uint32_t ticket, cycles, cycles_refused;
-    uint32_t strobe_ns; /* 2051h */
-    struct can_load_mark load;
+    uint32_t strobe_ns;                 /* 2051h */
+    int64_t load_from_ns, load_busy_ns; /* when the load of the bus was last read, and its busy time then */
     char refusal[BOARD_NODE_TEXT], remark[BOARD_NODE_REMARK + 1];
 };
 
@@ -97,6 +96,14 @@ void board_node_reject(struct board_node *n, const char *why);
 /* The bus cannot carry the stream, or can again: 2031h, EMCY FF03h; the bench is notified once. */
 void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns);
 void board_node_accept_stream(struct board_node *n, int64_t t_ns);
+
+/* Whether the bus can carry `frames` frames that take need_ns at worst (canbits.h) and are due every have_ns; 0: whenever, not
+ * judged. False with a sentence about `what` in why. */
+bool board_node_load_fits(const struct can_bus_cfg *bus, const char *what, unsigned frames, int64_t need_ns,
+                          int64_t have_ns, char why[BOARD_NODE_TEXT]);
+
+/* Load of the bus in units of 0.1 % since it was last asked for. */
+int64_t board_node_load(struct board_node *n, int64_t t_ns);
 
 /* A condition of the board begins or ends: its EMCY. */
 void board_node_condition(struct board_node *n, uint16_t code, uint8_t source, bool active, int64_t t_ns);

@@ -182,11 +182,7 @@ static void enter_state(struct co_node *n, enum co_state state, int64_t t_ns)
 
 static void reset_communication(struct co_node *n)
 {
-    uint32_t abort = CO_OK;
-    struct co_value v = {0};
-    const struct co_entry *e = co_find(n->cfg.od, HEARTBEAT_TIME, 0, &abort);
-    if (e) co_default(e, n->cfg.id, &v);
-    n->heartbeat_ms = (uint16_t)v.number;
+    n->heartbeat_ms = (uint16_t)co_default_number(n->cfg.od, HEARTBEAT_TIME, 0, n->cfg.id);
     n->history_count = 0;
     memset(n->error, 0, sizeof n->error);
     co_sdo_reset(&n->sdo);
@@ -213,26 +209,13 @@ static void on_nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
         return;
     }
     if (m->data[1] != 0 && m->data[1] != n->cfg.id) return;
-    switch (m->data[0]) {
-    case NMT_START:
-        enter_state(n, CO_OPERATIONAL, t_ns);
-        return;
-    case NMT_STOP:
-        enter_state(n, CO_STOPPED, t_ns);
-        return;
-    case NMT_PRE_OPERATIONAL:
-        enter_state(n, CO_PRE_OPERATIONAL, t_ns);
-        return;
-    case NMT_RESET_NODE:
-        reset_node(n, CO_EV_RESET_NODE, t_ns);
-        return;
-    case NMT_RESET_COMM:
-        reset_node(n, CO_EV_RESET_COMM, t_ns);
-        return;
-    default:
-        n->malformed++;
-        return;
-    }
+    const unsigned command = m->data[0];
+    if (command == NMT_START) enter_state(n, CO_OPERATIONAL, t_ns);
+    else if (command == NMT_STOP) enter_state(n, CO_STOPPED, t_ns);
+    else if (command == NMT_PRE_OPERATIONAL) enter_state(n, CO_PRE_OPERATIONAL, t_ns);
+    else if (command == NMT_RESET_NODE) reset_node(n, CO_EV_RESET_NODE, t_ns);
+    else if (command == NMT_RESET_COMM) reset_node(n, CO_EV_RESET_COMM, t_ns);
+    else n->malformed++;
 }
 
 static void on_sync(struct co_node *n, const struct can_msg *m, int64_t t_ns)

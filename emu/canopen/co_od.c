@@ -66,6 +66,15 @@ void co_default(const struct co_entry *e, uint8_t node_id, struct co_value *v)
     set_text(v, e->text ? e->text : "", e->text ? strlen(e->text) : 0);
 }
 
+double co_default_number(const struct co_od *od, uint16_t index, uint8_t sub, uint8_t node_id)
+{
+    uint32_t abort = CO_OK;
+    struct co_value v = {.number = 0.0};
+    const struct co_entry *e = co_find(od, index, sub, &abort);
+    if (e) co_default(e, node_id, &v);
+    return v.number;
+}
+
 static int64_t clip_number(const struct co_entry *e, double number)
 {
     const unsigned bits = 8u * (unsigned)co_type_size(e->type);

@@ -79,6 +79,7 @@ size_t co_type_size(uint8_t type);
 
 /* Value of a const entry, and the default of the others. */
 void co_default(const struct co_entry *e, uint8_t node_id, struct co_value *v);
+double co_default_number(const struct co_od *od, uint16_t index, uint8_t sub, uint8_t node_id); /* 0: no such entry */
 
 /* To little-endian bytes, at most cap; returns their number. A number outside its type is clipped. */
 size_t co_encode(const struct co_entry *e, const struct co_value *v, uint8_t *out, size_t cap);

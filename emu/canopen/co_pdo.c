@@ -16,11 +16,7 @@ static struct co_pdo *pdo_of(struct co_node *n, const struct co_entry *e)
 
 static double default_of(const struct co_node *n, unsigned k, uint8_t sub)
 {
-    uint32_t abort = CO_OK;
-    const struct co_entry *e = co_find(n->cfg.od, (uint16_t)(FIRST + k), sub, &abort);
-    struct co_value v = {0};
-    if (e) co_default(e, n->cfg.id, &v);
-    return v.number;
+    return co_default_number(n->cfg.od, (uint16_t)(FIRST + k), sub, n->cfg.id);
 }
 
 void co_pdo_reset(struct co_node *n)

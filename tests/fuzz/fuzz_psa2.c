@@ -129,9 +129,9 @@ static void op_reset(struct world *w, struct script *s)
     w->any = false;
 }
 
-static void op_stream(struct world *w, struct script *s)
+static void op_host(struct world *w, struct script *s)
 {
-    psa2_stream(&w->b, script_byte(s) & 1);
+    w->b.host.frame = script_byte(s) & 1 ? on_frame : NULL;
 }
 
 static void op_wait(struct world *w, struct script *s)
@@ -168,7 +168,7 @@ static void op_watch(struct world *w, struct script *s)
 static void step(struct world *w, struct script *s)
 {
     static void (*const ops[])(struct world * w, struct script * s) = {
-        op_submit, op_wait, op_next, op_submit, op_reset, op_stream, op_input, op_watch,
+        op_submit, op_wait, op_next, op_submit, op_reset, op_host, op_input, op_watch,
     };
     ops[script_byte(s) % (sizeof ops / sizeof ops[0])](w, s);
     check(w);

@@ -243,7 +243,7 @@ static uint32_t read_counter(struct board_node *n, const struct co_entry *e, str
                               n->node.sdo.aborts,
                               n->node.malformed + n->node.sdo.malformed};
     if (e->sub >= sizeof value / sizeof value[0]) return CO_AB_NO_SUB;
-    v->number = e->sub == LOAD ? (double)can_load_since(&n->load, n->bus, t_ns) : (double)value[e->sub];
+    v->number = e->sub == LOAD ? (double)board_node_load(n, t_ns) : (double)value[e->sub];
     return CO_OK;
 }
 

@@ -150,5 +150,5 @@ bool psa2_form_fits(const struct can_bus_cfg *bus, const struct psa2_can_setting
     }
     char what[32];
     (void)snprintf(what, sizeof what, "form %u (%s)", set->form, f->name);
-    return can_load_fits(bus, what, f->frames, worst_ns(f, bus), due_ns(set, period_ns), why, BOARD_NODE_TEXT);
+    return board_node_load_fits(bus, what, f->frames, worst_ns(f, bus), due_ns(set, period_ns), why);
 }

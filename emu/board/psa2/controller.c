@@ -122,7 +122,7 @@ static void read_done(struct psa2 *b, int64_t t_ns)
     for (unsigned i = 0; i < PSA2_WORDS; i++) f->word[i] = 0; /* until it is sent */
     b->sample.reading = b->sample.overrun = b->temp.fresh = false;
     if (b->sample.unsettled) b->sample.unsettled--;
-    if (b->stream) psa2_out_start(b, t_ns);
+    psa2_out_start(b, t_ns);
 }
 
 static void read_start(struct psa2 *b, int64_t t_ns)
@@ -320,7 +320,6 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
     memset(b, 0, sizeof *b); /* no state of an earlier run */
     b->profile = *p;
     board_init(&b->base, psa2_lines, PSA2_LINES, cfg, io, s);
-    b->stream = true;
     b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
     init_trace(b);
@@ -394,7 +393,6 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
     for (unsigned i = 0; i < 3; i++) ads1282_power_off(&b->adc[i], t_ns);
     ads1256_power_off(&b->tadc, t_ns);
     trace_steps(&b->base.trace, &(struct trace_step){t_ns, (UINT32_C(1) << PSA2_LINES) - 1, 0}, 1);
-    b->stream = true;
     b->latest = (struct psa2_frame){0};
     board_notify(&b->base, PSA2_EV_RES, t_ns);
     board_notify(&b->base, PSA2_EV_POWER_DOWN, t_ns);
@@ -404,11 +402,6 @@ void psa2_power_down(struct psa2 *b, int64_t t_ns)
 bool psa2_ready(const struct psa2 *b)
 {
     return b->mode == PSA2_RUN;
-}
-
-void psa2_stream(struct psa2 *b, bool on)
-{
-    b->stream = on;
 }
 
 void psa2_sample_until(struct psa2 *b, int64_t t_ns)

@@ -119,7 +119,6 @@ void psa2_reset(struct psa2 *b, int64_t t_ns);    /* a pulse on Res */
 void psa2_power_down(struct psa2 *b, int64_t t_ns);
 
 bool psa2_ready(const struct psa2 *b);                /* the set-up has been carried out */
-void psa2_stream(struct psa2 *b, bool on);            /* frames on the line and to the host; on after power-up */
 void psa2_sample_until(struct psa2 *b, int64_t t_ns); /* the converters take their inputs up to now */
 
 /* Queues one request; PSA2_OK means done() will be called later (never from inside), anything else that it will not.

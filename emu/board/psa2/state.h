@@ -109,7 +109,6 @@ struct psa2 {
     bool unpowered; /* the lines are low since a power-down */
     unsigned step;  /* of the set-up */
     bool reversed;  /* the present set-up runs in reverse order */
-    bool stream;
     struct psa2_spi spi;
     struct psa2_xfer read; /* of the three codes */
     struct psa2_pulse pulse;

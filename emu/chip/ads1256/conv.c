@@ -1,18 +1,10 @@
 #include "chip/ads1256/internal.h"
 
-static uint32_t get_reg24(const struct ads1256 *a, enum ads1256_reg low)
-{
-    return a->value[low] | (uint32_t)a->value[low + 1] << 8 | (uint32_t)a->value[low + 2] << 16;
-}
+#include "base/bits.h"
 
 static int32_t get_ofc(const struct ads1256 *a)
 {
-    return (int32_t)(get_reg24(a, ADS1256_OFC0) ^ 0x800000) - 0x800000;
-}
-
-static void poke_reg24(struct ads1256 *a, enum ads1256_reg low, uint32_t v)
-{
-    for (unsigned i = 0; i < 3; i++) reg_poke(&a->regs, low + i, (uint8_t)(v >> (8 * i)));
+    return bits_sign_extend(reg_peek24(&a->regs, ADS1256_OFC0), 24);
 }
 
 void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns)
@@ -115,7 +107,7 @@ static int32_t convert_mean(struct ads1256 *a)
 {
     bool clipped = false;
     const double raw = a->rate->alpha * (a->mean.out + noise_fs(a));
-    const int32_t code = ads1256_code(raw, get_ofc(a), get_reg24(a, ADS1256_FSC0), &clipped);
+    const int32_t code = ads1256_code(raw, get_ofc(a), reg_peek24(&a->regs, ADS1256_FSC0), &clipped);
     a->n.clipped += clipped;
     return code;
 }
@@ -193,14 +185,14 @@ void ads1256_calibrate(struct ads1256 *a, enum ads1256_cal kind, int64_t t_ns)
 static void store_ofc(struct ads1256 *a, double raw)
 {
     bool clamped = false;
-    poke_reg24(a, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(raw, &clamped));
+    reg_poke24(&a->regs, ADS1256_OFC0, (uint32_t)ads1256_cal_ofc(raw, &clamped));
     a->n.cal_clamped += clamped;
 }
 
 static void store_fsc(struct ads1256 *a, double raw)
 {
     bool clamped = false;
-    poke_reg24(a, ADS1256_FSC0, ads1256_cal_fsc(a->rate, raw, &clamped));
+    reg_poke24(&a->regs, ADS1256_FSC0, ads1256_cal_fsc(a->rate, raw, &clamped));
     a->n.cal_clamped += clamped;
 }
 

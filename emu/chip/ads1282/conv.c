@@ -140,19 +140,14 @@ static int64_t due_tclk(const struct ads1282 *a, int64_t p)
     return a->timing.first_tclk + p * a->timing.period_tclk;
 }
 
-static uint32_t get_reg24(const struct ads1282 *a, unsigned low_byte)
+static int32_t get_ofc(const struct ads1282 *a)
 {
-    return (uint32_t)bits_get_le(&a->reg_value[low_byte], 3);
-}
-
-static void put_reg24(struct ads1282 *a, unsigned low_byte, uint32_t v)
-{
-    for (unsigned i = 0; i < 3; i++) reg_poke(&a->regs, low_byte + i, (uint8_t)(v >> (8 * i)));
+    return bits_sign_extend(reg_peek24(&a->regs, ADS1282_OFC0), 24);
 }
 
 static int64_t correct_code(const struct ads1282 *a, int64_t y)
 {
-    return ads1282_correct(y, bits_sign_extend(get_reg24(a, ADS1282_OFC0), 24), get_reg24(a, ADS1282_FSC0));
+    return ads1282_correct(y, get_ofc(a), reg_peek24(&a->regs, ADS1282_FSC0));
 }
 
 static uint32_t fir_word(struct ads1282 *a, int64_t y)
@@ -178,9 +173,9 @@ static bool calibrate_word(struct ads1282 *a, int64_t y)
     struct ads1282_cal *c = &a->cal;
     if (c->kind == ADS1282_CAL_NONE) return false;
     if (!ads1282_cal_take(c, a->cfg.cal_corrected ? correct_code(a, y) : y)) return true;
-    const int32_t ofc = a->cfg.cal_corrected ? 0 : bits_sign_extend(get_reg24(a, ADS1282_OFC0), 24);
-    if (c->kind == ADS1282_CAL_OFFSET) put_reg24(a, ADS1282_OFC0, (uint32_t)ads1282_cal_ofc(c));
-    else put_reg24(a, ADS1282_FSC0, ads1282_cal_fsc(c, ofc));
+    const int32_t ofc = a->cfg.cal_corrected ? 0 : get_ofc(a);
+    if (c->kind == ADS1282_CAL_OFFSET) reg_poke24(&a->regs, ADS1282_OFC0, (uint32_t)ads1282_cal_ofc(c));
+    else reg_poke24(&a->regs, ADS1282_FSC0, ads1282_cal_fsc(c, ofc));
     a->count.calibrations++;
     c->kind = ADS1282_CAL_NONE;
     choose_special(a);

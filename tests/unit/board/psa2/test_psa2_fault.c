@@ -194,7 +194,6 @@ static void after_power_up_all_begins_anew(void **state)
     const int64_t first_ns = rig.frame[0].t_sample_ns;
     struct psa2_request q = {.group = PSA2_ACCEL, .op = PSA2_WRITE_REG, .addr = ADS1282_OFC0, .value = 0x55};
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
-    psa2_stream(&rig.b, false);
     psa2_power_down(&rig.b, rig.s.now_ns);
     up_to(1000000000); /* the clocks' edges fall as at 0 */
     const unsigned before = rig.frames;
