@@ -3,8 +3,8 @@
  *
  * BOARD_LIFE(NAME) at the file's top level defines init, power_up, power_down, reset and sample_until, which
  * BOARD_LIFE_FUNCTIONS puts into the board_type. BOARD_COMMON(NAME, PREFIX) does so with all else that each board names alike:
- * NAME_fields, PREFIX_LINES, the file's parts. BOARD_BUS(NAME) defines strobe, by the profile's strobe_ns and strobe_min_ns, and
- * submit, of board_bus. */
+ * NAME_fields, PREFIX_LINES, the file's parts. BOARD_BUS(NAME, COUNT) defines NAME_bus with COUNT addresses: the file's submit,
+ * registers and describe_expected, and the strobe by the profile's strobe_ns and strobe_min_ns. */
 #ifndef PSABENCH_BOARD_LIFE_H
 #define PSABENCH_BOARD_LIFE_H
 
@@ -28,17 +28,14 @@
     .parts = parts, .part_count = sizeof parts / sizeof *parts, .controller_faults = controller_faults,                \
     .can = &NAME##_can, BOARD_LIFE_FUNCTIONS, .ready = ready, .digest = digest
 
-#define BOARD_BUS(NAME)                                                                                                \
-    static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)                    \
-    {                                                                                                                  \
-        return NAME##_submit((struct NAME *)board, c, t_ns);                                                           \
-    }                                                                                                                  \
+#define BOARD_BUS(NAME, COUNT)                                                                                         \
     static struct board_strobe strobe(const struct board *board)                                                       \
     {                                                                                                                  \
         const struct NAME *b = (const struct NAME *)board;                                                             \
         return (struct board_strobe){b->profile.strobe_ns, b->profile.strobe_min_ns};                                  \
     }                                                                                                                  \
-    struct NAME /* so that a semicolon has to follow */
+    const struct board_bus NAME##_bus = {                                                                              \
+        .submit = submit, .addresses = (COUNT), .registers = registers, .strobe = strobe, .expected = describe_expected}
 // clang-format on
 
 #endif

@@ -119,7 +119,7 @@ static void op_submit(struct world *w, struct script *s)
     struct board_cycle *const at = w->waiting ? &c : &w->cycle;
     if (!w->waiting) w->cycle = c;
     w->submitting = true;
-    const enum board_cycle_result r = pik_submit(&w->b, at, w->s.now_ns);
+    const enum board_cycle_result r = pik_bus.submit(&w->b.base, at, w->s.now_ns);
     w->submitting = false;
     if (!w->b.on) assert(r == BOARD_CYCLE_OFF);
     else if (w->waiting) assert(r != BOARD_CYCLE_OK);

@@ -123,7 +123,7 @@ static void op_submit(struct world *w, struct script *s)
     struct board_cycle *const at = w->waiting ? &c : &w->cycle;
     if (!w->waiting) w->cycle = c;
     w->submitting = true;
-    const enum board_cycle_result r = pmka_submit(&w->b, at, w->s.now_ns);
+    const enum board_cycle_result r = pmka_bus.submit(&w->b.base, at, w->s.now_ns);
     w->submitting = false;
     if (w->b.life == PMKA_OFF) assert(r == BOARD_CYCLE_OFF);
     else if (w->waiting) assert(r != BOARD_CYCLE_OK);

@@ -124,12 +124,12 @@ static void op_cycle(struct world *w, struct script *s)
                                   .ctx = w};
     if (w->waiting) {
         struct board_cycle second = c;
-        assert(psd1_submit(&w->b, &second, w->s.now_ns) == BOARD_CYCLE_BUSY);
+        assert(psd1_bus.submit(&w->b.base, &second, w->s.now_ns) == BOARD_CYCLE_BUSY);
         return;
     }
     w->cycle = c;
     w->submitting = true;
-    const enum board_cycle_result r = psd1_submit(&w->b, &w->cycle, w->s.now_ns);
+    const enum board_cycle_result r = psd1_bus.submit(&w->b.base, &w->cycle, w->s.now_ns);
     w->submitting = false;
     w->waiting = r == BOARD_CYCLE_OK;
     mix(w, (uint64_t)r);
@@ -141,7 +141,7 @@ static void op_take(struct world *w, struct script *s)
     const int64_t strobe_ns = script_span_ns(s);
     if (w->waiting || !w->b.fl2) return;
     w->cycle = (struct board_cycle){.address = (uint8_t)w->b.axis, .strobe_ns = strobe_ns, .done = on_bus, .ctx = w};
-    w->waiting = psd1_submit(&w->b, &w->cycle, w->s.now_ns) == BOARD_CYCLE_OK;
+    w->waiting = psd1_bus.submit(&w->b.base, &w->cycle, w->s.now_ns) == BOARD_CYCLE_OK;
 }
 
 static void op_request(struct world *w, struct script *s)

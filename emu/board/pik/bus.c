@@ -103,8 +103,9 @@ static enum board_cycle_result check_cycle(const struct pik *b, const struct boa
     return !c->write || accepts_value(b, c) ? BOARD_CYCLE_OK : BOARD_CYCLE_BAD_VALUE;
 }
 
-enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t t_ns)
+static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)
 {
+    struct pik *b = (struct pik *)board;
     const enum board_cycle_result r = check_cycle(b, c);
     if (r != BOARD_CYCLE_OK) {
         b->counters.cycles_refused++;
@@ -133,10 +134,4 @@ void pik_bus_init(struct pik *b)
     sched_ev(&b->cycle_end, cycle_end, b);
 }
 
-BOARD_BUS(pik);
-
-const struct board_bus pik_bus = {.submit = submit,
-                                  .addresses = PIK_REGISTERS,
-                                  .registers = registers,
-                                  .strobe = strobe,
-                                  .expected = describe_expected};
+BOARD_BUS(pik, PIK_REGISTERS);

@@ -117,8 +117,6 @@ void pik_clock(struct pik *b, int32_t ppm, int64_t t_ns); /* the generator is of
 void pik_stick(struct pik *b, unsigned axis, const struct chip_fault *f, int64_t t_ns);
 bool pik_flip(struct pik *b, unsigned axis, unsigned reg, uint8_t mask, int64_t t_ns);
 
-/* As board_bus.submit. */
-enum board_cycle_result pik_submit(struct pik *b, struct board_cycle *c, int64_t t_ns);
 extern const struct board_bus pik_bus;
 int64_t pik_period_ns(const void *pik); /* of the readings, as the register has it */
 

@@ -165,8 +165,9 @@ static enum board_cycle_result check_cycle(const struct pmka *b, const struct bo
 static const struct bus_lines bus_lines = {PMKA_LINE_CS, PMKA_LINE_RW, PMKA_LINE_AB0, PMKA_LINE_D0};
 
 /* What a register holds is taken at the beginning of the strobe, what is written is taken over at its end. */
-enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns)
+static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)
 {
+    struct pmka *b = (struct pmka *)board;
     const enum board_cycle_result r = check_cycle(b, c);
     if (r != BOARD_CYCLE_OK) {
         b->counters.cycles_refused++;
@@ -214,10 +215,4 @@ void pmka_bus_cut(struct pmka *b, int64_t t_ns)
     if (b->bus.cycle) finish_cycle(b, BOARD_CYCLE_OFF, t_ns);
 }
 
-BOARD_BUS(pmka);
-
-const struct board_bus pmka_bus = {.submit = submit,
-                                   .addresses = PMKA_ADDRESSES,
-                                   .registers = registers,
-                                   .strobe = strobe,
-                                   .expected = describe_expected};
+BOARD_BUS(pmka, PMKA_ADDRESSES);

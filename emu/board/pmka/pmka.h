@@ -119,7 +119,6 @@ bool pmka_command(struct pmka *b, unsigned tau, enum pmka_cal cal);
 void pmka_set_mode(struct pmka *b, enum pmka_mode mode);
 
 /* Parallel bus: pmka/bus.c. */
-enum board_cycle_result pmka_submit(struct pmka *b, struct board_cycle *c, int64_t t_ns);
 extern const struct board_bus pmka_bus;
 #define PMKA_ADDRESSES 16u
 

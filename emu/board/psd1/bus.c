@@ -25,16 +25,11 @@ static const struct board_register registers[PSD1_REGS] = {
     [PSD1_REG_FLAGS] = {"FLAGS", BOARD_READABLE | BOARD_WRITABLE, 3},
 };
 
-static bool in_cycle(const struct psd1 *b)
-{
-    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
-}
-
 static uint16_t status_word(const struct psd1 *b)
 {
     const unsigned bits[] = {
         b->fl2 ? PSD1_ST_FL2 | b->axis << 1 : 0u,
-        in_cycle(b) ? PSD1_ST_CYCLE : 0u,
+        psd1_in_cycle(b) ? PSD1_ST_CYCLE : 0u,
         b->int0 ? PSD1_ST_INT0 : 0u,
         b->fl1 ? PSD1_ST_FL1 : 0u,
         b->dr ? 0u : PSD1_ST_DR,
@@ -67,7 +62,7 @@ static uint16_t read_register(struct psd1 *b, unsigned address, int64_t t_ns)
     if (address == PSD1_REG_COMMAND) return command_word(b);
     if (address == PSD1_REG_FLAGS) return (uint16_t)((b->int0 ? 1u : 0u) | (b->fl1 ? 2u : 0u));
     /* latched at A0: of the cycle under way, else of the latest */
-    const struct psd1_cycle *c = in_cycle(b) ? &b->now : &b->latest;
+    const struct psd1_cycle *c = psd1_in_cycle(b) ? &b->now : &b->latest;
     return address < PSD1_REG_RATE_X ? (uint16_t)c->gyro[address - PSD1_REG_GYRO_X]
                                      : (uint16_t)c->rate[address - PSD1_REG_RATE_X];
 }
@@ -235,8 +230,10 @@ static void strobe_end(void *ctx, int64_t t_ns)
     if (!s->busy) begin_waiting(b, t_ns); /* unless done() has begun another */
 }
 
-enum board_cycle_result psd1_submit(struct psd1 *b, struct board_cycle *c, int64_t t_ns)
+/* While the built-in host strobes, a cycle waits its turn; its rejection then comes by done(). */
+static enum board_cycle_result submit(struct board *board, struct board_cycle *c, int64_t t_ns)
 {
+    struct psd1 *b = (struct psd1 *)board;
     if (b->phase == PSD1_OFF) return BOARD_CYCLE_OFF;
     if (b->bus.cycle || b->bus.waiting) return BOARD_CYCLE_BUSY;
     if (!b->bus.busy) return begin_strobe(b, c, t_ns);
@@ -303,7 +300,4 @@ void psd1_bus_stop(struct psd1 *b, int64_t t_ns)
     cut_cycle(&s->waiting, t_ns);
 }
 
-BOARD_BUS(psd1);
-
-const struct board_bus psd1_bus = {
-    .submit = submit, .addresses = PSD1_REGS, .registers = registers, .strobe = strobe, .expected = describe_expected};
+BOARD_BUS(psd1, PSD1_REGS);

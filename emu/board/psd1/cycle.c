@@ -110,15 +110,9 @@ int64_t psd1_clear(struct psd1 *b, int64_t t_ns)
 
 /* ---- its end before its time ---- */
 
-/* From A0 on; one that is only due has not begun. */
-static bool under_way(const struct psd1 *b)
-{
-    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
-}
-
 void psd1_cut(struct psd1 *b, int64_t t_ns)
 {
-    if (!under_way(b)) return;
+    if (!psd1_in_cycle(b)) return;
     b->counters.cut++;
     if (b->frame.active) psd1_frame_end(b, t_ns);
     psd1_rf(b, b->axis, true, t_ns);

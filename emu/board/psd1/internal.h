@@ -87,6 +87,12 @@ psd1_step psd1_tfs_fall, psd1_tfs_rise, psd1_await_dr, psd1_coef_a0, psd1_coef_f
 psd1_step psd1_job_next; /* begins the operation that is due */
 
 /* ---- psd1/cycle.c ---- */
+/* From A0 on; one that is only due has not begun. */
+static inline bool psd1_in_cycle(const struct psd1 *b)
+{
+    return b->phase >= PSD1_RF_FALL && b->phase <= PSD1_CLEAR;
+}
+
 uint32_t psd1_lost(struct psd1 *b);          /* counts what was lost so far into the counters; the sum */
 void psd1_cut(struct psd1 *b, int64_t t_ns); /* the cycle ends here */
 

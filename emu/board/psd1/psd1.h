@@ -98,9 +98,6 @@ void psd1_power_down(struct psd1 *b, int64_t t_ns);
 void psd1_reset(struct psd1 *b, int64_t t_ns);
 void psd1_sample_until(struct psd1 *b, int64_t t_ns);
 
-/* As board_bus.submit. While the built-in host strobes, a cycle waits its turn; its rejection then comes by done(). */
-enum board_cycle_result psd1_submit(struct psd1 *b, struct board_cycle *c, int64_t t_ns);
-
 /* BOARD_CYCLE_OK: done() comes later, never from inside. BUSY, BAD_VALUE (with a sentence in *why), OFF. */
 enum board_cycle_result psd1_request(struct psd1 *b, struct psd1_request *r, const char **why, int64_t t_ns);
 

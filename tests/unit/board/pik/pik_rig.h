@@ -188,8 +188,9 @@ static inline void rig_run_until(struct rig *r, int64_t t_ns)
 /* Up minus down, now. */
 static inline double rig_count(struct rig *rig, unsigned axis)
 {
+    const struct pik_axis *a = &rig->b.channel[axis].axis;
     pik_sample_until(&rig->b, rig->s.now_ns);
-    return (double)pik_axis_count(&rig->b.channel[axis].axis);
+    return (double)(int64_t)(a->plus - a->minus);
 }
 
 static inline void rig_done(void *ctx, struct board_cycle *c, enum board_cycle_result result, int64_t t_ns)
@@ -208,7 +209,7 @@ static inline enum board_cycle_result rig_submit(struct rig *r, bool write, uint
     r->answered = false;
     r->cycle = (struct board_cycle){
         .write = write, .address = address, .data = data, .strobe_ns = strobe_ns, .done = rig_done, .ctx = r};
-    return pik_submit(&r->b, &r->cycle, r->s.now_ns);
+    return pik_bus.submit(&r->b.base, &r->cycle, r->s.now_ns);
 }
 
 /* A whole cycle with the profile's strobe; the word read. */

@@ -297,7 +297,7 @@ static void a_cycle_takes_its_strobe_and_ends_with_the_power(void **state)
     rig_run_until(&r, 1000000);
     assert_int_equal(rig_submit(&r, true, PIK_REG_CLEAR, 0, 5000), BOARD_CYCLE_OK);
     struct board_cycle second = r.cycle;
-    assert_int_equal(pik_submit(&r.b, &second, r.s.now_ns), BOARD_CYCLE_BUSY);
+    assert_int_equal(pik_bus.submit(&r.b.base, &second, r.s.now_ns), BOARD_CYCLE_BUSY);
     rig_run_until(&r, 1004999);
     assert_false(r.answered);
     rig_run_until(&r, 1005000);

@@ -218,21 +218,21 @@ static void strobes(void **state)
     (void)state;
     up();
     struct board_cycle c = {.address = Y, .strobe_ns = 199, .done = rig_done, .ctx = &rig}, other = c;
-    assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_TOO_SHORT);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, rig.s.now_ns), BOARD_CYCLE_TOO_SHORT);
     c.strobe_ns = 5000000; /* the register holds what it had at the strobe's beginning */
     const int16_t was = rig.reading[rig.readings - 1].code[1];
     const int64_t t_ns = rig.s.now_ns;
     rig.answered = false;
-    assert_int_equal(pmka_submit(&rig.b, &c, t_ns), BOARD_CYCLE_OK);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, t_ns), BOARD_CYCLE_OK);
     other.strobe_ns = 200;
-    assert_int_equal(pmka_submit(&rig.b, &other, t_ns), BOARD_CYCLE_BUSY);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &other, t_ns), BOARD_CYCLE_BUSY);
     sched_run_until(&rig.s, t_ns + 4999999);
     assert_false(rig.answered);
     sched_run_until(&rig.s, t_ns + 5000000);
     assert_true(rig.answered);
     assert_int_equal((int16_t)c.data, was);
     assert_int_not_equal(rig.reading[rig.readings - 1].code[1], was);
-    assert_int_equal(pmka_submit(&rig.b, &other, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &other, rig.s.now_ns), BOARD_CYCLE_OK);
 }
 
 /* What is written comes into force when the strobe ends. */
@@ -242,7 +242,7 @@ static void a_write_acts_at_the_end_of_its_strobe(void **state)
     up();
     struct board_cycle c = {
         .write = true, .address = BEAT, .data = 500, .strobe_ns = 1000, .done = rig_done, .ctx = &rig};
-    assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, rig.s.now_ns), BOARD_CYCLE_OK);
     sched_run_until(&rig.s, rig.s.now_ns + 999);
     assert_int_equal(rig.b.rotation.beat_periods, 200);
     sched_run_until(&rig.s, rig.s.now_ns + 1);
@@ -265,17 +265,17 @@ static void too_early_without_power_and_cut(void **state)
     rig_readings(&rig, 1);
     (void)rig_read(&rig, X);
     struct board_cycle c = {.address = X, .strobe_ns = 1000, .done = rig_done, .ctx = &rig};
-    assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, rig.s.now_ns), BOARD_CYCLE_OK);
     rig.answered = false;
     pmka_board.reset(&rig.b.base, rig.s.now_ns);
     assert_true(rig.answered);
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
     assert_int_equal(rig_cycle(&rig, false, X, &data), BOARD_CYCLE_NOT_READY);
     c.address = STATUS;
-    assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, rig.s.now_ns), BOARD_CYCLE_OK);
     pmka_board.power_down(&rig.b.base, rig.s.now_ns);
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
-    assert_int_equal(pmka_submit(&rig.b, &c, rig.s.now_ns), BOARD_CYCLE_OFF);
+    assert_int_equal(pmka_bus.submit(&rig.b.base, &c, rig.s.now_ns), BOARD_CYCLE_OFF);
 }
 
 int main(void)

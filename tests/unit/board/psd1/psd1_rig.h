@@ -216,7 +216,7 @@ static inline enum board_cycle_result rig_bus(struct rig *r, bool write, uint8_t
     r->bus = (struct board_cycle){
         .write = write, .address = address, .data = data, .strobe_ns = strobe_ns, .done = rig_done, .ctx = r};
     r->answered = false;
-    const enum board_cycle_result result = psd1_submit(&r->b, &r->bus, r->s.now_ns);
+    const enum board_cycle_result result = psd1_bus.submit(&r->b.base, &r->bus, r->s.now_ns);
     if (result != BOARD_CYCLE_OK) return result;
     assert_false(r->answered);
     while (!r->answered) sched_run_until(&r->s, sched_next_ns(&r->s));

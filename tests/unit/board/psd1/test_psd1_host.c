@@ -116,9 +116,9 @@ static void the_bus_takes_one_cycle_at_a_time(void **state)
     rig_await(&rig, PSD1_READY);
     rig.bus = (struct board_cycle){.address = 3, .done = rig_done, .ctx = &rig};
     rig.answered = false;
-    assert_int_equal(psd1_submit(&rig.b, &rig.bus, rig.s.now_ns), BOARD_CYCLE_OK);
+    assert_int_equal(psd1_bus.submit(&rig.b.base, &rig.bus, rig.s.now_ns), BOARD_CYCLE_OK);
     struct board_cycle second = rig.bus;
-    assert_int_equal(psd1_submit(&rig.b, &second, rig.s.now_ns), BOARD_CYCLE_BUSY);
+    assert_int_equal(psd1_bus.submit(&rig.b.base, &second, rig.s.now_ns), BOARD_CYCLE_BUSY);
     psd1_reset(&rig.b, rig.s.now_ns);
     assert_true(rig.answered);
     assert_int_equal(rig.result, BOARD_CYCLE_OFF);
