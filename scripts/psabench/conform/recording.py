@@ -25,7 +25,7 @@ from psabench.conform.sources import clocks
 from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
 from psabench.conform.sources.lines import Recorded
-from psabench.conform.verdict import Failed, Inconclusive, Outcome, Unseen, Verdict, decide, not_decided
+from psabench.conform.verdict import Failed, Inconclusive, Outcome, Unseen, Verdict, conclusive, decide, not_decided
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire
@@ -224,8 +224,7 @@ def stream(e: Capture) -> Capture:
 def boot(e: Capture, needs: frozenset[str]) -> Capture:
     """All, with the mark of the reset where the log shows it. Raises Inconclusive where no reset was recorded."""
     boots = _boots(e)
-    if "can" in needs and not boots:
-        raise Inconclusive("the log has no boot-up")
+    conclusive("can" not in needs or boots, "the log has no boot-up")
     if needs & {"line", "pins"} and e.lines is not None and not len(_resets_ns(e.lines)):
         has_res = "Res" in e.lines.recording.wires or e.variant.family in RES_IS_A_LINE
         if has_res or not boots:

@@ -275,8 +275,7 @@ def who_gives_up_finds_the_bus_busy(t: Talk) -> str:
     t.send(t.sdo_rx, _read(address))
     t.send(t.sdo_rx, bytes([ABORT]) + _read(address)[1:])
     found = t.abort_of(_read(address))
-    if found != code:
-        raise Failed(f"{'a word' if found is None else f'{found:08X}h'} right after giving up", f"{code:08X}h")
+    expect(found == code, f"{'a word' if found is None else f'{found:08X}h'} right after giving up", f"{code:08X}h")
     t.s.run_for(1.1 * LONGEST_NS * 1e-9)
     _strobe(t, 0)
     t.upload(BUS, address + 1)

@@ -51,8 +51,7 @@ def the_common_objects_are_there(t: Talk) -> str:
     for o in filter(_common, t.s.unit.node.objects()):
         value = t.upload(o.index, o.sub)
         what = f"{o.index:04X}h:{o.sub}"
-        if o.data_bytes is not None and len(value) != o.data_bytes:
-            raise Failed(f"{what} has {len(value)} bytes", f"{o.data_bytes}")
+        expect(o.data_bytes is None or len(value) == o.data_bytes, f"{what} has {len(value)} bytes", f"{o.data_bytes}")
         due = _due(o)
         if due is not None and value != due:
             raise Failed(f"{what} is {words(value)}", words(due))
@@ -205,13 +204,13 @@ def _compare(t: Talk, can_id: int, entry: int, at: int) -> None:
     before = [f for f in t.heard[:place] if f.can_id == can_id and not f.error][-NEAR:]
     near = before + t.readings(NEAR, can_id, at=place)[:NEAR]
     due = {int.from_bytes(f.data, "little") >> at & (1 << bits) - 1 for f in near}
-    if found not in due:
-        raise Failed(
-            f"{index:04X}h:{sub} is {found:X}h",
-            f"bits {at} to {at + bits - 1} of a frame {can_id:03X}h just before or after: "
-            + ", ".join(f"{d:X}h" for d in sorted(due)),
-            frames=near,
-        )
+    expect(
+        found in due,
+        f"{index:04X}h:{sub} is {found:X}h",
+        f"bits {at} to {at + bits - 1} of a frame {can_id:03X}h just before or after: "
+        + ", ".join(f"{d:X}h" for d in sorted(due)),
+        frames=near,
+    )
 
 
 @dialogue("BUS-CNT-01", reset=True)

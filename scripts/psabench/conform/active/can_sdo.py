@@ -339,8 +339,7 @@ def refusals_are_counted(t: Talk) -> str:
     ]
     before = t.counter("Requests refused")
     for k, request in enumerate(bad, 1):
-        if t.abort_of(request) is None:
-            raise Failed(f"{words(request)} is not refused", "an abort")
+        expect(t.abort_of(request) is not None, f"{words(request)} is not refused", "an abort")
         counted = t.counter("Requests refused") - before
         expect(counted == k, f"{counted} refusals counted after {k}, the last of {words(request)}", f"{k}")
     return f"{len(bad)} refusals, {len(bad)} counted"
@@ -356,8 +355,7 @@ def an_abort_of_the_client_ends_it(t: Talk) -> str:
         raise Failed(f"{words(came[0].data)} to an abort", "silence", frames=came)
     t.ask(read(Common.REMARK))
     t.send(t.sdo_rx, bytes([ABORT]) + read(Common.REMARK)[1:])
-    if t.abort_of(segment(0)) is None:
-        raise Failed("the transfer goes on after an abort", "a refusal of its next segment")
+    expect(t.abort_of(segment(0)) is not None, "the transfer goes on after an abort", "a refusal of its next segment")
     put(t, Common.REMARK, b"")
     return "silence; the next segment is refused"
 

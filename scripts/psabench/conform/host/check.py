@@ -21,7 +21,7 @@ from psabench.conform.host.capture import Bus, SentSample
 from psabench.conform.host.results import Sample, Told
 from psabench.conform.host.stimulus_bus import BusCycle
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, conclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.errors import expected
 
 HEARTBEAT_S = 1.0  # 1017h as the board has it
@@ -88,8 +88,7 @@ class HostCapture:
         """The match of a case in which samples are due. Raises Failed where none came, or the host did not go on."""
         if not self.streamed or not self.bus.samples:
             raise Failed(f"no stream was started{self.last_words()}", "NMT start after the set-up has been read")
-        if not self.told.samples:
-            raise Failed(f"no sample was reported{self.last_words()}", f"{len(self.bus.samples)} samples")
+        expect(self.told.samples, f"no sample was reported{self.last_words()}", f"{len(self.bus.samples)} samples")
         m = self.match
         if m.strange:
             s = m.strange[0]

@@ -45,8 +45,7 @@ def the_end_is_told(e: HostCapture) -> str:
     """The link ends: the last word, and the exit status."""
     if e.told.of("end") != [True] or e.told.events[-1].name != "end" or e.told.events[-1].at != e.told.count:
         raise Failed(f"{len(e.told.of('end'))} ends", '{"end": true} once, as the last word')
-    if e.status != 0:
-        raise Failed("it had to be ended" if e.status is None else f"exit status {e.status}", "exit status 0")
+    expect(e.status == 0, "it had to be ended" if e.status is None else f"exit status {e.status}", "exit status 0")
     return "end told, exit status 0"
 
 
@@ -127,8 +126,7 @@ def what_is_refused_during_the_set_up_is_asked_again(e: HostCapture) -> str:
     e.samples()
     for f in refused:
         again = [r for r in _requests(e) if r.t_s > f.t_s and r.data[1:4] == f.data[1:4]]
-        if not again:
-            raise Failed(f"{_named(f)} was refused and never asked for again", "it is, until it is answered")
+        expect(again, f"{_named(f)} was refused and never asked for again", "it is, until it is answered")
     _all_are_read(e)
     return f"{len(refused)} refusals, all registers read, {len(e.bus.samples)} samples"
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.verdict import Inconclusive, damaged_data_are
+from psabench.conform.verdict import Inconclusive, conclusive, damaged_data_are
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, layout
 
@@ -26,8 +26,7 @@ def columns(e: Capture, least: int = 20) -> Mapping[str, Floats]:
 def _columns(can: CanLog, board: str, node: int, least: int) -> Mapping[str, Floats]:
     logs = [can.of(name, board, node) for name in MESSAGES]
     n = min(len(log) for log in logs)
-    if n < least:
-        raise Inconclusive(f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
+    conclusive(n >= least, f"{', '.join(f'{len(log)} {name}' for log, name in zip(logs, MESSAGES, strict=True))}")
     found: dict[str, Floats] = {}
     with damaged_data_are(Inconclusive):
         for name, log in zip(MESSAGES, logs, strict=True):

@@ -109,8 +109,7 @@ def level_seq_is_that_of_the_last_frame(e: Capture) -> str:
             latest = int.from_bytes(f.data, "little") >> scale.start_bit & (1 << scale.bits) - 1
         elif f.can_id == mine and latest is not None and len(f.data) == 8:
             told = int.from_bytes(f.data[6:], "little")
-            if (latest - told) & 0xFFFF > 1:  # a frame may pass between the step and its message
-                raise Failed(f"LEVEL_SEQ {told}", f"{latest}, the last that passed", frames=(f,))
+            expect((latest - told) & 0xFFFF <= 1, f"LEVEL_SEQ {told}", f"{latest}, the last that passed", frames=(f,))
             count += 1
     conclusive(count >= 20, f"{count} readings with frames of the level unit")
     return f"{count} readings"
@@ -207,8 +206,7 @@ def windows_show_the_rate_of_the_earth(e: Capture, row: Requirement) -> str:
     rows, s = [], []
     for k in range(1, count + 1):
         mine = (c["PHASE"] == Phase.WINDOW) & (c["POSITION"] == k) & (c["MODE"] == Mode.GYROCOMPASS)
-        if mine.sum() < 100:
-            raise Inconclusive(f"no window at position {k}")
+        conclusive(mine.sum() >= 100, f"no window at position {k}")
         q = np.radians(float(c["ENCODER"][mine].mean()))
         rows.append([np.sin(q), np.cos(q), 1.0])
         s.append(-setting(e, "m1_per_s") * float(c["BETA"][mine].mean()) * 3600)
@@ -227,8 +225,7 @@ def rates_are_limited_and_say_so(e: Capture) -> str:
     near = row_for(e, *LIMITS).limit("tolerance_degph")
     expect(top.max() <= most + near, f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
     at_limit = top > most - near
-    if not at_limit.any():
-        raise Inconclusive(f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
+    conclusive(at_limit.any(), f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
     if (at_limit != (c["SATURATED"] == 1)).any():
         raise Failed(
             f"{int((c['SATURATED'] == 1).sum())} readings with SATURATED", f"{int(at_limit.sum())} at the limit"
@@ -283,8 +280,7 @@ def angles_stay_without_the_level_unit(e: Capture, row: Requirement) -> str:
     conclusive(len(lost) >= 2 * silent, f"{len(lost)} readings without the level unit")
     mine = lost[silent:-silent]
     for name in ("BETA", "GAMMA", "U1"):
-        if np.ptp(c[name][mine]) > 0:
-            raise Failed(f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
+        expect(np.ptp(c[name][mine]) <= 0, f"{name} moves by {np.ptp(c[name][mine]):g}", "it stays")
     begun = [k for k, _ in emergencies(e, EMCY) if k == int(row.limit("emcy_code"))]
     expect(len(begun) == 1, f"{len(begun)} emergencies FF21h", "one")
     return f"{len(mine)} readings with the same angles and U1, one emergency"
@@ -296,8 +292,7 @@ def res_ends_the_mode_and_counts_anew(e: Capture) -> str:
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     late = late_readings(e, "GYRO_HEARTBEAT", MESSAGES[0], 0.0, period_s)
     c = columns(e)
-    if c["MODE"].any():
-        raise Failed(f"mode {c['MODE'].max():g}", "0")
+    expect(not c["MODE"].any(), f"mode {c['MODE'].max():g}", "0")
     expect(c["STEP"][0] <= 1 + late, f"STEP {c['STEP'][0]:g} first", f"{1 + late} at most")
     return f"{len(c['MODE'])} readings of mode 0, STEP from {c['STEP'][0]:g}"
 

@@ -137,8 +137,7 @@ def a_turn_ends_at_its_angle_and_holds(e: Capture, row: Requirement) -> str:
     turns, worst = _turns(e), 0.0
     for _, to, c in turns:
         off = abs(wrapped_deg(float(c["ENCODER"][-1]) - to))
-        if off > row.limit("encoder_off_max_arcmin") / 60:
-            raise Failed(f"{c['ENCODER'][-1]:.4f} deg", f"{to:g} deg")
+        expect(off <= row.limit("encoder_off_max_arcmin") / 60, f"{c['ENCODER'][-1]:.4f} deg", f"{to:g} deg")
         worst = max(worst, off)
     if not isinstance(held, tuple):
         raise Inconclusive("mode 2 is not in the recording")
@@ -164,8 +163,7 @@ def turns_take_the_shorter_way(e: Capture, row: Requirement) -> str:
         if abs(made - way) > row.limit("way_tolerance_deg"):
             raise Failed(f"{made:.2f} deg from {at:g} to {to:g}", f"{way:g} deg")
         fastest = float(np.abs(rates).max())
-        if fastest > allowed * row.limit("rate_dps"):
-            raise Failed(f"{fastest:.2f} deg/s", f"{row.limit('rate_dps'):g} deg/s")
+        expect(fastest <= allowed * row.limit("rate_dps"), f"{fastest:.2f} deg/s", f"{row.limit('rate_dps'):g} deg/s")
         over = round(ACCEL_OVER_S / period_s)
         pushed = float(np.abs(rates[over:] - rates[:-over]).max()) / ACCEL_OVER_S
         if pushed > allowed * row.limit("accel_dps2"):

@@ -76,8 +76,7 @@ def _sums(e: HostCapture, sent: Sequence[Pulses]) -> str:
         for k, axis in enumerate("xyz"):
             saw = round(r.values[k] - first[0].values[k])
             due = sent[at].totals[k] - first[1].totals[k]
-            if (saw - due) % SUM_WRAP:
-                raise Failed(f"{saw} pulses of {axis} up to reading {r.number}", f"{due}")
+            expect(not (saw - due) % SUM_WRAP, f"{saw} pulses of {axis} up to reading {r.number}", f"{due}")
     if at < len(sent) - 10:
         raise Failed(f"nothing after reading {told[-1].number}{e.last_words()}", f"{len(sent) - 1 - at} more came")
     return f"{len(told)} readings, {round(told[-1].values[0] - told[0].values[0])} pulses of x"

@@ -10,7 +10,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.signals import Ints
 
 KEYS = ("KL1", "KL2", "KL3", "KL4")
@@ -103,8 +103,7 @@ def resets_are_told_with_their_signs(e: Capture) -> str:
     for k, name in enumerate("XYZK"):
         for sign, wire in ((1, f"RP{k + 1}"), (-1, f"RN{k + 1}")):
             told, real = int((c[f"RESET_{name}"] == sign).sum()), len(e.wires.rises(wire))
-            if abs(told - real) > 1:  # at the ends of the recording
-                raise Failed(f"{told} resets of sign {sign} of {name} told", f"{real} on {wire}")
+            expect(abs(told - real) <= 1, f"{told} resets of sign {sign} of {name} told", f"{real} on {wire}")
             seen.append(real)
     conclusive(sum(seen) >= LEAST, f"{sum(seen)} resets were recorded")
     return f"{sum(seen)} resets on the lines, as many told"
@@ -193,6 +192,5 @@ def res_ends_resets(e: Capture) -> str:
     for name in (*RESETS, *TAU):
         if int(e.wires[name].at(int(rises[0]) - 1 - round(e.slack_ns(0.0)))):
             raise Failed(f"{name} high before the first sample", "low", at_ns=int(rises[0]), lines=(name, "SH"))
-    if int(which[0]) != 0:
-        raise Failed(f"{'XYZK'[int(which[0])]} sampled first", "X", at_ns=int(rises[0]), lines=SAMPLE)
+    expect(int(which[0]) == 0, f"{'XYZK'[int(which[0])]} sampled first", "X", at_ns=int(rises[0]), lines=SAMPLE)
     return "no reset, beat 0, X sampled first"

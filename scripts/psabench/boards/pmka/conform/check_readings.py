@@ -64,8 +64,7 @@ def readings_begin_with_0_after_res(e: Capture, row: Requirement) -> str:
         row_for(e, "PMKA-CAN-04").limit("start_ms") * 1e-3,
         row_for(e, "PMKA-SAMP-01").limit("ts_us") * 1e-6,
     )
-    if not first <= seq <= first + late:
-        raise Failed(f"SEQ {seq} first", f"{first}" if not late else f"{first} to {first + late}")
+    expect(first <= seq <= first + late, f"SEQ {seq} first", f"{first}" if not late else f"{first} to {first + late}")
     return f"SEQ {seq} first"
 
 
@@ -194,8 +193,7 @@ def the_input_stays_connected_in_a_reset(e: Capture, row: Requirement) -> str:
         step, reset = np.diff(p.code[:, k]), p.reset[1:, k]
         plain = home & (reset == 0)
         hit = home & (reset != 0)
-        if plain.sum() < 10 or hit.sum() < 10:
-            raise Inconclusive(f"{int(hit.sum())} periods with a reset on {'XYZ'[k]}")
+        conclusive(plain.sum() >= 10 and hit.sum() >= 10, f"{int(hit.sum())} periods with a reset on {'XYZ'[k]}")
         whole = step + np.where(reset > 0, sizes[k, 0], 0.0) - np.where(reset < 0, sizes[k, 1], 0.0)
         with_reset, without = float(whole[hit].mean()), float(step[plain].mean())
         if abs(with_reset / without - 1) > row.limit("increment_tolerance_pct") / 100:
@@ -284,8 +282,7 @@ def calibration_is_first_of_zero_then_of_resets(e: Capture) -> str:
     for a, b in pairwise(beats):
         cal = p.cal[a:b]
         order = cal[cal != 0]
-        if len(order) and (np.diff(order) < 0).any():
-            raise Failed("a zero after resets in a beat", "zero first")
+        expect(not len(order) or not (np.diff(order) < 0).any(), "a zero after resets in a beat", "zero first")
         count += len(order) > 0
     return f"{count} beats, first the zero, then resets"
 

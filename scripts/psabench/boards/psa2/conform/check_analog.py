@@ -237,8 +237,7 @@ def a_write_changes_all_codes(e: Capture, row: Requirement) -> str:
     """Write CONFIG1 through 2000h: the registers and the codes of all axes."""
     p, _, _ = _step(e)
     for a in fact(e, "read"):
-        if number(a) != int(row.limit("config1_code")):
-            raise Failed(f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
+        expect(number(a) == int(row.limit("config1_code")), f"CONFIG1 {number(a):02X}h", "0Ah on each converter")
     ratio = np.median(p.code[-50:], axis=0) / np.median(p.code[:50], axis=0)
     if (np.abs(ratio - row.limit("ratio")) > row.limit("tolerance_ratio")).any():
         raise Failed(f"codes grew by {ratio.round(4)}", "2, on each axis", frames=p.about(len(p) - 3))

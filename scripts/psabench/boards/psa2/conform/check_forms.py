@@ -171,8 +171,7 @@ def each_sync_takes_one_sample(e: Capture, row: Requirement) -> str:
     for a, b in itertools.pairwise(cuts):
         part = segment(e, a, b)
         n = len(part.frames_of("PSA2_XY"))
-        if n != 1:
-            raise Failed(f"{n} samples after a SYNC", "one", frames=part.can.frames[:10])
+        expect(n == 1, f"{n} samples after a SYNC", "one", frames=part.can.frames[:10])
     begin = segment(e, cuts[0], cuts[-1])
     p = pairs(begin, LEAST)
     gaps = p.steps
@@ -216,8 +215,7 @@ def the_frame_period_follows_dr(e: Capture, row: Requirement) -> str:
             raise Failed(f"CONFIG0 with DR {dr:03b} answered by {e.facts.get(f'answer {dr}')}", "it is taken")
         p = pairs(segment(e, f"DR {dr}", f"DR {dr} end"), 3)
         frames = int(p.steps.sum())
-        if frames <= 0:
-            raise Failed(f"SEQ {p.seq.tolist()}", "it rises", frames=p.frames[:4])
+        expect(frames > 0, f"SEQ {p.seq.tolist()}", "it rises", frames=p.frames[:4])
         period_us = float(p.stamp[-1] - p.stamp[0]) * unit_us(e) / frames
         due_us = row.limit(f"dr_{dr:03b}_us")
         slack_us = e.slack_ns(due_us * 1e3) * 1e-3 + unit_us(e) / frames

@@ -11,7 +11,7 @@ from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.signals import Floats, Ints
 
 LOWS = ("PSA2-INT-04", "PSA2-INT-05", "PSA2-INT-06")
@@ -34,8 +34,7 @@ def a_transfer_has_four_words(e: Capture, row: Requirement) -> str:
     due, apart_ns = int(row.limit("words_count")), row.limit("apart_min_clk") * _clk_ns(e)
     for fall, rises in zip(t.fall_ns, t.rises, strict=True):
         count = int((np.diff(rises) > apart_ns).sum()) + (len(rises) > 0)
-        if count != due:
-            raise Failed(f"{count} words in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
+        expect(count == due, f"{count} words in a transfer", f"{due}", at_ns=int(fall), lines=LINES)
     return f"{len(t)} transfers of {due} words"
 
 
@@ -83,8 +82,7 @@ def data_stand_still_around_each_rise_of_clk(e: Capture, row: Requirement) -> st
     changes = e.wires["Data"].t_ns[1:]
     keep_ns = (row.limit("hold_clk") - row.limit("tolerance_clk")) * clk_ns - e.slack_ns(clk_ns)
     rises = t.clk_rise_ns
-    if not len(changes):
-        raise Failed("a Data line that never changes", "data", at_ns=int(t.fall_ns[0]), lines=LINES)
+    expect(len(changes), "a Data line that never changes", "data", at_ns=int(t.fall_ns[0]), lines=LINES)
     after = np.searchsorted(rises, changes)
     to_next = np.where(after < len(rises), rises[np.minimum(after, len(rises) - 1)] - changes, np.inf)
     since = np.where(after > 0, changes - rises[np.maximum(after - 1, 0)], np.inf)
@@ -157,8 +155,7 @@ def int_is_low_for_its_periods_of_clk(e: Capture) -> str:
 def _clk_falls(t: Transfers) -> tuple[Floats, Floats]:
     """First and last fall (n,) of CLK in each transfer. Raises Failed where there is none."""
     for rise, falls in zip(t.rise_ns, t.falls, strict=True):
-        if not len(falls):
-            raise Failed("no fall of CLK in a transfer", "one a bit", at_ns=int(rise), lines=LINES)
+        expect(len(falls), "no fall of CLK in a transfer", "one a bit", at_ns=int(rise), lines=LINES)
     return np.array([f[0] for f in t.falls], np.float64), np.array([f[-1] for f in t.falls], np.float64)
 
 
@@ -177,8 +174,7 @@ def int_rises_with_the_last_fall_of_clk(e: Capture, row: Requirement) -> str:
 def int_rests_high(e: Capture, row: Requirement) -> str:
     """Look at Int where CLK has long been still."""
     for name in LINES:
-        if name not in e.wires:
-            raise Inconclusive(f"the recording has no line {name}")
+        conclusive(name in e.wires, f"the recording has no line {name}")
     edges = e.wires["CLK"].t_ns[1:]
     still_ns = np.diff(edges)
     long = (still_ns > 2 * row.limit("quiet_us") * 1e3) & e.wires.known(edges[:-1], edges[1:])

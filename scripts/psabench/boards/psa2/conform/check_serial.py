@@ -303,8 +303,7 @@ def every_conversion_is_read(e: Capture) -> str:
     """Count the reads after each fall of DRD_A."""
     found = _read_of_each_fall(e)
     for fall, reads in found:
-        if len(reads) != 1:
-            raise Failed(f"{len(reads)} reads after a fall of DRD_A", "one", at_ns=fall, lines=READING)
+        expect(len(reads) == 1, f"{len(reads)} reads after a fall of DRD_A", "one", at_ns=fall, lines=READING)
     return f"{len(found)} falls of DRD_A, one read after each"
 
 
@@ -315,8 +314,7 @@ def a_read_has_its_bits(e: Capture, row: Requirement) -> str:
     reads = port_traffic(e).reads
     conclusive(len(reads) >= LEAST, f"{len(reads)} reads were recorded")
     for b in reads[:-1]:
-        if b.bits != due:
-            raise Failed(f"{b.bits} pulses of SClk in a read", f"{due}", at_ns=int(b.rise_ns[0]), lines=READING)
+        expect(b.bits == due, f"{b.bits} pulses of SClk in a read", f"{due}", at_ns=int(b.rise_ns[0]), lines=READING)
     return f"{len(reads)} reads of {due} bits"
 
 

@@ -193,8 +193,7 @@ def config0_is_written_first(e: Capture, row: Requirement) -> str:
     if len(falls) != 1:
         due = "on the first"
         raise Failed(f"it comes after {len(falls)} falls of DRD_A", due, at_ns=step.begin_ns, lines=ACCEL)
-    if s.steps[0] is not step:
-        raise Failed(f"{s.steps[0].name} first", step.name, at_ns=s.steps[0].begin_ns, lines=ACCEL + TEMP)
+    expect(s.steps[0] is step, f"{s.steps[0].name} first", step.name, at_ns=s.steps[0].begin_ns, lines=ACCEL + TEMP)
     return said
 
 
@@ -224,8 +223,7 @@ def one_message_writes_bufen_and_acal(e: Capture, row: Requirement) -> str:
     said = _status_write(e, "PSA2-SETUP-05", 0)
     register = sent_by(row)[0]
     more = [x for x in set_up(e).steps if x.line == "DInT" and x.sent[:1] == bytes([register])]
-    if len(more) != 1:
-        raise Failed(f"{len(more)} writes to STATUS", "one", at_ns=more[-1].begin_ns, lines=TEMP)
+    expect(len(more) == 1, f"{len(more)} writes to STATUS", "one", at_ns=more[-1].begin_ns, lines=TEMP)
     return said
 
 

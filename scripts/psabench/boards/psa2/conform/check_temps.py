@@ -49,8 +49,7 @@ def temperature_codes_are_the_upper_bits_that_were_read(e: Capture, row: Require
     bursts = [b for m in port_traffic(e).of(temp=True) if m.sent[:1] == b"\x01" for b in m.bursts[1:]]
     conclusive(len(bursts) >= LEAST, f"{len(bursts)} temperatures were read")
     for b in bursts[:-1]:
-        if b.bits != bits:
-            raise Failed(f"{b.bits} clocks", f"{bits}", at_ns=int(b.rise_ns[0]), lines=("SClk", "CST", "DOutT"))
+        expect(b.bits == bits, f"{b.bits} clocks", f"{bits}", at_ns=int(b.rise_ns[0]), lines=("SClk", "CST", "DOutT"))
     read = signed(np.array([[int(b.got[0][:code_bits] or "0", 2)] for b in bursts], np.int64), code_bits)
     p = pairs(e)
     told = p.temp[p.new][:, None]

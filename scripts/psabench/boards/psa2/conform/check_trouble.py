@@ -75,8 +75,7 @@ def emcys(e: Capture) -> list[CanFrame]:
 def _emcy(e: Capture, code: int) -> CanFrame:
     """The one of this code. Raises Failed for none and for several."""
     found = [f for f in emcys(e) if int.from_bytes(f.data[:2], "little") == code]
-    if len(found) != 1:
-        raise Failed(f"{len(found)} EMCY {code:04X}h", "one", frames=emcys(e))
+    expect(len(found) == 1, f"{len(found)} EMCY {code:04X}h", "one", frames=emcys(e))
     return found[0]
 
 
@@ -89,8 +88,7 @@ def a_silent_temperature_converter_is_told(e: Capture, row: Requirement) -> str:
     if told.data[3] != int(row.limit("source_code")):
         raise Failed(f"source {told.data[3]}", f"{int(row.limit('source_code'))}", frames=[told])
     later = [f for f in emcys(e) if f.data[:2] == b"\0\0" and e.can.frames.index(f) > e.can.frames.index(told)]
-    if len(later) != 1:
-        raise Failed(f"{len(later)} EMCY 0000h after it", "one, with the next temperature", frames=emcys(e))
+    expect(len(later) == 1, f"{len(later)} EMCY 0000h after it", "one, with the next temperature", frames=emcys(e))
     return f"EMCY {int(row.limit('emcy_code')):04X}h, then 0000h"
 
 

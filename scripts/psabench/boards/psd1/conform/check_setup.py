@@ -333,11 +333,9 @@ def the_bus_stands_in_a_strobe_and_rests_at_0(e: Capture) -> str:
         high = e.wires[name].at(free + slack) != rest
         first_bad(high, free, f"{name} {1 - rest} with CS high", f"{rest}", ("CS", name))
     seen = sum(int(e.wires[name].at(begin + slack).any()) for name in DATA)
-    if not seen:
-        raise Failed("D0..D15 all 0 in every strobe", "data", at_ns=int(begin[0]), lines=("CS", *DATA))
+    expect(seen, "D0..D15 all 0 in every strobe", "data", at_ns=int(begin[0]), lines=("CS", *DATA))
     writes = int((e.wires["RW"].at(begin + slack) == 0).sum())
-    if not writes:
-        raise Failed("R/W high in every strobe", "low in writes", at_ns=int(begin[0]), lines=("CS", "RW"))
+    expect(writes, "R/W high in every strobe", "low in writes", at_ns=int(begin[0]), lines=("CS", "RW"))
     return f"{len(begin)} strobes, {writes} of them writes"
 
 
