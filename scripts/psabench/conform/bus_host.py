@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from psabench.conform.dut import Dut
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, known
 from psabench.errors import DeviceError
 from psabench.link.busport import BusPort, Cycle
 
@@ -14,9 +14,7 @@ SHORT_S = 50e-6  # a cycle and some more
 
 def port(s: Dut) -> BusPort:
     """Raises Inconclusive where there is none."""
-    if s.port is None:
-        raise Inconclusive("no bus port was connected (--bus-port)")
-    return s.port
+    return known(s.port, "no bus port was connected (--bus-port)")
 
 
 def line(s: Dut, text: str) -> Cycle:

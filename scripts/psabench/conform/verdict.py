@@ -1,8 +1,9 @@
 """What a test came to, and how a test says so.
 
 A test returns in words what it saw. It raises `Failed` where that is not what was due, `Inconclusive` where what it got
-does not suffice to say either, and `Unseen` where there is nothing to look at; `expect` and `conclusive` raise the
-first two where a condition does not hold. Only `decide` turns this into a verdict: for a board, a recording and a host.
+does not suffice to say either, and `Unseen` where there is nothing to look at; `expect` and `none_of` raise the first
+of these, `conclusive` and `known` the second. Only `decide` turns this into a verdict: for a board, a recording and a
+host.
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import TypeVar
 
 from psabench.conform.capture.log import CanFrame
 from psabench.errors import BenchError, DeviceError
+
+T = TypeVar("T")
 
 
 class Verdict(Enum):
@@ -74,6 +78,19 @@ def conclusive(enough: object, why: str) -> None:
     """Raises Inconclusive unless there is enough to look at."""
     if not enough:
         raise Inconclusive(why)
+
+
+def none_of(found: Sequence[T], saw: Callable[[T], str], due: str, *, frames: Sequence[CanFrame] = ()) -> None:
+    """Raises Failed where there are any, with what is to be said of the first."""
+    if found:
+        raise Failed(saw(found[0]), due, frames=frames)
+
+
+def known(value: T | None, why: str) -> T:
+    """The value. Raises Inconclusive where there is none."""
+    if value is None:
+        raise Inconclusive(why)
+    return value
 
 
 @contextmanager

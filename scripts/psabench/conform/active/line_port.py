@@ -12,7 +12,7 @@ from psabench.conform.plan import active
 from psabench.conform.probes import PortProbe
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.sources.samples import line_log
-from psabench.conform.verdict import Failed, Inconclusive, expect
+from psabench.conform.verdict import Failed, expect, known, none_of
 from psabench.link.lineport import SAMPLE_HZ, open_line
 
 WORDS = 4
@@ -21,9 +21,7 @@ SLICE, SLOW_S = 1 << 14, 0.002  # bytes that a slow reader takes, and how long i
 
 
 def _port(s: Dut) -> PortProbe:
-    if s.line_port is None:
-        raise Inconclusive("no line port")
-    return s.line_port
+    return known(s.line_port, "no line port")
 
 
 def _look(s: Dut, dwell_s: float) -> bytes:
@@ -92,6 +90,5 @@ def the_port_opens_again(s: Dut) -> str:
     t = transfers(log)
     due = WORDS * int(s.variant["word_bits"])
     torn = [len(r) for r in t.rises[1:] if len(r) != due]
-    if torn:
-        raise Failed(f"{len(torn)} frames of {len(t)} with {torn[0]} bits", f"{due}")
+    none_of(torn, lambda bits: f"{len(torn)} frames of {len(t)} with {bits} bits", f"{due}")
     return f"{len(t)} whole frames after the second opening"

@@ -9,9 +9,10 @@ import numpy as np
 from psabench.boards.board import Bus
 from psabench.boards.objects import BusObjects
 from psabench.boards.registry import BOARDS
+from psabench.conform.bus_host import port
 from psabench.conform.capture.log import LineLog
 from psabench.conform.dut import Dut
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import known, none_of
 from psabench.link.signals import Ints
 
 ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
@@ -42,9 +43,7 @@ class Strobes:
 
 def strobes(log: LineLog) -> Strobes:
     """All whole lows of CS. Raises Failed where the lines are not there."""
-    missing = [n for n in (*LINES, *DATA) if n not in log]
-    if missing:
-        raise Failed(f"no line {missing[0]}", "the lines of the bus")
+    none_of([n for n in (*LINES, *DATA) if n not in log], lambda name: f"no line {name}", "the lines of the bus")
     fall, rise = log.pulses("CS", 0)
     end = rise - 1
 
@@ -77,24 +76,17 @@ def quiet(s: Dut) -> int:
 
 
 def _bus(s: Dut) -> Bus:
-    bus = BOARDS[s.variant.family].bus
-    if bus is None:
-        raise Inconclusive(f"a {s.variant.family} has no parallel bus")
-    return bus
+    return known(BOARDS[s.variant.family].bus, f"a {s.variant.family} has no parallel bus")
 
 
 def say(s: Dut, *lines: str, dwell_s: float = 0.0) -> list[str]:
     """Lines all at once, and as many answers. dwell_s: that they take beyond a cycle each."""
-    if s.port is None:
-        raise Inconclusive("no bus port was connected (--bus-port)")
-    s.port.ask("\n".join(lines))
+    port(s).ask("\n".join(lines))
     if s.lockstep:
         s.run_for(len(lines) * EACH_S + dwell_s)
-    return [s.port.answered() for _ in lines]
+    return [port(s).answered() for _ in lines]
 
 
 def tell(s: Dut) -> str:
     """One answer more: to a line that was sent before."""
-    if s.port is None:
-        raise Inconclusive("no bus port was connected (--bus-port)")
-    return s.port.answered()
+    return port(s).answered()

@@ -1,8 +1,9 @@
-"""Comparisons that checks of lines share: intervals, coincidences of edges, levels at instants."""
+"""What checks share: facts and lines that they need, intervals, coincidences of edges, levels at instants."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,12 @@ from psabench.conform.capture.log import Bools, Capture
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, conclusive
 from psabench.link.signals import Ints
+
+
+def fact(e: Capture, name: str, lacking: str = "") -> Any:
+    """What the stimulus noted under this name. Raises Inconclusive, in these words, where it has not."""
+    conclusive(name in e.facts, lacking or f"the scene has no {name}")
+    return e.facts[name]
 
 
 def wires_needed(e: Capture, *names: str) -> None:
@@ -101,6 +108,17 @@ def together(e: Capture, at_ns: Ints, edges_ns: Ints, tolerance_ns: float, what:
     saw = [f"{min(int(t), 10**9)} ns between {what}" for t in off_ns]
     first_bad(off_ns > slack_ns, at_ns, saw, f"not more than {slack_ns:.1f} ns", lines)
     return f"{len(at_ns)} times, not more than {off_ns.max()} ns between {what}"
+
+
+def overlaps(n: int, m: int) -> Iterator[tuple[slice, slice]]:
+    """Where n things of one row lie beside m of another that shows the same: by each shift that leaves out few.
+
+    Few: those that only one of them has at its ends, two at the most.
+    """
+    for shift in range(-(m - 1), n):
+        a, b = max(0, shift), min(n, shift + m)
+        if b - a >= min(n, m) - 2:
+            yield slice(a, b), slice(a - shift, b - shift)
 
 
 def edges(e: Capture, name: str) -> Ints:

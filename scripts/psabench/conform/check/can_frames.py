@@ -15,7 +15,7 @@ from psabench.conform.plan import check
 from psabench.conform.profile import proto_yaml
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
 from psabench.link.protocol_files import database, dbc_node, message
 from psabench.link.signals import unwrap
 
@@ -72,8 +72,7 @@ def frames_have_the_identifiers_of_the_node(e: Capture) -> str:
     services = {_id(e, "sdo_tx"): "SDO answers", _id(e, "heartbeat"): "heartbeat"}
     missing = [what for can_id, what in services.items() if can_id not in mine]
     stray = [f for f in e.can.frames if _is_stray(e, f)]
-    if stray:
-        raise Failed(f"a frame {stray[0].can_id:03X}h, which is no message of the unit", "its own", frames=stray)
+    none_of(stray, lambda f: f"a frame {f.can_id:03X}h, which is no message of the unit", "its own", frames=stray)
     conclusive(not missing, f"no {', '.join(missing)} in the log")
     if not mine & {i + e.node for i in pdos(e.variant.family).values()}:
         raise Failed(f"frames {', '.join(f'{i:03X}h' for i in sorted(mine))}", "TPDOs at the identifiers of the page")
@@ -93,8 +92,7 @@ def _is_stray(e: Capture, f: CanFrame) -> bool:
 def no_remote_frames(e: Capture) -> str:
     """Look for remote frames of the unit."""
     bad = [f for f in _mine(e) if f.remote]
-    if bad:
-        raise Failed(f"a remote frame {bad[0].can_id:03X}h", "data frames", frames=bad)
+    none_of(bad, lambda f: f"a remote frame {f.can_id:03X}h", "data frames", frames=bad)
     return f"{len(_mine(e))} data frames"
 
 
@@ -102,8 +100,7 @@ def no_remote_frames(e: Capture) -> str:
 def identifiers_have_11_bits(e: Capture) -> str:
     """Look for frames with identifiers of 29 bits."""
     bad = [f for f in e.can.frames if f.extended and not f.error and not f.sent]
-    if bad:
-        raise Failed(f"a frame {bad[0].can_id:08X}h", "11 bits", frames=bad)
+    none_of(bad, lambda f: f"a frame {f.can_id:08X}h", "11 bits", frames=bad)
     return f"{len(_mine(e))} frames of the unit with 11 bits"
 
 
@@ -113,8 +110,7 @@ def services_are_classic(e: Capture) -> str:
     ids = {_id(e, n) for n in ("emcy", "sdo_tx", "heartbeat")}
     mine = [f for f in _mine(e) if f.can_id in ids]
     bad = [f for f in mine if f.fd]
-    if bad:
-        raise Failed(f"an FD frame {bad[0].can_id:03X}h", "a classic one", frames=bad)
+    none_of(bad, lambda f: f"an FD frame {f.can_id:03X}h", "a classic one", frames=bad)
     return f"{len(mine)} classic frames"
 
 

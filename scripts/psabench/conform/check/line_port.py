@@ -6,30 +6,29 @@ from typing import Any
 
 import numpy as np
 
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import Capture, LineLog
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.sources.samples import PORT_LINES
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, conclusive, expect, none_of
 from psabench.link.signals import Ints
 
 NS = 1e9
 WORDS = 4
+NO_SAMPLES = "no samples of the line port"
 
 
 def _bytes(e: Capture) -> Any:
     """The bytes (n,). Raises Inconclusive for less than a millisecond of them."""
-    found = e.facts.get("bytes")
-    if not isinstance(found, np.ndarray) or len(found) < row_for(e, "LINE-RATE-01").limit("sample_hz") * 1e-3:
-        raise Inconclusive("no samples of the line port")
+    found = fact(e, "bytes", NO_SAMPLES)
+    conclusive(len(found) >= row_for(e, "LINE-RATE-01").limit("sample_hz") * 1e-3, NO_SAMPLES)
     return found
 
 
 def _port(e: Capture) -> LineLog:
-    found = e.facts.get("port")
-    if not isinstance(found, LineLog):
-        raise Inconclusive("no samples of the line port")
+    found: LineLog = fact(e, "port", NO_SAMPLES)
     return found
 
 
@@ -37,9 +36,8 @@ def _port(e: Capture) -> LineLog:
 def bits_of_a_psa2(e: Capture, row: Requirement) -> str:
     """Look for frames in bits 0 and 2 of the bytes, for data in bit 1, for nothing in bits 3 to 6."""
     x = _bytes(e)
-    stray = np.flatnonzero(x & int(row.limit("zero_mask")))
-    if len(stray):
-        raise Failed(f"byte {x[stray[0]]:02X}h", "bits 3 to 6 zero")
+    stray = x[(x & int(row.limit("zero_mask"))) != 0].tolist()
+    none_of(stray, lambda byte: f"byte {byte:02X}h", "bits 3 to 6 zero")
     low = (x & int(row.limit("int_mask"))) == 0
     begin, end = _edges(low, 1), _edges(low, 0)
     end = end[np.searchsorted(end, begin[0], "right") :] if len(begin) else end

@@ -10,7 +10,7 @@ from psabench.boards.objects import Common, Psa2Objects
 from psabench.conform.host.capture import SDO_RX, SDO_TX, SEQS, WRAP_US, Frame, number
 from psabench.conform.host.cases_units import UNIT_CASES
 from psabench.conform.host.check import HostCapture, checks, enough, limits
-from psabench.conform.verdict import Failed, Unseen, expect
+from psabench.conform.verdict import Failed, Unseen, expect, none_of
 
 READ, ABORT = 0x40, 0x80  # command specifiers of SDO
 FAST, TOG = 0x380, 63  # PSA2_FAST, and the bit of it that tells the frame's number, even or odd
@@ -35,8 +35,7 @@ def every_sample_is_told_once_and_in_order(e: HostCapture) -> str:
 def nothing_is_told_that_was_not_played(e: HostCapture) -> str:
     """Everything told of ten seconds of a good board."""
     e.nothing_but()
-    if e.match.strange:
-        raise Failed(f"sample {e.match.strange[0].number}, which was not sent", "none")
+    none_of(e.match.strange, lambda s: f"sample {s.number}, which was not sent", "none")
     return f"{len(e.told.samples)} samples and no fault"
 
 
@@ -53,8 +52,7 @@ def the_end_is_told(e: HostCapture) -> str:
 def every_line_is_of_the_results_channel(e: HostCapture) -> str:
     """The lines told, against the words of the results channel."""
     enough(e.told.count or e.told.events or e.told.bad_lines, "a line")
-    if e.told.bad_lines:
-        raise Failed(f"{e.told.bad_lines} lines that are none, the first {e.told.bad[0]}", "docs/conform_host.md")
+    none_of(e.told.bad, lambda x: f"{e.told.bad_lines} lines that are none, the first {x}", "docs/conform_host.md")
     return f"{e.told.count + len(e.told.events)} lines"
 
 
@@ -313,8 +311,7 @@ def samples_that_have_not_settled_are_not_told(e: HostCapture) -> str:
     """CONFIG1 is written: 63 words whose SETTLED is 0."""
     m = e.samples()
     enough(sum(not p.settled for p in e.bus.samples) > 10, "words that have not settled")
-    if m.unsettled:
-        raise Failed(f"{len(m.unsettled)} of them told, the first {m.unsettled[0].number}", "none")
+    none_of(m.unsettled, lambda s: f"{len(m.unsettled)} of them told, the first {s.number}", "none")
     return f"none of {sum(not p.settled for p in e.bus.samples)}"
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.verdict import Inconclusive, conclusive, damaged_data_are
 from psabench.link.protocol_files import message
@@ -42,7 +43,4 @@ def vertical_degph(latitude_deg: float) -> float:
 
 def setting(e: Capture, name: str) -> float:
     """A setting of the unit, or what else the stimulus has read. Raises Inconclusive."""
-    value = e.facts.get(name)
-    if not isinstance(value, int | float):
-        raise Inconclusive(f"{name} is not known")
-    return float(value)
+    return float(fact(e, name, f"{name} is not known"))

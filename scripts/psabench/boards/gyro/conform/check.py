@@ -8,13 +8,13 @@ import numpy as np
 
 from psabench.boards.gyro.conform.capture_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.boards.gyro.device import Mode, Phase
-from psabench.conform.capture.intervals import interval
+from psabench.conform.capture.intervals import fact, interval
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, layout
@@ -37,9 +37,8 @@ def steps_are_counted(e: Capture, row: Requirement) -> str:
     """Look at STEP from reading to reading."""
     step = columns(e)["STEP"].astype(np.int64)
     modulo = int(row.limit("modulo"))
-    bad = np.flatnonzero(np.diff(step) % modulo != 1)
-    if len(bad):
-        raise Failed(f"STEP {step[bad[0]]}, then {step[bad[0] + 1]}", "one more")
+    bad = np.flatnonzero(np.diff(step) % modulo != 1).tolist()
+    none_of(bad, lambda k: f"STEP {step[k]}, then {step[k + 1]}", "one more")
     return f"{len(step)} readings without a gap"
 
 
@@ -146,9 +145,7 @@ def u1_levels(e: Capture, row: Requirement) -> str:
 @check("run", "GYRO-LAW-02", needs={"can"})
 def u2_holds_the_gimbal(e: Capture, row: Requirement) -> str:
     """Compute U2 at each position of a run from ENCODER, BETA and GAMMA; what the sensor is off there is a constant."""
-    c, positions = columns(e), e.facts.get("positions")
-    if not isinstance(positions, list):
-        raise Inconclusive("the positions are not known")
+    c, positions = columns(e), fact(e, "positions", "the positions are not known")
     mine = _steady(c, Mode.GYROCOMPASS, (Phase.WINDOW,)) & (c["SATURATED"] == 0)
     k = np.clip(c["POSITION"].astype(np.int64) - 1, 0, len(positions) - 1)
     b, g = np.radians(c["BETA"]), np.radians(c["GAMMA"])
@@ -164,9 +161,7 @@ def u2_holds_the_gimbal(e: Capture, row: Requirement) -> str:
 @check("hold", "GYRO-LAW-02", needs={"can"})
 def u2_turns_with_the_earth(e: Capture, row: Requirement) -> str:
     """Turn Wz round by the latitude in mode 2, and compute U2 before and after with one constant for the sensor."""
-    parts = e.facts.get("latitudes")
-    if not isinstance(parts, list):
-        raise Inconclusive("no latitudes in the recording")
+    parts = fact(e, "latitudes", "no latitudes in the recording")
     logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
     c = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
     wz = np.repeat([vertical_degph(d) for d, _, _ in parts], [len(log["U2"]) for log in logs])

@@ -8,6 +8,7 @@ import numpy as np
 
 from psabench.boards.gyro.conform.capture_readings import columns, setting
 from psabench.boards.gyro.device import Mode, Phase
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
@@ -50,8 +51,8 @@ def a_run_goes_through_its_positions(e: Capture) -> str:
     conclusive(len(here) >= 100, "no run in the recording")
     pairs = np.stack([c["POSITION"][here], c["PHASE"][here]], axis=1)
     order = [tuple(int(v) for v in p) for k, p in enumerate(pairs) if k == 0 or (p != pairs[k - 1]).any()]
-    positions = e.facts.get("positions")
-    due = [(k, p) for k in range(1, len(positions if isinstance(positions, list) else []) + 1) for p in (1, 2, 3)]
+    count = len(fact(e, "positions", "the positions are not known"))
+    due = [(k, p) for k in range(1, count + 1) for p in (1, 2, 3)]
     due_still = [p for p in due if p != (1, 1)] if order[:1] == [(1, 2)] else due
     expect(order in (due, due_still), f"positions and phases {order}", f"{due}")
     after = c["MODE"][here[-1] + 1 :]
@@ -75,10 +76,9 @@ def windows_have_their_length(e: Capture, row: Requirement) -> str:
 def windows_begin_settled(e: Capture, row: Requirement) -> str:
     """Look at BETA and ENCODER as a window begins, and how long it has settled."""
     c = columns(e)
-    positions = e.facts.get("positions")
+    positions = fact(e, "positions", "no window in the recording")
     begins = np.flatnonzero((np.diff(c["PHASE"]) != 0) & (c["PHASE"][1:] == Phase.WINDOW)) + 1
-    if not len(begins) or not isinstance(positions, list):
-        raise Inconclusive("no window in the recording")
+    conclusive(len(begins), "no window in the recording")
     most, shown = row.limit("tolerance_arcmin") / 60, row.limit("encoder_off_max_arcmin") / 60
     least = round(row.limit("settling_s") / (row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6))
     for k in begins:
@@ -122,9 +122,7 @@ def navigation_keeps_the_azimuth(e: Capture, row: Requirement) -> str:
 
 def _turns(e: Capture) -> list[tuple[float, float, Mapping[str, Floats]]]:
     """From, to, deg, and the readings of each turn by mode 3. Raises Inconclusive."""
-    parts = e.facts.get("turns")
-    if not isinstance(parts, list) or not parts:
-        raise Inconclusive("no turns in the recording")
+    parts = fact(e, "turns", "no turns in the recording")
     logs = [columns(e.with_can(CanLog(frames=e.can.frames[a:b]))) for _, a, b in parts]
     ends = [float(logs[0]["ENCODER"][0])] + [float(to) for to, _, _ in parts]
     return list(zip(ends[:-1], ends[1:], logs, strict=True))
@@ -133,15 +131,13 @@ def _turns(e: Capture) -> list[tuple[float, float, Mapping[str, Floats]]]:
 @check("turns", "GYRO-MODE-02", needs={"can"})
 def a_turn_ends_at_its_angle_and_holds(e: Capture, row: Requirement) -> str:
     """Look where ENCODER ends in each turn by mode 3, and whether it stays there in mode 2."""
-    held = e.facts.get("held")
     turns, worst = _turns(e), 0.0
     for _, to, c in turns:
         off = abs(wrapped_deg(float(c["ENCODER"][-1]) - to))
         expect(off <= row.limit("encoder_off_max_arcmin") / 60, f"{c['ENCODER'][-1]:.4f} deg", f"{to:g} deg")
         worst = max(worst, off)
-    if not isinstance(held, tuple):
-        raise Inconclusive("mode 2 is not in the recording")
-    c = columns(e.with_can(CanLog(frames=e.can.frames[held[0] : held[1]])))
+    begin, end = fact(e, "held", "mode 2 is not in the recording")
+    c = columns(e.with_can(CanLog(frames=e.can.frames[begin:end])))
     mine = c["MODE"] == Mode.HOLD
     moved = np.abs(wrapped_deg(c["ENCODER"][mine] - turns[-1][2]["ENCODER"][-1]))
     if mine.sum() < LEAST or moved.max() > row.limit("tolerance_arcmin") / 60:

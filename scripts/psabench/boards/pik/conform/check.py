@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from psabench.conform.capture.intervals import at_levels, before, edges, first_bad, first_of, interval
+from psabench.conform.capture.intervals import at_levels, before, edges, first_bad, first_of, interval, overlaps
 from psabench.conform.capture.log import CanLog, Capture, LineLog
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
@@ -252,14 +252,9 @@ def counts_are_the_pulses(e: Capture) -> str:
     seen = np.stack([_between(log, f"F{a}P", latch) - _between(log, f"F{a}N", latch) for a in "XYZ"], axis=1)
     raw = _told(e, "PIK_COUNTS").raw("PIK_COUNTS")
     told = np.stack([raw[a] for a in "XYZ"], axis=1)
-    n, m = len(seen), len(told)
-    for shift in range(-(m - 1), n):
-        a, b = max(0, shift), min(n, shift + m)
-        if b - a < min(n, m) - 2:
-            continue
-        off = (seen[a:b] - told[a - shift : b - shift]).cumsum(axis=0)
-        if np.abs(off).max() <= 1:
-            return f"{b - a} readings, {np.abs(seen[a:b]).sum(axis=0).tolist()} pulses on X, Y, Z"
+    for here, there in overlaps(len(seen), len(told)):
+        if np.abs((seen[here] - told[there]).cumsum(axis=0)).max() <= 1:
+            return f"{len(seen[here])} readings, {np.abs(seen[here]).sum(axis=0).tolist()} pulses on X, Y, Z"
     raise Failed(
         f"{told[:4].tolist()} told", f"{seen[:4].tolist()} seen", at_ns=int(latch[0]), lines=("LATCH", *PULSES)
     )

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from psabench.boards.pmka import estimate as est
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.conform.proves import row_for
 from psabench.conform.verdict import Inconclusive, conclusive, damaged_data_are, expect
@@ -86,9 +87,9 @@ class Run:
 
 def run_of(e: Capture) -> Run:
     """Raises Inconclusive where calibrations, ROM or inputs are missing, Failed where readings are."""
-    words = e.facts.get("rom")
-    if not isinstance(words, list) or len(e.inputs_v) < 3:
-        raise Inconclusive("the ROM, or the volts at the three inputs, are not known")
+    lacking = "the ROM, or the volts at the three inputs, are not known"
+    words = fact(e, "rom", lacking)
+    conclusive(len(e.inputs_v) >= 3, lacking)
     with damaged_data_are(Inconclusive):
         rom = est.rom_of(words)
         periods = est.periods_of(columns(e))

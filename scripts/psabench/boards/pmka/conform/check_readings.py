@@ -14,7 +14,7 @@ from psabench.conform.capture.messages import as_laid_out, booted, in_turn, late
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
 from psabench.link.signals import Floats, Ints
 
 BEAT_OF_AXIS = {2: 0, 3: 1, 4: 2}  # beat to the axis that the spare serves
@@ -45,10 +45,8 @@ def readings_are_counted_without_gaps(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
     modulo = int(row.limit("modulo"))
     seq = columns(e)["SEQ"].astype(np.int64)
-    gaps = np.flatnonzero(np.diff(seq) % modulo != 1)
-    if len(gaps):
-        k = int(gaps[0])
-        raise Failed(f"SEQ {seq[k]}, then {seq[k + 1]} ({len(gaps)} gaps)", "one more")
+    gaps = np.flatnonzero(np.diff(seq) % modulo != 1).tolist()
+    none_of(gaps, lambda k: f"SEQ {seq[k]}, then {seq[k + 1]} ({len(gaps)} gaps)", "one more")
     return f"{len(seq)} readings, SEQ {seq[0]} to {seq[-1]}"
 
 
@@ -330,9 +328,8 @@ def _serves(e: Capture, tau: int, due: tuple[int, ...]) -> str:
     mine = _steady(c["TAU"]) & (c["TAU"] == tau)
     conclusive(mine.any(), f"no reading of beat {tau}")
     serves = np.column_stack([c[f"SERVES_{n}"] for n in est.INTEGRATORS]).astype(np.int64)[mine]
-    bad = np.flatnonzero((serves != np.array(due)).any(axis=1))
-    if len(bad):
-        raise Failed(f"SERVES {serves[int(bad[0])].tolist()} in beat {tau}", f"{list(due)} of X, Y, Z, K")
+    bad = serves[(serves != np.array(due)).any(axis=1)].tolist()
+    none_of(bad, lambda one: f"SERVES {one} in beat {tau}", f"{list(due)} of X, Y, Z, K")
     return f"{int(mine.sum())} readings of beat {tau}, SERVES {list(due)}"
 
 

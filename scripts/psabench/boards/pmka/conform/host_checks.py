@@ -16,7 +16,7 @@ from psabench.conform.host.check import HostCapture, checks, enough, limits
 from psabench.conform.host.results import Reading
 from psabench.conform.host.units import SECOND, frames_of, readings_told
 from psabench.conform.profile import variant
-from psabench.conform.verdict import Failed, expect
+from psabench.conform.verdict import Failed, expect, none_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,11 +115,10 @@ def what_is_lost_is_told_and_not_made_up(e: HostCapture) -> str:
     enough(any(s.over for s in sent), "an integrator at its limit")
     if e.told.of("over_range")[:1] != ["x"] or e.told.of("in_range")[-1:] != ["x"]:
         raise Failed(f"over-range {e.told.of('over_range')}, in range {e.told.of('in_range')}", "x, and its end")
-    if made := [r for r, _, s in _numbered(e.told.readings, sent) if s.over]:
-        raise Failed(f"an integral of reading {made[0].number}, which was at its limit", "none")
-    if whole := [(a, b) for a, b in itertools.pairwise(e.told.readings) if _over_a_gap(a, b, sent)]:
-        (a, b) = whole[0]
-        raise Failed(f"integrals of readings {a.number} and {b.number}, with lost ones between", "sums from 0")
+    made = [r.number for r, _, s in _numbered(e.told.readings, sent) if s.over]
+    none_of(made, lambda n: f"an integral of reading {n}, which was at its limit", "none")
+    whole = [f"{a.number} and {b.number}" for a, b in itertools.pairwise(e.told.readings) if _over_a_gap(a, b, sent)]
+    none_of(whole, lambda two: f"integrals of readings {two}, with lost ones between", "sums from 0")
     return f"lost {gaps}, over-range told, nothing made up"
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from psabench.conform.capture.intervals import first_of
+from psabench.conform.capture.intervals import fact, first_of
 from psabench.conform.capture.log import Bools, CanFrame, CanLog, Capture
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are
+from psabench.conform.verdict import Failed, conclusive, damaged_data_are
 from psabench.link import signals
 from psabench.link.signals import Ints
 
@@ -56,9 +56,9 @@ class Pairs:
 
 def segment(e: Capture, begin: str, end: str | None = None) -> Capture:
     """The same with the part of the CAN log between two cuts of the stimulus (facts["cut"])."""
-    cuts = e.facts.get("cut")
-    if not isinstance(cuts, dict) or begin not in cuts or (end is not None and end not in cuts):
-        raise Inconclusive(f"the scene has no cut {begin} or {end}")
+    lacking = f"the scene has no cut {begin} or {end}"
+    cuts = fact(e, "cut", lacking)
+    conclusive(begin in cuts and (end is None or end in cuts), lacking)
     frames = e.can.frames[cuts[begin] : None if end is None else cuts[end]]
     return e.with_can(CanLog(frames=frames))
 

@@ -11,11 +11,12 @@ from psabench.boards.psa2.conform.capture_can import STAMP_BITS, pairs, segment
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.check_stream import MESSAGES, US, number, unit_us
 from psabench.boards.psa2.conform.stimulus_can import Answer
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, damaged_data_are, expect, none_of
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -36,8 +37,7 @@ def _form(e: Capture, form: int, name: str, least: int = LEAST) -> CanLog:
     expect(len(log) >= least, f"{len(log)} frames {name}", "one a sample", frames=part.can.frames[:10])
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
-    if bad:
-        raise Failed(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad[:3])
+    none_of(bad, lambda f: f"{name} of {len(f.data)} bytes", f"{due}", frames=bad[:3])
     return log
 
 
@@ -120,9 +120,7 @@ def _evenly(e: Capture, row: Requirement, stamp_us: Ints, samples: int) -> str:
 @check("forms", "PSA2-FORM-05", needs={"fd"})
 def a_block_begins_anew_after_a_stop(e: Capture) -> str:
     """Stop the stream and start it: is the first sample of the block one after the start?"""
-    stamps = e.facts.get("stamps")
-    if not isinstance(stamps, list):
-        raise Inconclusive("the scene started no stream again")
+    stamps = fact(e, "stamps", "the scene started no stream again")
     for k, stamp in enumerate(stamps):
         log = segment(e, f"again {k}", f"again {k} end").frames_of("PSA2_BLOCK")
         expect(len(log), "no block after the start", "one every five samples")
@@ -140,10 +138,7 @@ def a_form_switches_its_tpdos(e: Capture, row: Requirement) -> str:
     mask = int(row.limit("off_mask"))
     sends = {0: (0, 1), 1: (2,), 2: (4,), 3: (3,)}
     for form, on in sends.items():
-        off = e.facts.get(f"off {form}")
-        if not isinstance(off, list):
-            raise Inconclusive("the scene read no TPDOs")
-        for k, a in enumerate(off):
+        for k, a in enumerate(fact(e, f"off {form}", "the scene read no TPDOs")):
             if bool(number(a) & mask) == (k in on):
                 raise Failed(
                     f"{OD.TPDO + k:04X}h:1 {number(a):08X}h in form {form}", f"bit 31 {'clear' if k in on else 'set'}"
@@ -156,8 +151,7 @@ def fd_frames_are_those_of_two_forms(e: Capture) -> str:
     """Look at the form of every frame."""
     fd = {int(message(n).frame_id) - 5 + e.node for n in ("PSA2_FRAME", "PSA2_BLOCK")}
     wrong = [f for f in e.can.frames if f.fd and f.can_id not in fd]
-    if wrong:
-        raise Failed(f"{wrong[0].can_id:03X}h in an FD frame", "PSA2_FRAME and PSA2_BLOCK only", frames=wrong[:3])
+    none_of(wrong, lambda f: f"{f.can_id:03X}h in an FD frame", "PSA2_FRAME and PSA2_BLOCK only", frames=wrong[:3])
     return f"{sum(f.fd for f in e.can.frames)} FD frames of {len(e.can)}, all of the two forms"
 
 

@@ -7,17 +7,16 @@ from collections.abc import Mapping
 
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.psa2.conform.capture_can import Pairs, pairs
-from psabench.boards.psa2.conform.check_registers import fact
+from psabench.boards.psa2.conform.check_registers import READ_ONLY, WRITE_ONLY
 from psabench.boards.psa2.conform.check_stream import number, unit_us
 from psabench.boards.psa2.conform.stimulus_objects import Row
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive, expect
 from psabench.link.canopen_host import Described
-
-READ_ONLY, WRITE_ONLY = 0x06010002, 0x06010001
 
 
 @check("objects", "PSA2-CAN-09")

@@ -10,12 +10,12 @@ from psabench.boards.psa2.conform.capture_can import SEQ_BITS, STAMP_BITS, pairs
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
-from psabench.conform.capture.intervals import first_of
+from psabench.conform.capture.intervals import fact, first_of
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.protocol_files import message
 
 LINES = ("Int", "Data", "CLK")
@@ -219,9 +219,7 @@ def overrun_tells_of_lost_conversions(e: Capture) -> str:
 
 
 def _counted(e: Capture, sub: int) -> int:
-    before, after = e.facts.get("before"), e.facts.get("after")
-    if not isinstance(before, dict) or not isinstance(after, dict):
-        raise Inconclusive("the scene has no counters")
+    before, after = (fact(e, name, "the scene has no counters") for name in ("before", "after"))
     return number(after[sub]) - number(before[sub])
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from psabench.boards.psa2.conform.capture_can import pairs, segment
-from psabench.boards.psa2.conform.check_registers import fact
 from psabench.boards.psa2.conform.check_setup import ACCEL as ACCEL_LINES
 from psabench.boards.psa2.conform.check_setup import port_traffic
 from psabench.boards.psa2.conform.check_stream import number
 from psabench.boards.psa2.conform.stimulus_can import FORM, TIMEOUTS, Answer
+from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import CanFrame, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for

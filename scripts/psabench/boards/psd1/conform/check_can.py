@@ -10,7 +10,7 @@ from psabench.conform.capture.messages import as_laid_out
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive, expect
+from psabench.conform.verdict import Failed, conclusive, expect, none_of
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats
 
@@ -22,8 +22,7 @@ def _told(e: Capture, name: str, least: int = 3) -> CanLog:
     conclusive(len(log) >= least, f"{len(log)} messages {name} came; expected {least}")
     due = int(message(name).length)
     bad = [f for f in log.frames if len(f.data) != due]
-    if bad:
-        raise Failed(f"{name} of {len(bad[0].data)} bytes", f"{due}", frames=bad)
+    none_of(bad, lambda f: f"{name} of {len(f.data)} bytes", f"{due}", frames=bad)
     return log
 
 

@@ -22,6 +22,7 @@ from psabench.conform.capture.intervals import (
     edges,
     first_bad,
     interval,
+    overlaps,
     together,
     wires_needed,
 )
@@ -93,11 +94,9 @@ def told_words(e: Capture) -> np.ndarray:
 
 def _found(seen: np.ndarray, told: np.ndarray) -> str:
     """The reported words are consecutive words of those seen; words outside the recording are left out."""
-    n, m = len(seen), len(told)
-    for shift in range(-(m - 1), n):
-        a, b = max(0, shift), min(n, shift + m)
-        if b - a >= min(n, m) - 2 and b - a >= 3 and np.array_equal(seen[a:b], told[a - shift : b - shift]):
-            return f"{b - a} cycles, their words on SDAT and on CAN"
+    for here, there in overlaps(len(seen), len(told)):
+        if len(seen[here]) >= 3 and np.array_equal(seen[here], told[there]):
+            return f"{len(seen[here])} cycles, their words on SDAT and on CAN"
     raise Failed(
         f"{_hex(told[0])} on CAN, {_hex(seen[0])} on SDAT, never alike", "the same words in order", lines=LINES
     )

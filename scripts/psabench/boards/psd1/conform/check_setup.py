@@ -24,6 +24,7 @@ from psabench.conform.capture.intervals import (
     edges,
     first_bad,
     interval,
+    overlaps,
     together,
     wires_needed,
     within,
@@ -33,7 +34,7 @@ from psabench.conform.capture.messages import booted, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, conclusive, damaged_data_are, expect, known
 from psabench.link.signals import Ints
 
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
@@ -67,9 +68,7 @@ def frames(e: Capture) -> list[Frame]:
     for name in ("TFS", *FRAMES):
         for a, b in zip(*log.pulses(name, 0), strict=True):
             found.append(Frame(name, int(a), int(b), within(up, a, b), within(down, a, b)))
-    begin = min((f.fall for f in found if f.line == "TFS"), default=None)
-    if begin is None:
-        raise Inconclusive("no control word in the recording")
+    begin = known(min((f.fall for f in found if f.line == "TFS"), default=None), "no control word in the recording")
     return sorted((f for f in found if f.fall >= begin), key=lambda f: f.fall)
 
 
@@ -359,18 +358,20 @@ def psd1_time_tells_the_cycle(e: Capture, row: Requirement) -> str:
         [raw["TSTAMP"] * 1000 * row.limit("unit_us"), raw["LENGTH"], np.minimum(raw["WAITED"], 255)], axis=1
     )
     seen[:, 2] = np.minimum(seen[:, 2], 255)
-    n, m = len(seen), len(told)
-    for shift in range(-(m - 1), n):
-        a, b = max(0, shift), min(n, shift + m)
-        if b - a < min(n, m) - 2 or b - a < 3:
+    for here, there in overlaps(len(seen), len(told)):
+        s, t = seen[here], told[there]
+        if len(s) < 3:
             continue
-        s, t = seen[a:b], told[a - shift : b - shift]
         apart = (s[:, 0] - s[0, 0]) - (t[:, 0] - t[0, 0])
         if (
             np.abs(apart).max() <= 1000 * row.limit("unit_us") + e.slack_ns(float(s[-1, 0] - s[0, 0]))
             and (np.abs(s[:, 1:] - t[:, 1:]) <= 1).all()
         ):
-            return f"{b - a} messages, LENGTH {int(t[0, 1])}, WAITED {int(t[:, 2].min())} to {int(t[:, 2].max())}"
+            return f"{len(s)} messages, LENGTH {int(t[0, 1])}, WAITED {int(t[:, 2].min())} to {int(t[:, 2].max())}"
     saw = f"LENGTH {int(told[0, 1])}, WAITED {int(told[0, 2])}, {told[1, 0] - told[0, 0]:.0f} ns between TSTAMPs"
-    due = f"{int(seen[0, 1])}, {int(seen[0, 2])}, {seen[1, 0] - seen[0, 0]:.0f} ns" if n > 1 else "those of the lines"
+    due = (
+        f"{int(seen[0, 1])}, {int(seen[0, 2])}, {seen[1, 0] - seen[0, 0]:.0f} ns"
+        if len(seen) > 1
+        else "those of the lines"
+    )
     raise Failed(saw, due, at_ns=int(begin[0]), lines=("DR", "A0", "FL2"), frames=log.frames[:4])

@@ -7,7 +7,7 @@ from psabench.conform.bus_host import code_of, line
 from psabench.conform.dut import Dut
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
-from psabench.conform.verdict import Failed, Inconclusive
+from psabench.conform.verdict import Failed, known
 from psabench.errors import CycleRefused
 from psabench.link.busport import Cycle
 
@@ -72,8 +72,7 @@ def drive(s: Dut, count: int, slow_s: float = 0.0) -> list[Cycle]:
 
 def word(s: Dut, axis: int, slow_s: float = 0.0) -> Cycle:
     """The next word of an axis as soon as it waits."""
-    if s.port is None:
-        raise Inconclusive("a board without a built-in host wants a bus port to be read")
+    known(s.port, "a board without a built-in host wants a bus port to be read")
     wait_s = period_s(s.variant) / 20
     if slow_s:
         s.run_for(slow_s)
