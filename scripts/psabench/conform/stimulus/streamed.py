@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import wraps
 
@@ -27,6 +27,7 @@ def recorded(
     boards: Iterable[str],
     lines: bool = True,
     streaming: bool = False,
+    facts: Callable[[Dut], Mapping[str, object]] = lambda _: {},
     around: Callable[[Dut], AbstractContextManager[object]] = nullcontext,
     before: Callable[[Dut], object] = lambda _: None,
     after: Callable[[Dut], object] = lambda _: None,
@@ -34,6 +35,7 @@ def recorded(
     """A @stimulus that is one take from its begin to its end, with the lines or without, while readings flow or not.
 
     before, after: bring the board to a known state; around: the same where it must be done after a failure, too.
+    facts: what else is noted, as it was just before the take.
     """
 
     def register(play: Callable[[Dut, Take], None]) -> Callable[[Dut], Capture]:
@@ -41,8 +43,10 @@ def recorded(
         @wraps(play)
         def make(s: Dut) -> Capture:
             before(s)
+            noted = facts(s)
             with around(s), s.take(lines=lines) as take, while_streaming(s) if streaming else nullcontext():
                 play(s, take)
+            take.facts |= noted
             after(s)
             return s.capture(name, take)
 
@@ -63,12 +67,3 @@ def from_res(s: Dut, dwell_s: float) -> Capture:
         with while_streaming(s):
             s.run_for(dwell_s)
     return s.capture("power_on", take)
-
-
-def readings(s: Dut, begun_s: float, pass_time: Callable[[], object], *, lines: bool = True) -> Take:
-    """Readings after a Res and begun_s while pass_time lets time pass."""
-    s.reset()
-    s.run_for(begun_s)
-    with s.take(lines=lines) as take, while_streaming(s):
-        pass_time()
-    return take

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from psabench.boards.gyro.conform.capture_readings import columns, vertical_degph
 from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
@@ -11,7 +13,7 @@ from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
-from psabench.conform.verdict import Inconclusive, conclusive
+from psabench.conform.verdict import conclusive, known
 from psabench.estimate.angles import wrapped_deg
 
 READY_S = 0.4
@@ -29,9 +31,7 @@ FACTS = ("m1_per_s", "m2_per_s", "latitude_deg", "zero_x_v", "zero_y_v", "scale_
 
 def unit(s: Dut) -> Gyro:
     """Raises Inconclusive where it is none."""
-    if not isinstance(s.unit, Gyro):
-        raise Inconclusive("no gyro unit")
-    return s.unit
+    return known(s.unit if isinstance(s.unit, Gyro) else None, "no gyro unit")
 
 
 def calm(s: Dut) -> None:
@@ -56,13 +56,18 @@ def settings(s: Dut) -> dict[str, object]:
     }
 
 
+def _wait_until(s: Dut, met: Callable[[], bool], limit_s: float, why: str) -> None:
+    """Let time pass until it is met. Raises Inconclusive, in these words, where it is not within the limit."""
+    while not met():
+        conclusive(limit_s > 0, why)
+        s.run_for(WAIT_S)
+        limit_s -= WAIT_S
+
+
 def until_mode(s: Dut, mode: Mode, limit_s: float) -> None:
     """Raises Inconclusive where the unit does not come to that mode."""
-    left_s = limit_s
-    while int(s.unit.node.read(OD.CONTROL, 1)) != mode:
-        conclusive(left_s > 0, f"the unit does not come to mode {int(mode)} within {limit_s:g} s")
-        s.run_for(WAIT_S)
-        left_s -= WAIT_S
+    why = f"the unit does not come to mode {int(mode)} within {limit_s:g} s"
+    _wait_until(s, lambda: int(s.unit.node.read(OD.CONTROL, 1)) == mode, limit_s, why)
 
 
 def levelled(s: Dut) -> None:
@@ -70,12 +75,10 @@ def levelled(s: Dut) -> None:
     row = requirements()["GYRO-MODE-11"]
     calm(s)
     unit(s).mode = Mode.LEVEL
-    left_s = row.limit("limit_s")
+    limit_s, most = row.limit("limit_s"), row.limit("level_max_arcmin")
     s.run_for(WAIT_S)
-    while abs(unit(s).beta_deg) * 60 > row.limit("level_max_arcmin"):
-        conclusive(left_s > 0, f"the platform is not level after {row.limit('limit_s'):g} s")
-        s.run_for(WAIT_S)
-        left_s -= WAIT_S
+    why = f"the platform is not level after {limit_s:g} s"
+    _wait_until(s, lambda: abs(unit(s).beta_deg) * 60 <= most, limit_s, why)
     s.run_for(REST_S)
 
 
@@ -84,11 +87,8 @@ def slew(s: Dut, to_deg: float) -> None:
     unit(s).set(slew_deg=to_deg)
     unit(s).mode = Mode.SLEW
     s.run_for(0.1)
-    left_s = TURN_LIMIT_S
-    while unit(s).phase == Phase.SLEWING:
-        conclusive(left_s > 0, f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s")
-        s.run_for(WAIT_S)
-        left_s -= WAIT_S
+    why = f"a turn to {to_deg:g} deg does not end within {TURN_LIMIT_S:g} s"
+    _wait_until(s, lambda: unit(s).phase != Phase.SLEWING, TURN_LIMIT_S, why)
     s.run_for(1.0)
 
 
@@ -108,18 +108,13 @@ def level(s: Dut, take: Take) -> None:
     s.run_for(requirements()["GYRO-MODE-11"].limit("limit_s"))
 
 
-@stimulus("run", boards=("gyro",))
-def run(s: Dut) -> Capture:
+@recorded("run", boards=("gyro",), before=levelled, streaming=True, facts=settings)
+def run(s: Dut, take: Take) -> None:
     """Levelling, then a run of three positions with the settings of power-on, on the lines and on CAN."""
-    levelled(s)
-    facts = settings(s)
-    with s.take() as take, while_streaming(s):
-        s.run_for(LEVEL_S)
-        unit(s).mode = Mode.GYROCOMPASS
-        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
-        s.run_for(2.0)
-    take.facts |= facts
-    return s.capture("run", take)
+    s.run_for(LEVEL_S)
+    unit(s).mode = Mode.GYROCOMPASS
+    until_mode(s, Mode.HOLD, RUN_LIMIT_S)
+    s.run_for(2.0)
 
 
 @stimulus("navigation", boards=("gyro",))
@@ -156,23 +151,19 @@ def _moved(s: Dut, dwell_s: float) -> tuple[float, float]:
     return wrapped_deg(unit(s).heading_deg - first_deg), s.bench.time_s - begun_s
 
 
-@stimulus("turns", boards=("gyro",))
-def turns(s: Dut) -> Capture:
+@recorded("turns", boards=("gyro",), before=levelled, after=calm, lines=False, streaming=True)
+def turns(s: Dut, take: Take) -> None:
     """Turns of all kinds by mode 3, then mode 2."""
-    levelled(s)
     parts: list[tuple[float, int, int]] = []  # angle, first and last frame
-    with s.take(lines=False) as take, while_streaming(s):
-        s.run_for(0.1)
-        for to_deg in TURNS_DEG:
-            begin = len(take.frames)
-            slew(s, to_deg)
-            parts.append((to_deg, begin, len(take.frames)))
+    s.run_for(0.1)
+    for to_deg in TURNS_DEG:
         begin = len(take.frames)
-        unit(s).mode = Mode.HOLD
-        s.run_for(3.0)
+        slew(s, to_deg)
+        parts.append((to_deg, begin, len(take.frames)))
+    begin = len(take.frames)
+    unit(s).mode = Mode.HOLD
+    s.run_for(3.0)
     take.facts |= {"turns": parts, "held": (begin, len(take.frames))}
-    calm(s)
-    return s.capture("turns", take)
 
 
 @stimulus("hold", boards=("gyro",))
@@ -196,20 +187,21 @@ def hold(s: Dut) -> Capture:
     return s.capture("hold", take)
 
 
-@stimulus("tilted", boards=("gyro",))
-def tilted(s: Dut) -> Capture:
-    """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
+def _tilted(s: Dut) -> None:
+    """Half a degree off the level, with a slow loop and no settling time."""
     levelled(s)
     zero_v, scale_v = unit(s).get("zero_y_v"), unit(s).get("scale_y_v_per_g")
     unit(s).set(zero_y_v=zero_v + scale_v * TILT_G)
     s.run_for(5.0)
     unit(s).set(m1_per_s=SLOW_PER_S, zero_y_v=zero_v, settle_s=0.0, settle_limit_s=60.0, count=1, window_s=1.0)
     unit(s).positions_deg = (round(unit(s).encoder_deg),)
-    with s.take(lines=False) as take, while_streaming(s):
-        unit(s).mode = Mode.GYROCOMPASS
-        until_mode(s, Mode.HOLD, RUN_LIMIT_S)
-    calm(s)
-    return s.capture("tilted", take)
+
+
+@recorded("tilted", boards=("gyro",), before=_tilted, after=calm, lines=False, streaming=True)
+def tilted(s: Dut, take: Take) -> None:
+    """A run that begins half a degree off the level, with a slow loop and no settling time: its first window."""
+    unit(s).mode = Mode.GYROCOMPASS
+    until_mode(s, Mode.HOLD, RUN_LIMIT_S)
 
 
 @recorded("limits", boards=("gyro",), before=levelled, after=calm, lines=False, streaming=True)
@@ -223,17 +215,11 @@ def limits(s: Dut, take: Take) -> None:
     s.run_for(8.0)
 
 
-@stimulus("silence", boards=("gyro",))
-def silence(s: Dut) -> Capture:
+@recorded("silence", boards=("gyro",), before=levelled, after=calm, streaming=True, facts=settings)
+def silence(s: Dut, take: Take) -> None:
     """The level unit silent for a while, twice: shorter and longer than the unit waits."""
-    levelled(s)
-    facts = settings(s)
-    with s.take() as take, while_streaming(s):
-        s.run_for(0.3)
-        level_unit(s, False)
-        s.run_for(0.5)
-        level_unit(s, True)
-        s.run_for(2.5)
-    take.facts |= facts
-    calm(s)
-    return s.capture("silence", take)
+    s.run_for(0.3)
+    level_unit(s, False)
+    s.run_for(0.5)
+    level_unit(s, True)
+    s.run_for(2.5)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from psabench.boards.objects import PikObjects as OD
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Dut
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import from_res, readings, while_streaming
+from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
 from psabench.conform.verdict import conclusive
 
 START_S, STREAM_S, MINUTE_S = 0.06, 1.0, 60.5
@@ -21,24 +21,29 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, START_S)
 
 
-@stimulus("stream", boards=("pik",))
-def stream(s: Dut) -> Capture:
+def _started(s: Dut) -> None:
+    """With its first readings after Res."""
+    s.reset()
+    s.run_for(START_S)
+
+
+@recorded("stream", boards=("pik",), before=_started, streaming=True)
+def stream(s: Dut, take: Take) -> None:
     """A second of pulses and readings."""
-    return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
+    s.run_for(STREAM_S)
 
 
-@stimulus("minute", boards=("pik",))
-def minute(s: Dut) -> Capture:
+@recorded("minute", boards=("pik",), before=_started, lines=False, streaming=True)
+def minute(s: Dut, take: Take) -> None:
     """A minute of readings at still inputs."""
-    return s.capture("minute", readings(s, START_S, lambda: s.run_for(MINUTE_S), lines=False))
+    s.run_for(MINUTE_S)
 
 
 @stimulus("overdrive", boards=("pik",))
 def overdrive(s: Dut) -> Capture:
     """The accelerometer X turned by a dividing head until its channel cannot keep up, and back; a reading each 2 ms."""
     conclusive("head" in s.probes, "no dividing head was connected")
-    s.reset()
-    s.run_for(START_S)
+    _started(s)
     s.unit.node.write_raw(BUS, PERIOD + 1, SOON.to_bytes(2, "little"))
     head = s.bench.head
     rest_deg = head.angle_deg
@@ -50,17 +55,12 @@ def overdrive(s: Dut) -> Capture:
         head.turn(rest_deg)
         s.run_for(0.4)
     take.lines = looked.lines
-    s.reset()
-    s.run_for(START_S)
+    _started(s)
     return s.capture("overdrive", take)
 
 
-@stimulus("power_cycle", boards=("pik",))
-def power_cycle(s: Dut) -> Capture:
+@recorded("power_cycle", boards=("pik",), before=_started)
+def power_cycle(s: Dut, take: Take) -> None:
     """Readings, no power for a while, and its first periods afterwards."""
-    s.reset()
+    s.power_cycle(OFF_S)
     s.run_for(START_S)
-    with s.take() as take:
-        s.power_cycle(OFF_S)
-        s.run_for(START_S)
-    return s.capture("power_cycle", take)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from psabench.boards.pmka.device import Pmka
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Dut
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
 from psabench.conform.requirements import requirements
-from psabench.conform.stimulus.streamed import from_res, readings
-from psabench.conform.verdict import Inconclusive
-from psabench.link.busport import Cycle
+from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
+from psabench.conform.verdict import known
 
 BEAT, ZERO, RESETS = 200, 120, 78  # periods, as the board turns itself (PMKA-CAL-03)
 SHORT = (40, 20, 12)  # a beat of a stimulus where the computer turns it
@@ -24,9 +23,7 @@ def ts_s() -> float:
 
 def unit(s: Dut) -> Pmka:
     """Raises Inconclusive where it is none."""
-    if not isinstance(s.unit, Pmka):
-        raise Inconclusive("no PMKA")
-    return s.unit
+    return known(s.unit if isinstance(s.unit, Pmka) else None, "no PMKA")
 
 
 def turn(s: Dut, beats: int, lengths: tuple[int, int, int]) -> None:
@@ -50,33 +47,33 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, START_S + 6 * ts_s())
 
 
-@stimulus("stream", boards=("pmka",))
-def stream(s: Dut) -> Capture:
+def _started(s: Dut) -> None:
+    """With its first readings after Res."""
+    s.reset()
+    s.run_for(START_S)
+
+
+@recorded("stream", boards=("pmka",), before=_started, streaming=True)
+def stream(s: Dut, take: Take) -> None:
     """A rotation and some more, on the lines and on CAN."""
-    return s.capture("stream", readings(s, START_S, lambda: turn(s, ROTATION + 1, SHORT)))
+    turn(s, ROTATION + 1, SHORT)
 
 
 @stimulus("minute", boards=("pmka",))
 def minute(s: Dut) -> Capture:
     """A minute of readings through many rotations, and the words of the ROM."""
-    take = readings(s, START_S, lambda: turn(s, MINUTE, (BEAT, ZERO, RESETS)), lines=False)
+    _started(s)
+    with s.take(lines=False) as take, while_streaming(s):
+        turn(s, MINUTE, (BEAT, ZERO, RESETS))
     take.facts["rom"] = unit(s).rom_words()
-    s.reset()
-    s.run_for(START_S)
+    _started(s)
     return s.capture("minute", take)
 
 
-@stimulus("strobes", boards=("pmka",))
-def strobes(s: Dut) -> Capture:
+@recorded("strobes", boards=("pmka",), before=_started, streaming=True)
+def strobes(s: Dut, take: Take) -> None:
     """Reads and writes of registers over the bus port, while readings come."""
-    cycles: list[Cycle] = []
-
-    def strobe() -> None:
-        for k in range(40):
-            cycles.append(line(s, f"R {k % 13 if k % 13 != 10 else 6:X} {800 + 100 * (k % 7)}"))
-            cycles.append(line(s, f"W D {k % 8:X}"))
-            s.run_for(0.3 * ts_s())
-
-    take = readings(s, START_S, strobe)
-    take.cycles += cycles
-    return s.capture("strobes", take)
+    for k in range(40):
+        take.cycles.append(line(s, f"R {k % 13 if k % 13 != 10 else 6:X} {800 + 100 * (k % 7)}"))
+        take.cycles.append(line(s, f"W D {k % 8:X}"))
+        s.run_for(0.3 * ts_s())
