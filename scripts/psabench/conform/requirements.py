@@ -145,20 +145,18 @@ def load(index: Path) -> Requirements:
     boards, traits = _boards_and_traits(files)
     profiles = _profiles(index.parent / "profiles", boards)
     retired = set(_texts(data.get("retired", []), f"{where}: retired"))
-    if type(data["version"]) is not int or data["version"] < 1:
-        raise RequirementsError(expected("a number from 1 on", repr(data["version"]), f"{where}: version"))
+    version = data["version"]
+    _demand(type(version) is int and version >= 1, "a number from 1 on", repr(version), f"{where}: version")
     words = _Words(frozenset(grades), frozenset(ways), frozenset(kinds), tuple(boards), traits, profiles)
     groups = _group_heads(files)
     rows: dict[str, Requirement] = {}
     for group in groups:
         for row in _rows(f"{group.name}.yaml", files[group.name], group, words):
-            if row.id in rows:
-                raise RequirementsError(expected("each id once", f"{row.id} twice", f"{group.name}.yaml"))
-            if row.id in retired:
-                raise RequirementsError(expected("a new id", f"{row.id} (retired)", f"{group.name}.yaml"))
+            _demand(row.id not in rows, "each id once", f"{row.id} twice", f"{group.name}.yaml")
+            _demand(row.id not in retired, "a new id", f"{row.id} (retired)", f"{group.name}.yaml")
             rows[row.id] = row
     return Requirements(
-        version=data["version"],
+        version=version,
         grades=MappingProxyType(grades),
         ways=MappingProxyType(ways),
         kinds=MappingProxyType(kinds),
@@ -189,6 +187,12 @@ class _Words:
         return tuple(b for b in self.boards if b in meant - away)
 
 
+def _demand(met: object, what: str, found: object, at: str) -> None:
+    """Raises RequirementsError, with what was expected there and what was found, unless it is met."""
+    if not met:
+        raise RequirementsError(expected(what, found, at))
+
+
 def _read(path: Path) -> Any:
     try:
         return yaml.load(path.read_text(encoding="utf-8"), _Loader)
@@ -204,8 +208,7 @@ def _profiles(folder: Path, boards: Mapping[str, str]) -> dict[str, str]:
     for path in sorted(folder.glob("*.yaml")):
         data = _read(path)
         board = data.get("board", "psa2") if isinstance(data, dict) else ""
-        if board not in boards:
-            raise RequirementsError(expected(", ".join(boards), repr(board), f"profiles/{path.name}: board"))
+        _demand(board in boards, ", ".join(boards), repr(board), f"profiles/{path.name}: board")
         found[path.stem] = board
     return found
 
@@ -228,8 +231,7 @@ def _boards_and_traits(files: Mapping[str, dict[str, Any]]) -> tuple[dict[str, s
         boards |= own
         for trait in _known(data.get("traits", []), TRAITS, f"{name}.yaml: traits"):
             traits[trait] |= own.keys()
-    if not boards:
-        raise RequirementsError(expected("a group file that defines a board", "none", "requirements"))
+    _demand(boards, "a group file that defines a board", "none", "requirements")
     return boards, {trait: frozenset(having) for trait, having in traits.items()}
 
 
@@ -247,8 +249,7 @@ def _rows(file: str, data: dict[str, Any], group: Group, words: _Words) -> Itera
     boards = words.known_boards(
         list(data["boards"]) if isinstance(data["boards"], dict) else data["boards"], f"{file}: boards"
     )
-    if not isinstance(data["rows"], list) or not data["rows"]:
-        raise RequirementsError(expected("a list of requirements", None, f"{file}: rows"))
+    _demand(isinstance(data["rows"], list) and data["rows"], "a list of requirements", None, f"{file}: rows")
     for number, raw in enumerate(data["rows"], start=1):
         key = raw.get("id", f"row {number}") if isinstance(raw, dict) else f"row {number}"
         yield _row(_mapping(raw, ROW_FIELDS, ROW_OPTIONS, f"{file}: {key}"), group, boards, words, file)
@@ -280,8 +281,7 @@ def _row(raw: dict[str, Any], group: Group, boards: tuple[str, ...], words: _Wor
         proved_by=_matching(raw.get("proved_by", []), TEST, f"{at}: proved_by"),
     )
     for wrong, why in _WRONG:
-        if wrong(row):
-            raise RequirementsError(expected(why, None, at))
+        _demand(not wrong(row), why, None, at)
     return row
 
 
@@ -316,22 +316,19 @@ def _mapping(raw: Any, needed: set[str], more: set[str], at: str) -> dict[str, A
 
 
 def _words(raw: Any, at: str) -> dict[str, str]:
-    if not isinstance(raw, dict) or not raw:
-        raise RequirementsError(expected("a mapping of words to their meaning", type(raw).__name__, at))
+    _demand(isinstance(raw, dict) and raw, "a mapping of words to their meaning", type(raw).__name__, at)
     return {_text(k, at): _text(v, f"{at}: {k}") for k, v in raw.items()}
 
 
 def _text(raw: Any, at: str, empty: bool = False) -> str:
-    if not isinstance(raw, str) or not (raw.strip() or empty):
-        raise RequirementsError(expected("a text", repr(raw), at))
+    _demand(isinstance(raw, str) and (raw.strip() or empty), "a text", repr(raw), at)
     return " ".join(raw.split())
 
 
 def _texts(raw: Any, at: str) -> tuple[str, ...]:
     texts = raw if isinstance(raw, list) else [raw]
     found = tuple(_text(t, at) for t in texts)
-    if len(set(found)) != len(found):
-        raise RequirementsError(expected("each item once", "one twice", at))
+    _demand(len(set(found)) == len(found), "each item once", "one twice", at)
     return found
 
 
@@ -353,17 +350,13 @@ def _matching(raw: Any, pattern: re.Pattern[str], at: str) -> tuple[str, ...]:
 
 
 def _observe(raw: Any, ways: frozenset[str], at: str) -> Mapping[str, str]:
-    if not isinstance(raw, dict):
-        raise RequirementsError(expected("a mapping of ways to phrases", type(raw).__name__, at))
+    _demand(isinstance(raw, dict), "a mapping of ways to phrases", type(raw).__name__, at)
     return MappingProxyType({_one(k, ways, at): _text(v, f"{at}: {k}") for k, v in raw.items()})
 
 
 def _limits(raw: Any, at: str) -> Mapping[str, Limit]:
-    if not isinstance(raw, dict):
-        raise RequirementsError(expected("a mapping of names to numbers", type(raw).__name__, at))
+    _demand(isinstance(raw, dict), "a mapping of names to numbers", type(raw).__name__, at)
     for name, value in raw.items():
-        if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequirementsError(expected("a name like int_low_min_us", repr(name), at))
-        if type(value) not in (int, float):
-            raise RequirementsError(expected("a number", repr(value), f"{at}: {name}"))
+        _demand(isinstance(name, str) and NAME.fullmatch(name), "a name like int_low_min_us", repr(name), at)
+        _demand(type(value) in (int, float), "a number", repr(value), f"{at}: {name}")
     return MappingProxyType(dict(raw))
