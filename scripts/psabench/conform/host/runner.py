@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -110,7 +110,7 @@ def perform(play: Play, name: str) -> HostCapture:
 def on_line(play: Play, case: LineCase) -> HostCapture:
     """Samples on a pseudo-terminal of ours."""
     with ExitStack() as stack:
-        port = stack.enter_context(LinePort())
+        port = stack.enter_context(closing(LinePort()))
         host = _host(play, case.name, case.title, {"line": str(port.path), **_form(play.profile)})
         stack.callback(host.kill)
         host.start()

@@ -157,7 +157,7 @@ class ByHand:
 
 
 class Bridge(Protocol):
-    """A bus port: bus_stage.BusBridge."""
+    """A bus port: stimulus_bus.BusBridge."""
 
     def serve(self, control: Control, host: Program | ByHand, for_s: float, cycle_s: float, leap_s: float) -> None: ...
 

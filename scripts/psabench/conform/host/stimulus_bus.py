@@ -10,14 +10,13 @@ import os
 import re
 import select
 import time
-import tty
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import canopen
 
 from psabench.boards.objects import BusObjects
 from psabench.conform.host.stimulus import STUCK_S, ByHand, Program
+from psabench.conform.host.stimulus_line import Pty
 from psabench.errors import ControlError, TimeOut
 from psabench.link.control import Control
 from psabench.places import proto_file
@@ -90,13 +89,11 @@ def refused(asked: Asked) -> str:
     return f"E {asked.code} {asked.op} {'-' if asked.address < 0 else f'{asked.address:02X}h'}"
 
 
-class BusBridge:
-    """The end that the host opens is `path`; it hangs up at `close`."""
+class BusBridge(Pty):
+    """What the host asks for on it is carried out, one line after the other."""
 
     def __init__(self, family: str) -> None:
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        self.path = Path(os.ttyname(self._theirs))
+        super().__init__()
         self.cycles: list[BusCycle] = []
         self.family = family
         self._input = b""
@@ -155,10 +152,3 @@ class BusBridge:
         bank = canopen.import_od(str(proto_file(f"{self.family}.eds")))[BUS_OBJECT]
         assert isinstance(bank, canopen.objectdictionary.ODRecord | canopen.objectdictionary.ODArray)
         return [(sub - 1, bank[sub].name) for sub in sorted(bank) if sub]
-
-    def close(self) -> None:
-        """Hang up."""
-        for end in (self._ours, self._theirs):
-            if end >= 0:
-                os.close(end)
-        self._ours = self._theirs = -1

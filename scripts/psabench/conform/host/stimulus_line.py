@@ -9,7 +9,6 @@ import time
 import tty
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 
 from psabench.conform.host.stimulus import STUCK_S, ByHand, Program
 from psabench.errors import TimeOut
@@ -20,17 +19,28 @@ HELD = 1 << 17  # bytes: more than the kernel keeps of what no one reads
 TAIL = bytes([INT]) * HELD
 
 
-class LinePort:
-    """The end that the host opens is `path`; it hangs up when the context ends."""
+class Pty:
+    """A pseudo-terminal. The end that the host opens is `path`; it hangs up at `close`."""
 
     def __init__(self) -> None:
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
-        os.set_blocking(self._ours, False)
         self.path = Path(os.ttyname(self._theirs))
+
+    def close(self) -> None:
+        """Hang up."""
+        for end in (self._ours, self._theirs):
+            if end >= 0:
+                os.close(end)
+        self._ours = self._theirs = -1
+
+
+class LinePort(Pty):
+    """What is played on it a host reads as samples of the lines."""
 
     def play(self, blocks: Iterable[bytes], host: Program | ByHand) -> None:
         """Raises TimeOut when the host does not read at all; one that reads no more is ended."""
+        os.set_blocking(self._ours, False)
         written = 0
         for block in itertools.chain(blocks, [TAIL]):
             left = memoryview(block)
@@ -49,16 +59,3 @@ class LinePort:
             if host.gone() or time.monotonic() > deadline_s:
                 return False
         return True
-
-    def __enter__(self) -> LinePort:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, e: BaseException | None, tb: TracebackType | None) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Hang up."""
-        for end in (self._ours, self._theirs):
-            if end >= 0:
-                os.close(end)
-        self._ours = self._theirs = -1
