@@ -19,7 +19,7 @@ from psabench.bench import Bench
 from psabench.boards.devices import of_board
 from psabench.boards.registry import BOARDS
 from psabench.boards.unit import Unit
-from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, Marks, apart
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, apart
 from psabench.conform.probes import LineProbe, PinProbe, PortProbe
 from psabench.conform.profile import Variant
 from psabench.errors import BadInput, LinkError, expected
@@ -183,7 +183,7 @@ class Dut:
             can=CanLog(frames=tuple(take.frames)),
             lines=take.lines,
             cycles=tuple(take.cycles),
-            marks=Marks(at_s=dict(take.marks)),
+            marks=dict(take.marks),
             facts=dict(take.facts),
             inputs_v=self.inputs_v,
             clock_ppm=self.allowed_ppm,

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog, Marks
+from psabench.conform.capture.log import CanFrame, CanLog, Capture, LineLog
 from psabench.conform.plan import Plan, plan_of
 from psabench.conform.profile import Variant
 from psabench.conform.proves import SuiteTest
@@ -236,7 +236,7 @@ def boot(e: Capture, needs: frozenset[str]) -> Capture:
     if not boots:
         return e
     asked = [f.t_s for f in e.can.frames[: boots[-1]] if f.can_id == 0 and f.data[:1] and f.data[0] in NMT_RESETS]
-    return replace(e, marks=Marks(at_s={"reset": asked[-1] if asked else e.can.frames[boots[-1]].t_s}))
+    return replace(e, marks={"reset": asked[-1] if asked else e.can.frames[boots[-1]].t_s})
 
 
 def _reset_amid_readings(e: Capture) -> None:

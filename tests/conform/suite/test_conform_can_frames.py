@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from psabench.conform.capture.canbits import frame_bits
-from psabench.conform.capture.log import CanFrame, CanLog, Capture, Marks
+from psabench.conform.capture.log import CanFrame, CanLog, Capture
 from psabench.conform.check import can_frames as c
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Failed, Inconclusive
@@ -60,7 +60,7 @@ def capture(frames: list[CanFrame], stimulus: str = "services", **facts: object)
         node=NODE,
         stimulus=stimulus,
         can=CanLog(frames=tuple(frames)),
-        marks=Marks(at_s={"flood": 4.0} if stimulus == "overload" else {"reset": 0.0}),
+        marks={"flood": 4.0} if stimulus == "overload" else {"reset": 0.0},
         facts=facts,
     )
 

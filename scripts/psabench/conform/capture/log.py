@@ -173,19 +173,6 @@ def _part(w: Wire, begin_ns: int, end_ns: int) -> Wire:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Marks:
-    """Instants of a stimulus by name, s in the time of its CAN log: when a reset was asked for, a write answered."""
-
-    at_s: Mapping[str, float] = field(default_factory=dict)
-
-    def __getitem__(self, name: str) -> float:
-        return self.at_s[name]
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.at_s
-
-
-@dataclass(frozen=True, kw_only=True)
 class Capture:
     """All of one stimulus or recording. lines: None where no probe was there."""
 
@@ -195,7 +182,7 @@ class Capture:
     can: CanLog = field(default_factory=CanLog)
     lines: LineLog | None = None
     cycles: tuple[Cycle, ...] = ()
-    marks: Marks = field(default_factory=Marks)
+    marks: Mapping[str, float] = field(default_factory=dict)  # instants by name, s in the time of the CAN log: a reset
     facts: Mapping[str, object] = field(default_factory=dict)  # what the stimulus asked for: objects read, rejections
     inputs_v: Mapping[str, float] = field(default_factory=dict)  # volts at the inputs by axis, where they are known
     clock_ppm: float = 100.0  # how far the board's clock and the recording's may lie apart
