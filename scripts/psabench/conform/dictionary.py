@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Container
+from typing import Any
 
 from psabench.boards.objects import Area, BusObjects, Common
 from psabench.conform.bus_host import refused
@@ -57,14 +58,17 @@ def _default(o: Described) -> bytes | None:
     """Bytes of what it holds after Res; None: the EDS cannot know it."""
     if o.access == "ro" or o.default is None or o.data_bytes is None:
         return None
-    return _encoded(o, o.default)
+    return encoded(o, o.default)
 
 
-def _encoded(o: Described, value: float) -> bytes:
-    assert o.data_bytes is not None
+def encoded(o: Described, value: Any) -> bytes:
+    """A value of this object as its bytes."""
+    if isinstance(value, str):
+        return value.encode()
+    size = o.data_bytes or 0
     if o.real:
-        return struct.pack(REAL_FORMATS[o.data_bytes], value)
-    return (int(value) & (1 << 8 * o.data_bytes) - 1).to_bytes(o.data_bytes, "little")
+        return struct.pack(REAL_FORMATS[size], value)
+    return (int(value) & (1 << 8 * size) - 1).to_bytes(size, "little")
 
 
 def _beyond(o: Described) -> bytes | None:
@@ -72,7 +76,7 @@ def _beyond(o: Described) -> bytes | None:
     if o.high is None or o.data_bytes is None:
         return None
     if o.real:
-        return _encoded(o, float(o.high) + max(1.0, abs(float(o.high))))
+        return encoded(o, float(o.high) + max(1.0, abs(float(o.high))))
     signed = o.low is not None and int(o.low) < 0
     most = (1 << 8 * o.data_bytes - signed) - 1
-    return _encoded(o, int(o.high) + 1) if int(o.high) < most else None
+    return encoded(o, int(o.high) + 1) if int(o.high) < most else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from psabench.boards.objects import Common
 from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
+from psabench.conform.dictionary import encoded
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import LEAST, Nmt, Talk, dialogue, read, talk, words
@@ -61,11 +62,7 @@ def the_common_objects_are_there(t: Talk) -> str:
 
 def _due(o: Described) -> bytes | None:
     """Value after a reset; None: the EDS cannot know it (serial number, state of errors)."""
-    if o.access == "ro" or o.default is None:
-        return None
-    if o.data_bytes is None:
-        return str(o.default).encode()
-    return int(o.default).to_bytes(o.data_bytes, "little")
+    return None if o.access == "ro" or o.default is None else encoded(o, o.default)
 
 
 @dialogue("BUS-OD-02")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping
 
 from psabench.boards.objects import Psa2Objects as OD
@@ -12,11 +11,11 @@ from psabench.boards.psa2.conform.check_stream import number, unit_us
 from psabench.boards.psa2.conform.stimulus_objects import Row
 from psabench.conform.capture.intervals import fact
 from psabench.conform.capture.log import Capture
+from psabench.conform.dictionary import encoded
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive, expect
-from psabench.link.canopen_host import Described
 
 
 @check("objects", "PSA2-CAN-09")
@@ -79,16 +78,6 @@ def _mirrored(e: Capture, p: Pairs, k: int, index: int, sub: int) -> float:
     return due[index]
 
 
-def encoded(d: Described) -> bytes:
-    """The default of an object as its bytes."""
-    if isinstance(d.default, str):
-        return d.default.encode()
-    size = d.data_bytes or 0
-    if d.real:
-        return struct.pack("<f" if size == 4 else "<d", d.default)
-    return (int(d.default) & ((1 << 8 * size) - 1)).to_bytes(size, "little")
-
-
 @check("dictionary", "PSA2-CAN-12")
 def objects_have_type_rights_default_and_limits(e: Capture) -> str:
     """Read every object of the EDS, and write what it must reject."""
@@ -101,7 +90,7 @@ def objects_have_type_rights_default_and_limits(e: Capture) -> str:
             continue
         expect(not r.abort, f"{name} read: abort {r.abort:08X}h", "its value")
         expect(d.data_bytes is None or len(r.raw) == d.data_bytes, f"{name} of {len(r.raw)} bytes", f"{d.data_bytes}")
-        if d.access in ("const", "rw") and d.default is not None and r.raw != encoded(d):
+        if d.access in ("const", "rw") and d.default is not None and r.raw != encoded(d, d.default):
             raise Failed(f"{name} {r.raw[::-1].hex().upper()}h", f"{d.default}")
         if r.write is not None and r.write != (READ_ONLY if d.access in ("ro", "const") else beyond):
             due = READ_ONLY if d.access in ("ro", "const") else beyond
