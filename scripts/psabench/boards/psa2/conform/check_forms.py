@@ -21,6 +21,8 @@ from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
 
+PULSED = ("SYNC_A", "DRD_A")
+
 # ---- frame forms
 
 
@@ -237,45 +239,34 @@ def sync_starts_the_filters_anew(e: Capture, row: Requirement) -> str:
 @check("sync", "PSA2-SAMP-04", needs={"pins"})
 def sync_pulses_sync_a(e: Capture, row: Requirement) -> str:
     """SYNC with 2024h = 1: the pulse on SYNC_A, and the fall of DRD_A after it."""
-    up, _down = e.wires.pulses("SYNC_A", 1)
-    if len(up) != 1:
-        raise Failed(
-            f"{len(up)} pulses on SYNC_A",
-            "one, for the SYNC with 2024h = 1",
-            at_ns=int(up[0]) if len(up) else e.wires.end_ns,
-            lines=("SYNC_A", "DRD_A"),
-        )
+    up = _pulses(e, 1, "one, for the SYNC with 2024h = 1")
     falls = e.wires.falls("DRD_A")
     later = falls[falls > up[0]]
     settled_ms = (float(later[0]) - float(up[0])) * 1e-6 if len(later) else np.inf
     slack_ms = e.slack_ns(settled_ms * 1e6) * 1e-6 if len(later) else 0.0
-    if not row.limit("settling_min_ms") - slack_ms <= settled_ms <= row.limit("settling_max_ms") + slack_ms:
-        raise Failed(
-            f"DRD_A falls {settled_ms:.3f} ms after SYNC_A",
-            f"{row.limit('settling_min_ms')} to {row.limit('settling_max_ms')} ms",
-            at_ns=int(up[0]),
-            lines=("SYNC_A", "DRD_A"),
-        )
+    lo, hi = row.limit("settling_min_ms"), row.limit("settling_max_ms")
+    saw, due = f"DRD_A falls {settled_ms:.3f} ms after SYNC_A", f"{lo} to {hi} ms"
+    expect(lo - slack_ms <= settled_ms <= hi + slack_ms, saw, due, at_ns=int(up[0]), lines=PULSED)
     return f"SYNC_A, then DRD_A {settled_ms:.4f} ms later"
+
+
+def _pulses(e: Capture, due: int, words: str) -> Ints:
+    """Rises (n,) of SYNC_A, as many as are due. Raises Failed."""
+    up, _ = e.wires.pulses("SYNC_A", 1)
+    at_ns = int(up[0]) if len(up) else e.wires.end_ns
+    expect(len(up) == due, f"{len(up)} pulses on SYNC_A", words, at_ns=at_ns, lines=PULSED)
+    return up
 
 
 @check("rates", "PSA2-CHIP-04", needs={"pins"})
 def filters_settle_in_their_time_at_each_rate(e: Capture, row: Requirement) -> str:
     """Pulse SYNC_A at each data rate and measure the next fall of DRD_A."""
-    up, _ = e.wires.pulses("SYNC_A", 1)
-    falls = e.wires.falls("DRD_A")
-    if len(up) != 5:
-        raise Failed(
-            f"{len(up)} pulses on SYNC_A",
-            "one at each of five data rates",
-            at_ns=int(up[0]) if len(up) else e.wires.end_ns,
-            lines=("SYNC_A", "DRD_A"),
-        )
+    up, falls = _pulses(e, 5, "one at each of five data rates"), e.wires.falls("DRD_A")
     said = []
     for dr, at in enumerate(up):
         earlier, later = falls[falls < at][-1 - LEAST :], falls[falls > at]
         if len(earlier) <= LEAST or not len(later):
-            raise Failed(f"DRD_A stands still with DR {dr:03b}", "it falls", at_ns=int(at), lines=("SYNC_A", "DRD_A"))
+            raise Failed(f"DRD_A stands still with DR {dr:03b}", "it falls", at_ns=int(at), lines=PULSED)
         period_ns = (
             float(earlier[-1] - earlier[0]) / LEAST
         )  # in the board's own clock: no crystal is off against itself
@@ -284,12 +275,7 @@ def filters_settle_in_their_time_at_each_rate(e: Capture, row: Requirement) -> s
         due_tclk = row.limit("settling_periods") * period_tclk + row.limit("settling_tclk")
         edge_tclk = e.slack_ns(0.0) / period_ns * period_tclk
         slack_tclk = row.limit("tolerance_tclk") + edge_tclk * (1.0 + row.limit("settling_periods") / LEAST)
-        if abs(saw_tclk - due_tclk) > slack_tclk:
-            raise Failed(
-                f"{saw_tclk:.2f} tCLK with DR {dr:03b}",
-                f"{due_tclk:.2f} +- {slack_tclk:.2f} tCLK",
-                at_ns=int(at),
-                lines=("SYNC_A", "DRD_A"),
-            )
+        saw, due = f"{saw_tclk:.2f} tCLK with DR {dr:03b}", f"{due_tclk:.2f} +- {slack_tclk:.2f} tCLK"
+        expect(abs(saw_tclk - due_tclk) <= slack_tclk, saw, due, at_ns=int(at), lines=PULSED)
         said.append(f"{saw_tclk:.1f}")
     return f"{', '.join(said)} tCLK"

@@ -169,10 +169,8 @@ def one_write_reaches_three_converters(e: Capture) -> str:
     conclusive(found, "nothing was written")
     for _, sub, value, answer, read in found:
         saw = [number(a) for a in read]
-        if answer == Answer() and len(set(saw)) != 1:
-            raise Failed(
-                f"register {sub - 1:02X}h is {', '.join(f'{v:02X}h' for v in saw)} on X, Y, Z", f"{value:02X}h on each"
-            )
+        words = f"register {sub - 1:02X}h is {', '.join(f'{v:02X}h' for v in saw)} on X, Y, Z"
+        expect(answer != Answer() or len(set(saw)) == 1, words, f"{value:02X}h on each")
     return f"{len(found)} writes, each the same on three converters"
 
 
@@ -200,13 +198,8 @@ def a_register_read_is_what_the_converter_says(e: Capture) -> str:
         lines = TEMP_LINES if m.temp else (*ACCEL_LINES, "DOutX", "DOutY", "DOutZ")
         raise Failed(f"{m.name} gave {saw}, the SDO {told}", "the same", at_ns=m.begin_ns, lines=lines)
     due = len(ACCEL) * len(REGISTERS) + len(REGISTERS)
-    if seen < due:
-        raise Failed(
-            f"{seen} reads of registers on the ports for {due} SDO uploads",
-            "one for each",
-            at_ns=e.wires.end_ns,
-            lines=ACCEL_LINES,
-        )
+    words = f"{seen} reads of registers on the ports for {due} SDO uploads"
+    expect(seen >= due, words, "one for each", at_ns=e.wires.end_ns, lines=ACCEL_LINES)
     return f"{seen} reads, each told as the converter said"
 
 
@@ -296,13 +289,8 @@ def refused_opcodes_never_reach_a_converter(e: Capture) -> str:
     """Look for them on DIn and DInT."""
     sent = {1: {m.sent for m in port_traffic(e).of(temp=False)}, 2: {m.sent for m in port_traffic(e).of(temp=True)}}
     for _, sub, value, _ in fact(e, "opcodes"):
-        if bytes([value]) in sent[sub]:
-            raise Failed(
-                f"opcode {value:02X}h on {'DIn' if sub == 1 else 'DInT'}",
-                "nothing",
-                at_ns=e.wires.start_ns,
-                lines=ACCEL_LINES,
-            )
+        saw = f"opcode {value:02X}h on {'DIn' if sub == 1 else 'DInT'}"
+        expect(bytes([value]) not in sent[sub], saw, "nothing", at_ns=e.wires.start_ns, lines=ACCEL_LINES)
     return f"none of {len(fact(e, 'opcodes'))} opcodes on DIn or DInT"
 
 
@@ -356,11 +344,9 @@ def opcodes_are_sent_to_their_group(e: Capture) -> str:
     """Look for RESET on DIn and DInT."""
     for code, temp in ((0x06, False), (0xFE, True)):
         n = sum(m.sent == bytes([code]) for m in port_traffic(e).of(temp=temp))
-        if n != 1:
-            line = "DInT" if temp else "DIn"
-            raise Failed(
-                f"{code:02X}h {n} times on {line}", "once", at_ns=e.wires.start_ns, lines=("SClk", line, "CST")
-            )
+        line = "DInT" if temp else "DIn"
+        saw, lines = f"{code:02X}h {n} times on {line}", ("SClk", line, "CST")
+        expect(n == 1, saw, "once", at_ns=e.wires.start_ns, lines=lines)
     return "06h on DIn, FEh on DInT"
 
 

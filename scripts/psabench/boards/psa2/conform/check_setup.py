@@ -112,14 +112,9 @@ def _after(s: SetUp, step: Step, before: Step | None) -> None:
     """A step waits for a fall of its own data-ready line after the step before it. Raises Failed."""
     since_ns = s.res_ns if before is None else before.end_ns
     falls = s.ready(step)
-    if not ((falls > since_ns) & (falls <= step.begin_ns)).any():
-        line = DATA_READY[step.line]
-        raise Failed(
-            f"{step.name} without a fall of {line} before it",
-            f"a fall of {line} after the step before",
-            at_ns=step.begin_ns,
-            lines=ACCEL + TEMP,
-        )
+    awaited, line = (falls > since_ns) & (falls <= step.begin_ns), DATA_READY[step.line]
+    saw, due = f"{step.name} without a fall of {line} before it", f"a fall of {line} after the step before"
+    expect(awaited.any(), saw, due, at_ns=step.begin_ns, lines=ACCEL + TEMP)
 
 
 def _span(e: Capture, row: Requirement, begin_ns: float, end_ns: float, lo: str, hi: str, what: str) -> str:
@@ -267,12 +262,8 @@ def each_step_waits_for_its_event(e: Capture) -> str:
     before: Step | None = None
     for step in s.until_sync_a():
         if before is not None and step.begin_ns <= before.end_ns:
-            raise Failed(
-                f"{step.name} before {before.name} has ended",
-                "one after the other",
-                at_ns=step.begin_ns,
-                lines=ACCEL + TEMP,
-            )
+            saw = f"{step.name} before {before.name} has ended"
+            raise Failed(saw, "one after the other", at_ns=step.begin_ns, lines=ACCEL + TEMP)
         _after(s, step, before)
         before = step
     return f"{len(s.until_sync_a())} steps, each after a fall of its own line and after the step before"
@@ -313,13 +304,9 @@ def the_first_frame_comes_when_the_filters_have_settled(e: Capture, row: Require
     said = _span(e, row, begin_ns, fall_ns, "settling_min_ms", "settling_max_ms", "after SYNC_A")
     frame_ns = first_fall(e.wires.falls("Int"), begin_ns, "Int")
     second = s.drd_a[s.drd_a > fall_ns]
-    if frame_ns < fall_ns or (len(second) and frame_ns > second[0]):
-        raise Failed(
-            f"the first frame {(frame_ns - fall_ns) * 1e-3:.1f} us after that fall",
-            "it follows at once",
-            at_ns=frame_ns,
-            lines=("Int", "DRD_A", "SYNC_A"),
-        )
+    soon = fall_ns <= frame_ns and (not len(second) or frame_ns <= second[0])
+    saw = f"the first frame {(frame_ns - fall_ns) * 1e-3:.1f} us after that fall"
+    expect(soon, saw, "it follows at once", at_ns=frame_ns, lines=("Int", "DRD_A", "SYNC_A"))
     return said
 
 
