@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from psabench.conform.plan import Plan, plan_of
 from psabench.conform.profile import Variant
 from psabench.conform.proves import SuiteTest
 from psabench.conform.requirements import Requirement
-from psabench.conform.runner import MISSING, Keep, wanted
+from psabench.conform.runner import MISSING, Keep, tell_each, wanted
 from psabench.conform.sources import clocks
 from psabench.conform.sources.clocks import BEATS, Clocks, Ratio
 from psabench.conform.sources.files import Recording
@@ -277,22 +278,9 @@ def run(
     keep: Keep = lambda *_: (),
 ) -> list[Outcome]:
     """Check everything; told: of each outcome as it comes."""
-    outcomes: list[Outcome] = []
     tests = wanted(bench.variant, only)
-    with progress.step(bench.variant.name, max(1, len(tests))) as advance:
-        for outcome in _outcomes(bench, tests, only, keep):
-            outcomes.append(outcome)
-            told(outcome)
-            advance()
-    return outcomes
-
-
-def _outcomes(
-    bench: Bench, tests: Sequence[tuple[SuiteTest, tuple[Requirement, ...]]], only: Sequence[str], keep: Keep
-) -> Iterator[Outcome]:
-    yield from _clock_outcome(bench, only)
-    for proof, rows in tests:
-        yield _outcome_of(bench, proof, rows, keep)
+    each = (_outcome_of(bench, proof, rows, keep) for proof, rows in tests)
+    return tell_each(chain(_clock_outcome(bench, only), each), len(tests), bench.variant.name, progress, told)
 
 
 def untested(rows: Sequence[Requirement], outcomes: Sequence[Outcome]) -> list[Outcome]:

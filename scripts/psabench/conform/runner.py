@@ -7,7 +7,7 @@ observable; one whose stimulus fails is inconclusive. Ctrl-C ends the run; what 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from psabench.conform.capture.log import Capture
@@ -109,13 +109,20 @@ def run(
 ) -> list[Outcome]:
     """Check everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
     dut.allowed_ppm = clock_ppm
-    captures = Captures(dut, keep)
+    captures, tests = Captures(dut, keep), wanted(dut.variant, only)
+    each = (_outcome_of(captures, proof, rows) for proof, rows in tests)
+    return tell_each(each, len(tests), dut.variant.name, progress, told)
+
+
+def tell_each(
+    each: Iterable[Outcome], count: int, subject: str, progress: Progress, told: Callable[[Outcome], None]
+) -> list[Outcome]:
+    """All outcomes, each told as it comes."""
     outcomes: list[Outcome] = []
-    tests = wanted(dut.variant, only)
-    with progress.step(dut.variant.name, max(1, len(tests))) as advance:
-        for proof, rows in tests:
-            outcomes.append(_outcome_of(captures, proof, rows))
-            told(outcomes[-1])
+    with progress.step(subject, max(1, count)) as advance:
+        for outcome in each:
+            outcomes.append(outcome)
+            told(outcome)
             advance()
     return outcomes
 
