@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 from psabench.boards.objects import Common
 from psabench.boards.unit import REFUSAL, STROBE_NS
-from psabench.conform.capture.bus_cycles import BUS, LINES, TAIL_S, harmless, quiet, registers, say, strobes, tell
+from psabench.conform.bus_host import port
+from psabench.conform.capture.bus_cycles import (
+    BUS,
+    LINES,
+    TAIL_S,
+    Strobes,
+    harmless,
+    quiet,
+    registers,
+    say,
+    strobes,
+    tell,
+)
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import ABORT, Nmt, Talk, dialogue, read, words, write
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive, expect
 
+T = TypeVar("T")
 DONE, REFUSED = "Bus cycles", "Bus cycles refused"
 LONG_NS, LONGEST_NS = 10_000_000, 100_000_000
 ADDRESSES = 16  # of the bus: AB0..AB3
@@ -23,6 +39,15 @@ def _strobe(t: Talk, length_ns: int) -> None:
 
 def _read(address: int) -> bytes:
     return read(BUS, address + 1)
+
+
+def _shown(t: Talk, address: int, cycle: Callable[[], T]) -> tuple[T, Strobes]:
+    """What comes of a cycle, and the strobes at an address that the lines show meanwhile."""
+    with t.s.take() as take:
+        answer = cycle()
+        t.s.run_for(TAIL_S)
+    assert take.lines is not None
+    return answer, strobes(take.lines).at(address)
 
 
 @dialogue("BUS-CYC-01", needs={"can", "pins"}, reset=True)
@@ -41,18 +66,11 @@ def an_object_is_a_cycle(t: Talk) -> str:
             continue  # a word that does not wait
         found = strobes(take.lines).at(address)
         value = int.from_bytes(answer[4:6], "little")
-        if not any(found.data[k] == value and not found.write[k] for k in range(len(found))):
-            raise Failed(
-                f"{len(found)} strobes at address {address:X}h, none of them a read of {value:04X}h",
-                "a strobe with address and word",
-                lines=LINES,
-            )
+        shown = any(found.data[k] == value and not found.write[k] for k in range(len(found)))
+        saw = f"{len(found)} strobes at address {address:X}h, none of them a read of {value:04X}h"
+        expect(shown, saw, "a strobe with address and word", lines=LINES)
         told += 1
-    with t.s.take() as take:
-        t.download(BUS, where + 1, word.to_bytes(2, "little"))
-        t.s.run_for(TAIL_S)
-    assert take.lines is not None
-    found = strobes(take.lines).at(where)
+    _, found = _shown(t, where, lambda: t.download(BUS, where + 1, word.to_bytes(2, "little")))
     if len(found) != 1 or not found.write[0] or found.data[0] != word:
         raise Failed(f"{len(found)} strobes at {where:X}h for a write", "one write with its word", lines=LINES)
     return f"{told} reads and a write, each a strobe with its address and word"
@@ -66,11 +84,7 @@ def a_strobe_is_as_long_as_it_is_set(t: Talk) -> str:
     address = quiet(t.s)
     for length_ns in (0, int(requirements()["BUS-CYC-05"].limit("strobe_min_ns")), 1234, 1_000_000):
         _strobe(t, length_ns)
-        with t.s.take() as take:
-            t.upload(BUS, address + 1)
-            t.s.run_for(TAIL_S)
-        assert take.lines is not None
-        found = strobes(take.lines).at(address)
+        _, found = _shown(t, address, lambda: t.upload(BUS, address + 1))
         due = length_ns or int(t.s.variant["strobe_ns"])
         low = (found.rise_ns - found.fall_ns).tolist()
         if low != [due]:
@@ -97,11 +111,7 @@ def cs_rises_before_the_answer(t: Talk) -> str:
     """A strobe of 1 ms: the rise of CS beside the answer."""
     t.s.wait_ready()
     _strobe(t, 1_000_000)
-    with t.s.take() as take:
-        answer = t.answer_to(_read(quiet(t.s)))
-        t.s.run_for(TAIL_S)
-    assert take.lines is not None
-    found = strobes(take.lines).at(quiet(t.s))
+    answer, found = _shown(t, quiet(t.s), lambda: t.answer_to(_read(quiet(t.s))))
     if len(found) != 1 or answer.t_s * 1e9 < found.rise_ns[0]:
         rise = found.rise_ns.tolist()
         raise Failed(f"CS rises at {rise} ns, the answer ends at {answer.t_s * 1e9:.0f} ns", "CS first", lines=LINES)
@@ -178,7 +188,8 @@ def a_second_cycle_is_refused(t: Talk, row: Requirement) -> str:
     expect(answer.startswith("E busy R"), answer, "E busy")
     t.until(lambda: any(f.can_id == t.sdo_tx for f in t.heard[at:]))
     _strobe(t, 0)
-    found = _while_the_port_is_busy(t, address)
+    _occupy(t, address)
+    found = t.abort_of(_read(address))
     t.s.run_for(1.1 * LONGEST_NS * 1e-9)
     tell(t.s)
     if found != code:
@@ -186,11 +197,10 @@ def a_second_cycle_is_refused(t: Talk, row: Requirement) -> str:
     return f"{answer}; abort {code:08X}h"
 
 
-def _while_the_port_is_busy(t: Talk, address: int) -> int | None:
-    assert t.s.port is not None
-    t.s.port.ask(f"R {address:X} {LONGEST_NS}")
+def _occupy(t: Talk, address: int) -> None:
+    """Let a long cycle of the bus port begin."""
+    port(t.s).ask(f"R {address:X} {LONGEST_NS}")
     t.s.run_for(SOON_S)
-    return t.abort_of(_read(address))
 
 
 @dialogue("BUS-CYC-07", needs={"can", "bus"}, reset=True)
@@ -198,9 +208,7 @@ def a_reset_cuts_a_cycle(t: Talk) -> str:
     """NMT 81h in a strobe of 100 ms of the bus port: the answer, and a cycle after it."""
     t.s.wait_ready()
     address = quiet(t.s)
-    assert t.s.port is not None
-    t.s.port.ask(f"R {address:X} {LONGEST_NS}")
-    t.s.run_for(SOON_S)
+    _occupy(t, address)
     t.reset(Nmt.RESET)
     answer = tell(t.s)
     expect(answer.startswith(f"E off R {address:02X}h"), answer, f"E off R {address:02X}h")
