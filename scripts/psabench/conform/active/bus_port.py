@@ -177,10 +177,8 @@ def times_are_those_of_cs(s: Dut) -> str:
     """A cycle: its time beside the rise of CS."""
     t_ns, found = _strobed(s, STROBE_NS)
     rises = found.rise_ns.tolist()
-    if rises != [t_ns]:
-        raise Failed(
-            f"t={t_ns}, CS rises at {rises} ns", "the rise of CS", at_ns=rises[0] if rises else None, lines=LINES
-        )
+    saw = f"t={t_ns}, CS rises at {rises} ns"
+    expect(rises == [t_ns], saw, "the rise of CS", at_ns=rises[0] if rises else None, lines=LINES)
     return f"t={t_ns}, the rise of CS"
 
 

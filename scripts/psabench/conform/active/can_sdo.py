@@ -155,11 +155,8 @@ def unknown_commands_are_refused(t: Talk, row: Requirement) -> str:
         t.upload(Common.DEVICE_TYPE)  # nothing is under way
         request = bytes([command]) + read(Common.DEVICE_NAME)[1:]
         found = t.abort_of(request)
-        if found != code:
-            raise Failed(
-                f"{'no refusal' if found is None else f'{found:08X}h'} of command {command:02X}h",
-                f"{int(code):08X}h",
-            )
+        saw = f"{'no refusal' if found is None else f'{found:08X}h'} of command {command:02X}h"
+        expect(found == code, saw, f"{int(code):08X}h")
     return f"abort {int(code):08X}h to {', '.join(f'{c:02X}h' for c in commands)}"
 
 

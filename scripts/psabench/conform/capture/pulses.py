@@ -15,7 +15,7 @@ import numpy as np
 from psabench.conform.capture.intervals import edges
 from psabench.conform.capture.log import Capture, apart
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive
+from psabench.conform.verdict import Failed, conclusive, expect
 
 LEAST = re.compile(r"(?P<line>\w+?)(_(?P<level>high|low))?_min_ns")
 LEVELS = {"high": (1,), "low": (0,), None: (0, 1)}
@@ -62,13 +62,9 @@ def all_move(e: Capture, row: Requirement, ending: str = "_edges") -> str:
     due = {name.removesuffix(ending): int(least) for name, least in row.limits.items() if name.endswith(ending)}
     names = {wire: least for name, least in due.items() for wire in lines_of(e, name)}
     for wire, least in names.items():
-        if len(edges(e, wire)) < least:
-            raise Failed(
-                f"{len(edges(e, wire))} edges of {wire}, always {int(e.wires[wire].level[0])}",
-                f"{least} or more",
-                at_ns=e.wires.start_ns,
-                lines=(wire,),
-            )
+        count = len(edges(e, wire))
+        saw = f"{count} edges of {wire}, always {int(e.wires[wire].level[0])}"
+        expect(count >= least, saw, f"{least} or more", at_ns=e.wires.start_ns, lines=(wire,))
     return f"{len(names)} lines with their edges"
 
 

@@ -201,10 +201,8 @@ def emergencies_have_their_form(e: Capture) -> str:
     """Look at length, error register and time of each emergency."""
     told = _told(e)
     for f in told:
-        if bool(f.data[2]) != bool(code_of(f)):
-            raise Failed(
-                f"error register {f.data[2]:02X}h with code {code_of(f):04X}h", "0 with 0000h only", frames=[f]
-            )
+        saw = f"error register {f.data[2]:02X}h with code {code_of(f):04X}h"
+        expect(bool(f.data[2]) == bool(code_of(f)), saw, "0 with 0000h only", frames=[f])
     times = [stamp_s(e, f) for f in told]
     expect(not any(b < a for a, b in itertools.pairwise(times)), f"times {times}", "that they rise", frames=told)
     t_s = [f.t_s - t for f, t in zip(told, times, strict=True)]

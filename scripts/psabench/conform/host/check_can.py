@@ -135,10 +135,9 @@ def the_stream_is_started_after_the_registers_are_known(e: HostCapture) -> str:
     expect(e.bus.starts, "no NMT start", "one, after identity and registers have been read")
     start_s = e.bus.starts[0]
     _all_are_read(e, before_s=start_s)
-    if not any(_answered(e, index, None, start_s) for index in IDENTITY):
-        raise Failed(
-            f"NMT start at {start_s:.6f} s, without an identity read before it", "1000h, 1008h or 1018h read before"
-        )
+    named = any(_answered(e, index, None, start_s) for index in IDENTITY)
+    saw = f"NMT start at {start_s:.6f} s, without an identity read before it"
+    expect(named, saw, "1000h, 1008h or 1018h read before")
     return f"identity and {len(REGISTERS)} registers, then NMT start at {start_s:.3f} s"
 
 
@@ -232,11 +231,9 @@ def a_wrong_bit_does_not_end_it(e: HostCapture) -> str:
     """A bit of four frames is wrong: the samples of the others."""
     hit = 4
     m = e.match
-    if not e.told.samples or len(m.strange) + len(m.missing) + len(m.wrong) > 2 * hit:
-        raise Failed(
-            f"{len(m.missing)} samples not told, {len(m.strange)} that were not sent, of {len(e.bus.samples)}",
-            f"those of the {hit} frames at most",
-        )
+    few = len(m.strange) + len(m.missing) + len(m.wrong) <= 2 * hit
+    saw = f"{len(m.missing)} samples not told, {len(m.strange)} that were not sent, of {len(e.bus.samples)}"
+    expect(e.told.samples and few, saw, f"those of the {hit} frames at most")
     return f"{len(m.pairs)} of {len(e.bus.samples)} samples"
 
 
@@ -298,10 +295,8 @@ def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
     expect(len(e.told.of("restart")) == restarts, f"{len(e.told.of('restart'))} restarts", f"{restarts}")
     e.samples()
     epochs = {p.epoch for _, p in e.match.pairs}
-    if epochs != set(range(restarts + 1)):
-        raise Failed(
-            f"samples of {len(epochs)} of {restarts + 1} lives of the board", "of all: NMT start after each boot-up"
-        )
+    saw = f"samples of {len(epochs)} of {restarts + 1} lives of the board"
+    expect(epochs == set(range(restarts + 1)), saw, "of all: NMT start after each boot-up")
     e.nothing_but("restart", "stale", "torn", "lost")
     return f"{restarts} restarts, samples after each"
 
@@ -332,11 +327,8 @@ def silence_is_told_and_its_end(e: HostCapture) -> str:
     told = [(x.value, x.at) for x in e.told.events if x.name == "stale"]
     if e.may_seem_silent:  # any other silence may have been real
         told = [t for t in told if t[1] == at]
-    if told != [(True, at), (False, at)]:
-        raise Failed(
-            ", ".join(f"stale {v} after {n} samples" for v, n in told) or "nothing",
-            f"stale after {at} samples, and fresh before the next",
-        )
+    saw = ", ".join(f"stale {v} after {n} samples" for v, n in told) or "nothing"
+    expect(told == [(True, at), (False, at)], saw, f"stale after {at} samples, and fresh before the next")
     return f"stale after {at} samples, fresh with the next"
 
 

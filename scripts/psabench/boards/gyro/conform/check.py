@@ -86,11 +86,8 @@ def level_angles_follow_from_the_codes(e: Capture, row: Requirement) -> str:
         beta = np.arcsin(np.clip(g[1], -1, 1))
         gamma = -np.arcsin(np.clip(g[0] / np.cos(beta), -1, 1))
         off = max(abs(np.degrees(beta) - c["BETA"][k]), abs(np.degrees(gamma) - c["GAMMA"][k])) * 1e6
-        if off > row.limit("tolerance_udeg"):
-            raise Failed(
-                f"BETA {c['BETA'][k]:.6f}, GAMMA {c['GAMMA'][k]:.6f} deg",
-                f"{np.degrees(beta):.6f}, {np.degrees(gamma):.6f}",
-            )
+        saw = f"BETA {c['BETA'][k]:.6f}, GAMMA {c['GAMMA'][k]:.6f} deg"
+        expect(off <= row.limit("tolerance_udeg"), saw, f"{np.degrees(beta):.6f}, {np.degrees(gamma):.6f}")
         worst, count = max(worst, off), count + 1
     conclusive(count >= 20, f"{count} readings whose frames of the level unit are known")
     return f"{count} readings, {worst:.2f} udeg off at most"
@@ -221,10 +218,8 @@ def rates_are_limited_and_say_so(e: Capture) -> str:
     expect(top.max() <= most + near, f"{top.max() / 3600:.3f} deg/s", f"{most / 3600:g} deg/s at most")
     at_limit = top > most - near
     conclusive(at_limit.any(), f"{top.max() / 3600:.3f} deg/s at most: nothing was limited")
-    if (at_limit != (c["SATURATED"] == 1)).any():
-        raise Failed(
-            f"{int((c['SATURATED'] == 1).sum())} readings with SATURATED", f"{int(at_limit.sum())} at the limit"
-        )
+    saw = f"{int((c['SATURATED'] == 1).sum())} readings with SATURATED"
+    expect(not (at_limit != (c["SATURATED"] == 1)).any(), saw, f"{int(at_limit.sum())} at the limit")
     return f"{int(at_limit.sum())} readings at {most / 3600:g} deg/s, as many with SATURATED"
 
 
@@ -254,10 +249,8 @@ def missing_frames_are_told(e: Capture, row: Requirement) -> str:
     code = int(row.limit("emcy_code"))
     found = emergencies(e, EMCY)
     begun, ended = [t for k, t in found if k == code], [t for k, t in found if k == 0]
-    if not lost.any() or lost.all() or not begun or not ended:
-        raise Failed(
-            f"LEVEL_LOST in {int(lost.sum())} readings, {[f'{k:04X}h' for k, _ in found]}", f"{code:04X}h, then 0000h"
-        )
+    saw = f"LEVEL_LOST in {int(lost.sum())} readings, {[f'{k:04X}h' for k, _ in found]}"
+    expect(lost.any() and not lost.all() and begun and ended, saw, f"{code:04X}h, then 0000h")
     steps = c["STEP"][lost]
     period_s = row_for(e, "GYRO-CAN-02").limit("period_us") * 1e-6
     due = float(steps[-1] - steps[0]) * period_s + row.limit("ends_s")

@@ -156,9 +156,8 @@ def resets_follow_codes_beyond_uc(e: Capture, row: Requirement) -> str:
         due = np.where(code > uc + tol, 1, np.where(code < -uc - tol, -1, 0))
         sure = free & (np.abs(np.abs(code) - uc) > tol)
         if (k := first_of(sure & (reset != due))) is not None:
-            raise Failed(
-                f"RESET_{name} {int(reset[k])} after a code of {code[k]:.4f} V", f"{int(due[k])}: Uc is {uc:g} V"
-            )
+            saw = f"RESET_{name} {int(reset[k])} after a code of {code[k]:.4f} V"
+            raise Failed(saw, f"{int(due[k])}: Uc is {uc:g} V")
         count += int((reset[sure] != 0).sum())
     conclusive(count >= 10, f"{count} resets were reported")
     return f"{count} resets, each after a code beyond {uc:g} V"
@@ -341,9 +340,8 @@ def each_axis_has_an_integrator(e: Capture) -> str:
     for axis in (1, 2, 3):
         count = (p.serves == axis).sum(axis=1)
         if (k := first_of((count < 1) | (count > 2) | (steady & (count != 1)))) is not None:
-            raise Failed(
-                f"SERVES {p.serves[k].tolist()}, TAU {int(c['TAU'][k])}", "each axis once, twice around a hand-over"
-            )
+            saw = f"SERVES {p.serves[k].tolist()}, TAU {int(c['TAU'][k])}"
+            raise Failed(saw, "each axis once, twice around a hand-over")
         twice += int((count == 2).sum())
     return f"{len(p)} readings, {twice} hand-overs"
 

@@ -50,10 +50,9 @@ def codes_have_the_sign_of_the_volts(e: Capture, row: Requirement) -> str:
     seen = {k: v for k, v in _inputs(e).items() if abs(v) >= least}
     conclusive(seen, f"no input is {least:g} V or more from zero")
     for k, volt_v in seen.items():
-        if np.sign(np.median(p.code[:, k])) != np.sign(volt_v):
-            raise Failed(
-                f"{'XYZ'[k]} {np.median(p.code[:, k]):.0f} at {volt_v:g} V", "the same sign", frames=p.about(0)
-            )
+        code = np.median(p.code[:, k])
+        saw = f"{'XYZ'[k]} {code:.0f} at {volt_v:g} V"
+        expect(np.sign(code) == np.sign(volt_v), saw, "the same sign", frames=p.about(0))
     return f"{len(seen)} axes of the sign of their input"
 
 
@@ -133,10 +132,8 @@ def _step(e: Capture) -> tuple[Pairs, int, Floats]:
     head = np.median(p.code[:50], axis=0)
     swing = tail - head
     row = row_for(e, "PSA2-REG-08")
-    if (np.abs(swing) < row.limit("swing_min_codes")).any():
-        raise Failed(
-            f"codes {head.round()} before, {tail.round()} after", "another gain shows in all codes", frames=p.about(0)
-        )
+    saw, moved = f"codes {head.round()} before, {tail.round()} after", np.abs(swing) >= row.limit("swing_min_codes")
+    expect(moved.all(), saw, "another gain shows in all codes", frames=p.about(0))
     y = (p.code - head) / swing
     moved = np.abs(p.code - head) > row.limit("moved_min_sigma") * np.maximum(p.code[:50].std(axis=0), 1.0)
     first = int(np.argmax(moved.any(axis=1)))

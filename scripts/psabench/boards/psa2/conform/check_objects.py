@@ -57,9 +57,8 @@ def mirrors_show_the_sample(e: Capture, row: Requirement) -> str:
             saw = int(saw / unit_us(e)) & 0xFFFF
         due = [_mirrored(e, p, k, index, sub) for k in range(first, last + 1)]
         if not any(abs(saw - d) <= rounding.get(index, 0.0) for d in due):
-            raise Failed(
-                f"{index:04X}h:{sub} {saw}", f"{due} of SEQ {p.seq[first]} to {p.seq[last]}", frames=p.about(first)
-            )
+            saw = f"{index:04X}h:{sub} {saw}"
+            raise Failed(saw, f"{due} of SEQ {p.seq[first]} to {p.seq[last]}", frames=p.about(first))
     return f"{len(fact(e, 'mirrors'))} objects as in the PDO of their sample"
 
 

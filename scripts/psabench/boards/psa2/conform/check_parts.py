@@ -21,7 +21,8 @@ from psabench.boards.psa2.conform.check_setup import ACCEL, TEMP, port_traffic
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive, expect
+from psabench.conform.verdict import conclusive, expect
+from psabench.link.signals import Floats, Ints
 
 # ---- limits of the parts
 
@@ -36,10 +37,8 @@ def _known(
 ) -> str:
     """Every message is a command of the table, with the bytes that it wants. Raises Failed."""
     for m in found:
-        if any(b.bits % 8 for b in m.bursts):
-            raise Failed(
-                f"{sum(b.bits for b in m.bursts)} clocks of {m.name}", "whole bytes", at_ns=m.begin_ns, lines=lines
-            )
+        saw = f"{sum(b.bits for b in m.bursts)} clocks of {m.name}"
+        expect(not any(b.bits % 8 for b in m.bursts), saw, "whole bytes", at_ns=m.begin_ns, lines=lines)
         code = m.sent[0]
         if code & 0xF0 in register:
             good = len(m.sent) > 2 and code & 0x0F <= last and len(m.sent) == 3 + m.sent[1]
@@ -86,16 +85,17 @@ def _setup_hold(e: Capture, found: Sequence[Burst], line: str, *, falls: bool, d
 
 def _widths(e: Capture, found: Sequence[Burst], lo_ns: float, hi_ns: float) -> None:
     for b in found:
-        high = b.fall_ns - b.rise_ns
-        low = b.rise_ns[1:] - b.fall_ns[:-1]
-        for w in (high, low):
-            if len(w) and (w.min() < lo_ns - e.slack_ns(lo_ns) or w.max() > hi_ns + e.slack_ns(hi_ns)):
-                raise Failed(
-                    f"SClk high or low for {w.min()} to {w.max()} ns",
-                    f"{lo_ns:.0f} to {hi_ns:.0f} ns",
-                    at_ns=int(b.rise_ns[0]),
-                    lines=("SClk",),
-                )
+        for w in (b.fall_ns - b.rise_ns, b.rise_ns[1:] - b.fall_ns[:-1]):
+            if len(w):
+                _within(e, w, lo_ns, hi_ns, "SClk high or low for", b)
+
+
+def _within(e: Capture, took_ns: Ints | Floats, lo_ns: float, hi_ns: float, what: str, begin: Burst) -> None:
+    """Raises Failed for an interval of SClk that is shorter or longer, showing the burst."""
+    shortest, longest = took_ns.min(), took_ns.max()
+    good = shortest >= lo_ns - e.slack_ns(lo_ns) and longest <= hi_ns + e.slack_ns(hi_ns)
+    saw, due = f"{what} {shortest:.0f} to {longest:.0f} ns", f"{lo_ns:.0f} to {hi_ns:.0f} ns"
+    expect(good, saw, due, at_ns=int(begin.rise_ns[0]), lines=("SClk",))
 
 
 @check("registers", "PSA2-CHIP-03", needs={"pins"}, on_recording="all")
@@ -105,13 +105,7 @@ def transfers_keep_the_limits_of_the_accelerometer_converters(e: Capture, row: R
     _widths(e, found, tclk_ns(e, row.limit("width_min_tclk")), tclk_ns(e, row.limit("width_max_tclk")))
     period = np.concatenate([np.diff(b.rise_ns) for b in found]).astype(np.float64)
     lo, hi = tclk_ns(e, row.limit("period_min_tclk")), tclk_ns(e, row.limit("period_max_tclk"))
-    if period.min() < lo - e.slack_ns(lo) or period.max() > hi + e.slack_ns(hi):
-        raise Failed(
-            f"periods of SClk of {period.min():.0f} to {period.max():.0f} ns",
-            f"{lo:.0f} to {hi:.0f} ns",
-            at_ns=int(found[0].rise_ns[0]),
-            lines=("SClk",),
-        )
+    _within(e, period, lo, hi, "periods of SClk of", found[0])
     said = _setup_hold(e, found, "DIn", falls=False, due_ns=row.limit("setup_min_ns"))
     return f"periods of {period.min():.0f} to {period.max():.0f} ns, {said}"
 

@@ -66,10 +66,8 @@ def near(
     conclusive(len(saw_ns), f"nothing was recorded of {what}")
     k = int(np.argmax(np.abs(saw_ns - due_ns)))
     allowed_ns = slack_ns + e.slack_ns(due_ns)
-    if abs(saw_ns[k] - due_ns) > allowed_ns:
-        raise Failed(
-            f"{saw_ns[k]:.1f} ns {what}", f"{due_ns:.1f} +- {allowed_ns:.1f} ns", at_ns=int(at_ns[k]), lines=lines
-        )
+    saw, due = f"{saw_ns[k]:.1f} ns {what}", f"{due_ns:.1f} +- {allowed_ns:.1f} ns"
+    expect(abs(saw_ns[k] - due_ns) <= allowed_ns, saw, due, at_ns=int(at_ns[k]), lines=lines)
     return f"{saw_ns.min():.1f} to {saw_ns.max():.1f} ns {what}"
 
 
@@ -187,12 +185,8 @@ def _changes_at(e: Capture, found: Sequence[Burst], lines: Sequence[str], *, fal
         bad = (since < 0) | (since > delay_ns + e.slack_ns(0.0))
         if bad.any():
             edge = "fall" if falls else "rise"
-            raise Failed(
-                f"{line} changes {since[bad][0]} ns after a {edge} of SClk",
-                f"at a {edge}",
-                at_ns=int(t[bad][0]),
-                lines=("SClk", line, "CST"),
-            )
+            saw = f"{line} changes {since[bad][0]} ns after a {edge} of SClk"
+            raise Failed(saw, f"at a {edge}", at_ns=int(t[bad][0]), lines=("SClk", line, "CST"))
         total += len(t)
     conclusive(total, f"{', '.join(lines)} never change within a burst")
     return f"{total} changes, all at {'falls' if falls else 'rises'} of SClk"
@@ -278,11 +272,8 @@ def clk_is_a_division_of_the_crystal(e: Capture, row: Requirement) -> str:
     crystal_ns = float(np.median(np.diff(falls))) / (row.limit("fclk_hz") * data_ns / NS)
     word = rises[: int(e.variant["word_bits"])]
     ratio = float(word[-1] - word[0]) / (len(word) - 1) / crystal_ns
-    if abs(ratio - round(ratio)) > row.limit("tolerance_ratio"):
-        raise Failed(
-            f"a period of CLK is {ratio:.4f} periods of fCLK", "a whole number", at_ns=int(word[0]), lines=("CLK",)
-        )
-    return f"a period of CLK is {ratio:.4f} periods of fCLK"
+    saw, off = f"a period of CLK is {ratio:.4f} periods of fCLK", abs(ratio - round(ratio))
+    return expect(off <= row.limit("tolerance_ratio"), saw, "a whole number", at_ns=int(word[0]), lines=("CLK",))
 
 
 # ---- reading
@@ -351,9 +342,8 @@ def int_falls_after_the_read(e: Capture, row: Requirement) -> str:
     after = (ints - falls[k]).astype(np.float64)
     bad = (after < lo - e.slack_ns(lo)) | (after > hi + e.slack_ns(hi))
     if bad.any():
-        raise Failed(
-            f"{after[bad][0]:.0f} ns after DRD_A", f"{lo:.0f} to {hi:.0f} ns", at_ns=int(ints[bad][0]), lines=READING
-        )
+        saw = f"{after[bad][0]:.0f} ns after DRD_A"
+        raise Failed(saw, f"{lo:.0f} to {hi:.0f} ns", at_ns=int(ints[bad][0]), lines=READING)
     return f"Int falls {after.min() * 1e-3:.2f} to {after.max() * 1e-3:.2f} us after DRD_A"
 
 

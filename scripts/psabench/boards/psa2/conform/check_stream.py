@@ -64,9 +64,8 @@ def xy_and_zt_alternate(e: Capture) -> str:
     for k, (a, b) in enumerate(itertools.pairwise(found)):
         names = ids[a.can_id], ids[b.can_id]
         if names not in (("PSA2_XY", "PSA2_ZT"), ("PSA2_ZT", "PSA2_XY")):
-            raise Failed(
-                f"{names[0]}, then {names[1]}", "PSA2_XY and PSA2_ZT in turn", frames=found[max(0, k - 2) : k + 3]
-            )
+            saw = f"{names[0]}, then {names[1]}"
+            raise Failed(saw, "PSA2_XY and PSA2_ZT in turn", frames=found[max(0, k - 2) : k + 3])
     return f"{len(found)} frames, PSA2_XY and PSA2_ZT in turn"
 
 

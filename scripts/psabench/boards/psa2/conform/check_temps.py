@@ -167,13 +167,9 @@ def _converted(e: Capture, b: Beside) -> tuple[Ints, Ints]:
 def _is_of_its_channel(b: Beside, new: Ints, told: Ints, converted: Ints) -> str:
     bad = told != converted
     if (k := first_of(bad)) is not None:
-        raise Failed(
-            f"channel {told[k]} told ({int(bad.sum())} of {len(bad)})",
-            f"{converted[k]}, whose input was converted",
-            at_ns=int(b.fall_ns[new[k]]),
-            lines=TEMP,
-            frames=b.samples.about(int(new[k])),
-        )
+        saw = f"channel {told[k]} told ({int(bad.sum())} of {len(bad)})"
+        due, at_ns = f"{converted[k]}, whose input was converted", int(b.fall_ns[new[k]])
+        raise Failed(saw, due, at_ns=at_ns, lines=TEMP, frames=b.samples.about(int(new[k])))
     return f"{len(new)} temperatures, each told as the channel whose input was converted"
 
 

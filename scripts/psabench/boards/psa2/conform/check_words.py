@@ -55,13 +55,8 @@ def beside(e: Capture) -> Beside:
     best = max((aligned(line[:, [k]], code[:, [j]]) for k in range(3) for j in range(3)), key=lambda r: r[1])
     shift, same = best
     if same < LEAST:
-        raise Failed(
-            "no word of the line is a code on CAN",
-            "codes, least significant bit first, word X first",
-            at_ns=int(e.wires.falls("Int")[0]),
-            lines=LINES,
-            frames=p.about(0),
-        )
+        saw, due = "no word of the line is a code on CAN", "codes, least significant bit first, word X first"
+        raise Failed(saw, due, at_ns=int(e.wires.falls("Int")[0]), lines=LINES, frames=p.about(0))
     i = np.arange(len(p)) + shift
     keep = (i >= 0) & (i < len(words))
     conclusive(keep.sum() >= LEAST, "the recording and the log have few samples in common")
@@ -82,9 +77,8 @@ def _same(saw: Ints, due: Ints, p: Pairs, what: str) -> str:
     bad = saw != due
     bad = bad.any(axis=1) if bad.ndim > 1 else bad
     if (k := first_of(bad)) is not None:
-        raise Failed(
-            f"{saw[k]} on the line ({int(bad.sum())} of {len(bad)})", f"{due[k]}, {what} on CAN", frames=p.about(k)
-        )
+        words = f"{saw[k]} on the line ({int(bad.sum())} of {len(bad)})"
+        raise Failed(words, f"{due[k]}, {what} on CAN", frames=p.about(k))
     return f"{len(bad)} frames, {what} as on CAN"
 
 
@@ -213,10 +207,6 @@ def a_frame_has_the_codes_of_the_read_before_it(e: Capture) -> str:
     k = np.searchsorted(ends, t.fall_ns) - 1
     for n, at in enumerate(k):
         if at >= 0 and (words[n, :3] != read[at]).any():
-            raise Failed(
-                f"{words[n, :3]} sent",
-                f"{read[at]}, as read before",
-                at_ns=int(t.fall_ns[n]),
-                lines=("DRD_A", "SClk", "DOutX", *LINES),
-            )
+            saw, due = f"{words[n, :3]} sent", f"{read[at]}, as read before"
+            raise Failed(saw, due, at_ns=int(t.fall_ns[n]), lines=("DRD_A", "SClk", "DOutX", *LINES))
     return f"{int((k >= 0).sum())} frames of the codes that were read before them"

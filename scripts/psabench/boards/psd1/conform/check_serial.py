@@ -157,12 +157,9 @@ def bits_change_after_the_fall_of_sclk(e: Capture, row: Requirement) -> str:
     took, slack_ns = np.array(late), e.slack_ns(row.limit("change_max_ns"))
     bad = (took < row.limit("hold_min_ns") - slack_ns) | (took > row.limit("change_max_ns") + slack_ns)
     if bad.any():
-        raise Failed(
-            f"SDAT moves {took[bad][0]} ns after a fall of SCLK ({int(bad.sum())} of {len(took)})",
-            f"{row.limit('hold_min_ns'):g} to {row.limit('change_max_ns'):g} ns after one",
-            at_ns=words[0].fall,
-            lines=SERIAL,
-        )
+        saw = f"SDAT moves {took[bad][0]} ns after a fall of SCLK ({int(bad.sum())} of {len(took)})"
+        due = f"{row.limit('hold_min_ns'):g} to {row.limit('change_max_ns'):g} ns after one"
+        raise Failed(saw, due, at_ns=words[0].fall, lines=SERIAL)
     return f"{len(took)} changes of SDAT, {took.min()} to {took.max()} ns after a fall of SCLK"
 
 

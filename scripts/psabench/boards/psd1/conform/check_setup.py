@@ -85,17 +85,12 @@ def the_set_up_goes_in_its_order(e: Capture) -> str:
     setup = found[:first_word]
     sent = [f for f in setup if f.line == "TFS"]
     read = [f for f in setup if f.line != "TFS"]
-    if setup[-1].line != "TFS" or len(sent) < 2:
-        raise Failed(
-            f"{setup[-1].line} last, {len(sent)} control words",
-            "two control words or more, one of them last",
-            at_ns=setup[0].fall,
-            lines=SETUP,
-        )
-    if [f.line for f in read] != [*FRAMES] * (COEFFICIENTS // len(FRAMES)):
-        raise Failed(
-            " ".join(f.line for f in read) or "no coefficient read", "X Y Z X Y Z", at_ns=setup[0].fall, lines=SETUP
-        )
+    at = setup[0].fall
+    saw, due = f"{setup[-1].line} last, {len(sent)} control words", "two control words or more, one of them last"
+    expect(setup[-1].line == "TFS" and len(sent) >= 2, saw, due, at_ns=at, lines=SETUP)
+    order = [f.line for f in read]
+    in_turn = order == [*FRAMES] * (COEFFICIENTS // len(FRAMES))
+    expect(in_turn, " ".join(order) or "no coefficient read", "X Y Z X Y Z", at_ns=at, lines=SETUP)
     low = [f for f in read if int(e.wires["A0"].at(f.fall)) != 1]
     if low:
         raise Failed("A0 low while a coefficient is read", "high", at_ns=low[0].fall, lines=SETUP)
@@ -225,13 +220,8 @@ def the_converters_limits_are_kept(e: Capture, row: Requirement) -> str:
                 raise Failed("SDAT not held, or A0 not low", f"held {held:g} ns, A0 low", at_ns=f.fall, lines=WRITE)
             continue
         moved = a0[(a0 > f.fall - row.limit("a0_rfs_min_ns") + e.slack_ns(0.0)) & (a0 < f.rise - e.slack_ns(0.0))]
-        if len(moved):
-            raise Failed(
-                "A0 moves about RFx",
-                f"{row.limit('a0_rfs_min_ns'):g} ns before it, not in it",
-                at_ns=f.fall,
-                lines=SETUP,
-            )
+        due = f"{row.limit('a0_rfs_min_ns'):g} ns before it, not in it"
+        expect(not len(moved), "A0 moves about RFx", due, at_ns=f.fall, lines=SETUP)
         free = round(row.limit("hiz_max_ns") + e.slack_ns(0.0))
         if int(log["SDAT"].at(f.rise + free)):
             raise Failed("SDAT driven after RFx", f"released within {free} ns", at_ns=f.rise, lines=SETUP)
