@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from psabench.conform.capture.log import Capture
-from psabench.conform.dut import Dut
+from psabench.conform.dut import Dut, Take
 from psabench.conform.plan import stimulus
-from psabench.conform.stimulus.streamed import from_res, readings
+from psabench.conform.stimulus.streamed import from_res, recorded
 
 START_S, STREAM_S = 0.06, 1.0
 
@@ -16,7 +16,13 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, START_S)
 
 
-@stimulus("stream", boards=("toy",))
-def stream_for_a_second(s: Dut) -> Capture:
+def _started(s: Dut) -> None:
+    """With its first samples after Res."""
+    s.reset()
+    s.run_for(START_S)
+
+
+@recorded("stream", boards=("toy",), before=_started, streaming=True)
+def stream_for_a_second(s: Dut, take: Take) -> None:
     """A second of samples on CAN and on the lines."""
-    return s.capture("stream", readings(s, START_S, lambda: s.run_for(STREAM_S)))
+    s.run_for(STREAM_S)
