@@ -45,11 +45,6 @@ def _strobe_s(text: str) -> float:
     return int(words[at]) * 1e-9 if len(words) > at else 0.0
 
 
-def code_of(e: DeviceError) -> int:
-    """Its CiA 301 abort code."""
-    return e.abort_code
-
-
 def refused(action: Callable[[], object], code: float, what: str) -> None:
     """An action that must be rejected with this abort code. Raises Failed."""
     due = f"a refusal with {int(code):08X}h"

@@ -120,7 +120,9 @@ class Bench:
             elif self.excused(own, other):
                 found.append(f"the clock of {name} is off by {own}: that of {second} agrees with the board's")
             elif other is not None and other.beyond(limit):
-                found.append(f"the board's clock is off by {_turned(own)} as {name} and {second} both have it")
+                found.append(
+                    f"the board's clock is off by {replace(own, ppm=-own.ppm)} as {name} and {second} both have it"
+                )
             else:
                 found.append(f"the clock of {name} or the board's is off, {own}: no second recorder tells which")
         return "; ".join(found)
@@ -140,10 +142,6 @@ class Bench:
 
 def _usable(r: Ratio | None) -> bool:
     return r is not None and r.usable
-
-
-def _turned(r: Ratio) -> Ratio:
-    return replace(r, ppm=-r.ppm)
 
 
 # ---- a capture by another clock, and parts of it

@@ -71,11 +71,6 @@ def near(
     return f"{saw_ns.min():.1f} to {saw_ns.max():.1f} ns {what}"
 
 
-def _column(found: Sequence[float]) -> tuple[Floats, Ints]:
-    values = np.array(found, np.float64)
-    return values, values.astype(np.int64)
-
-
 # ---- lines
 
 
@@ -230,7 +225,7 @@ def command_bytes_keep_their_gap(e: Capture, row: Requirement) -> str:
     """Measure the time between the bytes of commands to the accelerometer converters."""
     found = [m for m in port_traffic(e).of(temp=False) if len(m.bursts) > 1]
     pairs = [(a, b) for m in found for a, b in zip(m.bursts, m.bursts[1:], strict=False)]
-    gaps, _ = _column([float(b.rise_ns[0] - a.rise_ns[-1]) for a, b in pairs])
+    gaps = np.array([float(b.rise_ns[0] - a.rise_ns[-1]) for a, b in pairs], np.float64)
     at = np.array([b.rise_ns[0] for _, b in pairs], np.int64)
     due_ns = tclk_ns(e, row.limit("gap_min_tclk"))
     return least(e, gaps, at, due_ns, "between bytes of a command", ACCEL)

@@ -25,7 +25,6 @@ from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import conclusive
-from psabench.link.signals import Ints
 
 START = ("CLK_1M25", "INT0", "FL1", "DR", "A0", "RFX")
 US = 1e3
@@ -74,8 +73,9 @@ def a0_rises_with_the_clock(e: Capture, row: Requirement) -> str:
 def a0_rises_with_the_first_clock_that_it_can(e: Capture) -> str:
     """Look whether the rise of 1M25 before that of A0 came too early for all conditions."""
     whole = cycles(e)
-    at_ns, held_ns = starts(e, whole), _held(e)
-    ready = np.max([before(held_ns[k], starts(e, whole)) for k in range(len(held_ns))], axis=0)
+    at_ns = starts(e, whole)
+    held_ns = e.wires.rises("INT0"), e.wires.falls("FL1"), e.wires.falls("DR")  # each condition from here on
+    ready = np.max([before(edge_ns, at_ns) for edge_ns in held_ns], axis=0)
     ready[1:] = np.maximum(ready[1:], np.array([c[2].clear for c in whole], np.int64)[:-1])
     period_ns = row_for(e, "PSD1-CYC-07").limit("period_ns")
     waited = at_ns - ready
@@ -84,11 +84,6 @@ def a0_rises_with_the_first_clock_that_it_can(e: Capture) -> str:
     bad = (waited <= 0) | (waited > period_ns + slack_ns)
     first_bad(bad[1:], at_ns[1:], saw[1:], f"up to {period_ns:g} ns, the next rise of 1M25", START)
     return f"{len(at_ns) - 1} cycles, A0 {waited[1:].min()} to {waited[1:].max()} ns after the last condition"
-
-
-def _held(e: Capture) -> tuple[Ints, Ints, Ints]:
-    """Edges at which each condition became true."""
-    return e.wires.rises("INT0"), e.wires.falls("FL1"), e.wires.falls("DR")
 
 
 @check("stream", "PSD1-CYC-06", needs={"pins"})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.objects import Psd1Objects as OD
-from psabench.conform.bus_host import code_of, line
+from psabench.conform.bus_host import line
 from psabench.conform.dut import Dut
 from psabench.conform.profile import Variant
 from psabench.conform.requirements import requirements
@@ -80,7 +80,7 @@ def word(s: Dut, axis: int, slow_s: float = 0.0) -> Cycle:
         try:
             return line(s, f"R {axis:X}")
         except CycleRefused as e:
-            if code_of(e) != requirements()["PSD1-BUS-03"].limit("abort_code"):
+            if e.abort_code != requirements()["PSD1-BUS-03"].limit("abort_code"):
                 raise
         s.run_for(wait_s)
     raise Failed(f"no word of {'XYZ'[axis]} on the bus within four periods", "a word that waits")
