@@ -1,4 +1,4 @@
-"""What `--set` takes: a line a field of `Setup`, its range, and what it means to a person who has not read the code.
+"""What `--set` takes, in the words of a person who has not read the code: the fields of `Setup` and their ranges.
 
 A value out of its range is rejected by name before anything is computed; what only the algebra sees (positions that
 coincide, a latitude that leaves no horizontal rate) it rejects itself, told with the case.
@@ -7,63 +7,19 @@ coincide, a latitude that leaves no horizontal rate) it rejects itself, told wit
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import fields
 
 from psabench.campaign import chains
 from psabench.campaign.cases import Case
 from psabench.campaign.chains import Wanted
-from psabench.campaign.setup import ANY, CHOICES, Setup, changed
+from psabench.campaign.setup import ANY, CHOICES, Setting, Setup, changed
 from psabench.errors import BadInput, expected
 from psabench.native.navlib import library
 
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A field; `low` and `high` where it is a number, or a list of numbers."""
-
-    unit: str = ""
-    low: float = -math.inf
-    high: float = math.inf
-    about: str = ""
-
-
-SETTINGS: Mapping[str, Setting] = {
-    "latitude_deg": Setting("deg", -90, 90, "latitude of the instrument"),
-    "latitude_error_arcmin": Setting("arcmin", -599, 599, "error of the latitude that the host gets"),
-    "tilt_deg": Setting("deg", 0, 30, "pitch and roll of the parked vehicle"),
-    "tilt": Setting(about="tilt drawn within +-tilt_deg, or at the corners"),
-    "alpha1_deg": Setting("deg", -360, 360, "platform azimuth in position 1"),
-    "gimbal": Setting(about="steps about the vertical (alpha) or of the gimbal angle (uncorrected, corrected)"),
-    "drift_degph": Setting("deg/h", -1e4, 1e4, "mean drift about the measuring axis"),
-    "gm_sigma_degph": Setting("deg/h", 0, 1e4, "random drift, standard deviation of a Gauss-Markov process"),
-    "gm_tau_s": Setting("s", 0.1, 1e9, "correlation time of the random drift"),
-    "gm_from_zero": Setting(about="random drift begins at zero"),
-    "torquer_scale": Setting("", -0.2, 0.2, "relative error of the torquer"),
-    "beta_sys_arcmin": Setting("arcmin", -299, 299, "constant error of the level sensor of beta"),
-    "gamma_sys_arcmin": Setting("arcmin", -299, 299, "constant error of the level sensor of gamma"),
-    "beta_random_arcmin": Setting("arcmin", 0, 600, "random error of the level sensor of beta, new in each position"),
-    "gamma_random_arcmin": Setting("arcmin", 0, 600, "random error of the level sensor of gamma, new in each position"),
-    "angle_sys_arcmin": Setting("arcmin", -600, 600, "constant error of the set angle"),
-    "angle_sys": Setting(about="how the constant angle error acts"),
-    "angle_random_arcmin": Setting("arcmin", 0, 600, "random error of an angle, new in each position"),
-    "encoder": Setting(about="read the encoder (on an emulated board; the algebra is the same)"),
-    "random_sign": Setting(about="draw the sign of constant errors for each run"),
-    "per_sample": Setting(about="draw random errors every 10 ms, so that they average"),
-    "white_degph_rts": Setting("deg/h sqrt(s)", 0, 1e4, "white noise of the levelling rate"),
-    "angles_deg": Setting("deg", -36000, 36000, "positions in order, 3 to 64"),
-    "window_s": Setting("s", 0.01, 86400, "measuring time in a position"),
-    "gap_s": Setting("s", 0, 86400, "time between windows if slew_dps is 0"),
-    "slew_dps": Setting("deg/s", 0, 1000, "rate of the turns; 0: use gap_s"),
-    "slew_dps2": Setting("deg/s2", 0, 1000, "acceleration of the turns; 0: infinite"),
-    "m1_per_s": Setting("1/s", 0.01, 20, "gain of the levelling loop"),
-    "m2_per_s": Setting("1/s", 0, 20, "gain of the azimuth loop (error drift/m2); 0: ideal (algebra only)"),
-    "gm_before_s": Setting("s", 0, 1e6, "time from power-on to the first window, for gm_from_zero"),
-    "settle_s": Setting("s", 0, 86400, "time from a turn to its window, with slew_dps"),
-    "method": Setting(about="estimator"),
-    "simplified": Setting(about="eq. (14) instead of (13)"),
-}
+_FOUND = {f.name: f.metadata["setting"] for f in fields(Setup) if f.metadata}
+_LAST = ("gm_before_s", "settle_s", "method", "simplified")  # as --list has them: times of waiting after the loops
+SETTINGS: Mapping[str, Setting] = {n: _FOUND[n] for n in (*(n for n in _FOUND if n not in _LAST), *_LAST)}
 
 
 def base(words: Sequence[str], start: Setup | None = None) -> Setup:
@@ -81,7 +37,7 @@ def base(words: Sequence[str], start: Setup | None = None) -> Setup:
 
 def out_of_range(setup: Setup, name: str) -> str:
     """Why the field's value is rejected, "": it is not."""
-    s, value = SETTINGS.get(name, Setting()), getattr(setup, name)
+    s, value = SETTINGS.get(name, Setting("")), getattr(setup, name)
     if value is None or isinstance(value, str | bool):
         return ""
     if name == "angles_deg" and not 3 <= len(value) <= 64:

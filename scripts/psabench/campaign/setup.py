@@ -10,7 +10,7 @@ import math
 import types
 import typing
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from psabench.errors import BadInput, expected
@@ -38,44 +38,64 @@ def level_white_degph_rts(window_s: float, m1_per_s: float = 1.0) -> float:
     return 60.0 * LEVEL_NOISE_ARCMIN_RTS * math.sqrt(m1_per_s / window_s)
 
 
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What `--set` takes for a field: a number, or a list of numbers, from low to high."""
+
+    about: str
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def _setting(default: Any, about: str, *number: Any) -> Any:
+    """A field that `--set` takes; number: its unit and range."""
+    return field(default=default, metadata={"setting": Setting(about, *number)})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """A virtual instrument, where it is, and what is done with it."""
 
-    latitude_deg: float = 50.0  # the article names none; E0
-    latitude_error_arcmin: float = 0.1
-    tilt_deg: float = 5.0  # pitch and roll of the parked vehicle
-    tilt: str = "uniform"  # within, or at the corners of, +-tilt_deg
-    alpha1_deg: float | None = None  # of the platform in position 1; none: anywhere
-    gimbal: str = "alpha"  # turns are about the vertical, as the article reads; or of the gimbal, corrected or not
-    drift_degph: float = 25.0
-    gm_sigma_degph: float = 0.2
-    gm_tau_s: float = 1000.0
-    gm_from_zero: bool = False
-    gm_before_s: float = 0.0  # with it: zero so long before the first window, at power-on
-    torquer_scale: float = 0.0  # relative error
-    beta_sys_arcmin: float = 10.0  # of the level sensors, all positions alike
-    gamma_sys_arcmin: float = 10.0
-    beta_random_arcmin: float = 1.0
-    gamma_random_arcmin: float = 1.0
-    angle_sys_arcmin: float = 6.0  # of the set angle
-    angle_sys: str = "common"  # how those 6' are read
-    angle_random_arcmin: float = 3.0  # of the set angle, or of the encoder's reading
-    # Through the wire: the encoder is read instead of the set angle trusted; the algebra is the same.
-    encoder: bool = False
-    random_sign: bool = False  # of systematic errors
-    per_sample: bool = False  # random errors are drawn a sample and average, instead of once a position
-    white_degph_rts: float = 0.0  # white noise of S besides, deg/h sqrt(s)
-    angles_deg: tuple[float, ...] = (0.0, 90.0, 180.0)
-    window_s: float = 10.0
-    gap_s: float = 10.0  # between windows, with slew_dps 0
-    slew_dps: float = 0.0
-    slew_dps2: float = 0.0  # acceleration of a turn that reaches its rate; 0: at once
-    settle_s: float = 0.0
-    m1_per_s: float = 1.0  # levelling loop
-    m2_per_s: float = 0.0  # azimuth loop, proportional: it is off by drift/m2; 0: an ideal one (algebra only)
-    method: str = "closed3"
-    simplified: bool = True  # (14) for (13)
+    latitude_deg: float = _setting(50.0, "latitude of the instrument", "deg", -90, 90)  # the article names none; E0
+    latitude_error_arcmin: float = _setting(0.1, "error of the latitude that the host gets", "arcmin", -599, 599)
+    tilt_deg: float = _setting(5.0, "pitch and roll of the parked vehicle", "deg", 0, 30)
+    tilt: str = _setting("uniform", "tilt drawn within +-tilt_deg, or at the corners")
+    alpha1_deg: float | None = _setting(None, "platform azimuth in position 1", "deg", -360, 360)  # None: anywhere
+    # alpha: as the article reads.
+    gimbal: str = _setting("alpha", "steps about the vertical (alpha) or of the gimbal angle (uncorrected, corrected)")
+    drift_degph: float = _setting(25.0, "mean drift about the measuring axis", "deg/h", -1e4, 1e4)
+    gm_sigma_degph: float = _setting(0.2, "random drift, standard deviation of a Gauss-Markov process", "deg/h", 0, 1e4)
+    gm_tau_s: float = _setting(1000.0, "correlation time of the random drift", "s", 0.1, 1e9)
+    gm_from_zero: bool = _setting(False, "random drift begins at zero")
+    gm_before_s: float = _setting(0.0, "time from power-on to the first window, for gm_from_zero", "s", 0, 1e6)
+    torquer_scale: float = _setting(0.0, "relative error of the torquer", "", -0.2, 0.2)
+    beta_sys_arcmin: float = _setting(10.0, "constant error of the level sensor of beta", "arcmin", -299, 299)
+    gamma_sys_arcmin: float = _setting(10.0, "constant error of the level sensor of gamma", "arcmin", -299, 299)
+    beta_random_arcmin: float = _setting(
+        1.0, "random error of the level sensor of beta, new in each position", "arcmin", 0, 600
+    )
+    gamma_random_arcmin: float = _setting(
+        1.0, "random error of the level sensor of gamma, new in each position", "arcmin", 0, 600
+    )
+    angle_sys_arcmin: float = _setting(6.0, "constant error of the set angle", "arcmin", -600, 600)
+    angle_sys: str = _setting("common", "how the constant angle error acts")  # how the article's 6' are read
+    # Of the set angle, or of the encoder's reading.
+    angle_random_arcmin: float = _setting(3.0, "random error of an angle, new in each position", "arcmin", 0, 600)
+    encoder: bool = _setting(False, "read the encoder (on an emulated board; the algebra is the same)")
+    random_sign: bool = _setting(False, "draw the sign of constant errors for each run")
+    per_sample: bool = _setting(False, "draw random errors every 10 ms, so that they average")
+    white_degph_rts: float = _setting(0.0, "white noise of the levelling rate", "deg/h sqrt(s)", 0, 1e4)
+    angles_deg: tuple[float, ...] = _setting((0.0, 90.0, 180.0), "positions in order, 3 to 64", "deg", -36000, 36000)
+    window_s: float = _setting(10.0, "measuring time in a position", "s", 0.01, 86400)
+    gap_s: float = _setting(10.0, "time between windows if slew_dps is 0", "s", 0, 86400)
+    slew_dps: float = _setting(0.0, "rate of the turns; 0: use gap_s", "deg/s", 0, 1000)
+    slew_dps2: float = _setting(0.0, "acceleration of the turns; 0: infinite", "deg/s2", 0, 1000)
+    settle_s: float = _setting(0.0, "time from a turn to its window, with slew_dps", "s", 0, 86400)
+    m1_per_s: float = _setting(1.0, "gain of the levelling loop", "1/s", 0.01, 20)
+    m2_per_s: float = _setting(0.0, "gain of the azimuth loop (error drift/m2); 0: ideal (algebra only)", "1/s", 0, 20)
+    method: str = _setting("closed3", "estimator")
+    simplified: bool = _setting(True, "eq. (14) instead of (13)")
     scenario: str = ""  # of an emulator's bench, resolved, as JSON; "": the shipped one
 
     def __post_init__(self) -> None:
