@@ -184,7 +184,7 @@ def gyrocompass(
     ramp: bool = False,
     noise: Noise = _NO_NOISE,
 ) -> Compass:
-    """Alpha at position 1 and the drift about the measuring axis, (12)-(19) corrected. Raises Rejected."""
+    """Alpha at position 1 and the drift about the measuring axis, (12)-(19) corrected. Raises Refused."""
     rows = _rows(positions)
     fit = FitStruct(latitude_rad, int(method), int(simplified), int(ramp), _noise(noise))
     out = CompassStruct()
@@ -198,7 +198,7 @@ def gyrocompass(
 
 
 def gyrocompass_printed(positions: Sequence[Position], latitude_rad: float) -> tuple[float, float]:
-    """(alpha, drift) by (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Raises Rejected."""
+    """(alpha, drift) by (18), (19) and S1 + S3 as printed: wrong, for negative tests only. Raises Refused."""
     alpha_rad, drift_radps = c.c_double(), c.c_double()
     if len(positions) != 3:
         raise Refused("gyrocompass_printed", Status.TOO_FEW)
@@ -210,7 +210,7 @@ def gyrocompass_printed(positions: Sequence[Position], latitude_rad: float) -> t
 def attitude_from_level(
     q_rad: npt.ArrayLike, gamma_rad: npt.ArrayLike, beta_rad: npt.ArrayLike | None = None, *, bias: bool = False
 ) -> Attitude:
-    """Pitch and roll from gamma at several gimbal angles; bias: gamma's constant error as well. Raises Rejected."""
+    """Pitch and roll from gamma at several gimbal angles; bias: gamma's constant error as well. Raises Refused."""
     q, gamma = _same_length(q_rad, gamma_rad)
     beta = None if beta_rad is None else _same_length(q_rad, beta_rad)[1]
     out = AttitudeStruct()
@@ -234,7 +234,7 @@ def gamma(
 
 
 def cardan(q_rad: npt.ArrayLike, *, pitch_rad: float, roll_rad: float, beta_rad: npt.ArrayLike | None = None) -> Floats:
-    """Increments of alpha since the first gimbal angle, exactly. Raises Rejected."""
+    """Increments of alpha since the first gimbal angle, exactly. Raises Refused."""
     q = _array(q_rad)
     beta = None if beta_rad is None else _same_length(q_rad, beta_rad)[1]
     out = np.empty_like(q)
@@ -250,7 +250,7 @@ def heading(
 
 
 def window_slope(beta_n_rad: npt.ArrayLike, s_radps: npt.ArrayLike, dt_s: float) -> float:
-    """S [rad/s] of a window: negative slope of beta_n less the integral of the levelling command. Raises Rejected."""
+    """S [rad/s] of a window: negative slope of beta_n less the integral of the levelling command. Raises Refused."""
     beta, s = _same_length(beta_n_rad, s_radps)
     out = c.c_double()
     _check("window_slope", library().window_slope(_ptr(beta), _ptr(s), len(beta), dt_s, c.byref(out)))

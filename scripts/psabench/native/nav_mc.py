@@ -150,7 +150,7 @@ class HoldErrors:
 def closed(
     cfg: McConfig, seed: int, *, runs: int, first_run: int = 0, threads: int = 1, into: Errors | None = None
 ) -> Errors:
-    """Errors of first order in jointly Gaussian window means: tens of millions a second. Raises Rejected.
+    """Errors of first order in jointly Gaussian window means: tens of millions a second. Raises Refused.
 
     `into`: earlier results of as many runs whose arrays are written again; fresh memory takes as long as the runs."""
     out = _arrays(runs) if into is None else {name: getattr(into, name) for name, *_ in McOutStruct._fields_}
@@ -160,7 +160,7 @@ def closed(
 
 
 def samples(cfg: McConfig, seed: int, *, runs: int, first_run: int = 0, threads: int = 1) -> Errors:
-    """Drift and noise sample by sample, the estimator itself at the end of each run. Raises Rejected."""
+    """Drift and noise sample by sample, the estimator itself at the end of each run. Raises Refused."""
     out = _arrays(runs)
     struct = _checked(cfg, Model.SAMPLES)
     _ranges(library().mc_samples, struct, McOutStruct, out, (seed, first_run, runs), threads)
@@ -168,7 +168,7 @@ def samples(cfg: McConfig, seed: int, *, runs: int, first_run: int = 0, threads:
 
 
 def hold(cfg: HoldConfig, seed: int, *, runs: int, first_run: int = 0, threads: int = 1) -> HoldErrors:
-    """Heading held for hours after a gyrocompassing. Raises Rejected."""
+    """Heading held for hours after a gyrocompassing. Raises Refused."""
     out = {name: np.empty(runs) for name, *_ in McHoldOutStruct._fields_}
     struct = hold_struct(cfg)
     why = RefusalStruct()
