@@ -17,7 +17,7 @@ import os
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut, expected
 from psabench.estimate.face import Face
@@ -29,6 +29,7 @@ REPLY_S = 10.0  # timeout for an answer, real time
 CONNECT_S = 5.0
 REST_LIMIT_S = 3600.0  # timeout for it, bench time
 
+Value = TypeVar("Value")
 Wait = Callable[[float], None]
 
 
@@ -75,7 +76,8 @@ class Instrument:
         except ValueError as e:
             raise LinkError(expected("numbers", repr(answer), f"{self.name}: {command}")) from e
 
-    def _number(self, command: str) -> float:
+    def number(self, command: str) -> float:
+        """The answer to a query as a number, the first of several."""
         return self.numbers(command)[0]
 
     def _until(self, done: Callable[[], bool], what: str, limit_s: float) -> None:
@@ -113,8 +115,21 @@ class Instrument:
         raise InstrumentError(self.name, command, int(number), text.strip().strip('"'))
 
 
+class _Shown(Generic[Value]):
+    """An attribute that asks the instrument each time: a query, and what its number is here."""
+
+    def __init__(self, query: str, value: Callable[[float], Value]) -> None:
+        self._query, self._value = query, value
+
+    def __get__(self, instrument: Instrument, _: type[Instrument] | None = None) -> Value:
+        return self._value(instrument.number(self._query))
+
+
 class Head(Instrument):
     """A dividing head: sets an angle about its axis and takes the sensor's mount with one of four faces."""
+
+    angle_deg = _Shown("ANGL?", float)  # by the scale, deg
+    at_rest = _Shown("REST?", bool)
 
     def turn(self, angle_deg: float) -> float:
         """Turn to angle_deg; returns what the scale shows when it stands still, deg."""
@@ -131,17 +146,8 @@ class Head(Instrument):
         return self.angle_deg
 
     @property
-    def angle_deg(self) -> float:
-        """What the scale shows, deg."""
-        return self._number("ANGL?")
-
-    @property
     def face(self) -> Face:
         return Face(self.query("FACE?").lower())
-
-    @property
-    def at_rest(self) -> bool:
-        return self._number("REST?") != 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,20 +202,24 @@ class Table(Instrument):
         return AxisState(angle_deg=float(angle), rate_dps=float(rate), mode=mode.lower(), at_rest=float(rest) != 0.0)
 
     def angle_deg(self, *, axis: int = 1) -> float:
-        return self._number(f"AXIS{axis}:POS?")
+        return self.number(f"AXIS{axis}:POS?")
 
     def rate_dps(self, *, axis: int = 1) -> float:
-        return self._number(f"AXIS{axis}:RATE?")
+        return self.number(f"AXIS{axis}:RATE?")
 
     def wait_rest(self, *, axis: int = 1, limit_s: float = REST_LIMIT_S) -> None:
         """Let time pass until the axis stands still. Raises TimeOut after limit_s of bench time."""
-        self._until(lambda: self._number(f"AXIS{axis}:REST?") != 0.0, f"rest of axis {axis}", limit_s)
+        self._until(lambda: self.number(f"AXIS{axis}:REST?") != 0.0, f"rest of axis {axis}", limit_s)
 
 
 class Chamber(Instrument):
     """A thermal chamber: air at a temperature, changed at a ramp."""
 
     poll_s = 1.0
+    temp_degc = _Shown("TEMP?", float)  # of the air, by the chamber's own sensor
+    setpoint_degc = _Shown("TEMP:SETP?", float)
+    ramp_k_per_min = _Shown("RAMP?", float)
+    stable = _Shown("STAB?", bool)
 
     def set(self, temp_degc: float, *, wait: bool = False, limit_s: float = 24 * 3600.0) -> None:
         """New set-point; with wait, returns when the chamber calls its air stable there."""
@@ -221,23 +231,6 @@ class Chamber(Instrument):
         """How fast the air's set-point moves from now on, K/min."""
         self.write(f"RAMP {ramp_k_per_min!r}")
 
-    @property
-    def temp_degc(self) -> float:
-        """Of the air, as the chamber's own sensor shows it."""
-        return self._number("TEMP?")
-
-    @property
-    def setpoint_degc(self) -> float:
-        return self._number("TEMP:SETP?")
-
-    @property
-    def ramp_k_per_min(self) -> float:
-        return self._number("RAMP?")
-
-    @property
-    def stable(self) -> bool:
-        return self._number("STAB?") != 0.0
-
     def wait_stable(self, *, limit_s: float = 24 * 3600.0) -> None:
         """Let time pass until the air is stable. Raises TimeOut after limit_s of bench time."""
         self._until(lambda: self.stable, "a stable temperature", limit_s)
@@ -245,6 +238,10 @@ class Chamber(Instrument):
 
 class Supply(Instrument):
     """A power supply with one output."""
+
+    volt_v = _Shown("VOLT?", float)  # what it is set to
+    measured_v = _Shown("MEAS:VOLT?", float)  # what is at the terminals now
+    is_on = _Shown("OUTP?", bool)
 
     def set(self, volt_v: float) -> None:
         """New voltage."""
@@ -256,20 +253,6 @@ class Supply(Instrument):
     def ripple(self, amplitude_v: float, frequency_hz: float) -> None:
         """Sine on top of the voltage; amplitude 0: none."""
         self.write(f"RIPP {amplitude_v!r},{frequency_hz!r}")
-
-    @property
-    def volt_v(self) -> float:
-        """What it is set to."""
-        return self._number("VOLT?")
-
-    @property
-    def measured_v(self) -> float:
-        """What is at the terminals now."""
-        return self._number("MEAS:VOLT?")
-
-    @property
-    def is_on(self) -> bool:
-        return self._number("OUTP?") != 0.0
 
 
 KINDS: dict[str, type[Instrument]] = {"head": Head, "table": Table, "chamber": Chamber, "supply": Supply}
