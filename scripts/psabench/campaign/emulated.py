@@ -222,7 +222,7 @@ Platforms = Callable[[Scenario], AbstractContextManager[PlatformBench]]
 
 def recorded() -> Platforms:
     """An emulator a run, in free pace. What the units tell of themselves is asked for once."""
-    plates = Plates()
+    plates: Plates = {}
     return lambda s: nullcontext(RecordedPlatform(s, first_turn_deg=FIRST_TURN_DEG, plates=plates))
 
 

@@ -18,7 +18,7 @@ import resource
 import subprocess
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -37,6 +37,7 @@ SETTLED_S = 0.05  # recorded beyond the last thing that was asked for
 EMULATOR_S = 120.0  # timeout for a process that takes a twentieth of a second
 
 Key = tuple[int, int, int]  # node, index, sub-index
+Plates = dict[Key, bytes]  # what units answered to reads before a run: the same for all runs with the same units
 Scenario = Mapping[str, Any]
 
 
@@ -47,13 +48,6 @@ class _Request:
     key: Key
     frame: bytes
     what: str
-
-
-@dataclass(slots=True)
-class Plates:
-    """What units answered to reads before a run: the same for all runs with the same units."""
-
-    known: dict[Key, bytes] = field(default_factory=dict)
 
 
 class ScriptedBench:
@@ -67,7 +61,7 @@ class ScriptedBench:
         self.emulator_s = 0.0  # processor time of the emulators so far
         self._scenario = dict(scenario)
         self._listen_to, self._bus = listen_to, bus
-        self._plates = Plates() if plates is None else plates
+        self._plates = {} if plates is None else plates
         self._frames: list[tuple[float, str]] = []
         self._requests: list[_Request] = []
         self._written: dict[Key, bytes] = {}
@@ -91,9 +85,9 @@ class ScriptedBench:
         """An object as the units have it now: as it was written, or as they answer."""
         if key not in self._written:
             self._transfer(key, bytes([UPLOAD]), b"", f"read {key[1]:04X}h:{key[2]}")
-            if key not in self._plates.known:
+            if key not in self._plates:
                 self._record(self.now_s)
-        return _variable(board, key).decode_raw(self._written.get(key) or self._plates.known[key])
+        return _variable(board, key).decode_raw(self._written.get(key) or self._plates[key])
 
     def wait(self, dwell_s: float) -> None:
         """The next thing happens so much later."""
@@ -150,7 +144,7 @@ class ScriptedBench:
                 self._keep(request, answer[4 : 8 - (answer[0] >> 2 & 3)])
 
     def _keep(self, request: _Request, data: bytes) -> None:
-        if self._plates.known.setdefault(request.key, data) != data:
+        if self._plates.setdefault(request.key, data) != data:
             raise LinkError(f"{request.what}: the value differs from that of earlier runs")
 
 

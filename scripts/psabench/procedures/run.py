@@ -74,7 +74,7 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
 def _conditions(options: RunOptions) -> list[Condition]:
     if _there(options) or options.scenario:
         average = 16 if options.average is None else options.average
-        return [Condition(label="", scenario=str(options.scenario or ""), average=average, about="", g_mps2=G_MPS2)]
+        return [Condition(label="", scenario=str(options.scenario or ""), average=average, g_mps2=G_MPS2)]
     return [CONDITIONS[c] for c in options.conditions]
 
 
