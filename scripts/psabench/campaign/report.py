@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from psabench.campaign import builds, chains, page, plots
 from psabench.campaign.cases import STUDIES
-from psabench.campaign.chains import CHAINS, Wanted
+from psabench.campaign.chains import CHAINS
 from psabench.campaign.claims import Figures, HoldFigures, checks, claims
 from psabench.campaign.page import Campaign
 from psabench.campaign.runner import Plan
@@ -51,8 +51,7 @@ def _reasons(plan: Plan, store: Store, chosen: Callable[[Rows], npt.NDArray[np.b
     found = Counter[str]()
     for case in plan.cases if CHAINS[plan.chain].emulates else ():
         runs = np.flatnonzero(chosen(plan.rows(store, case)))[:REASONS_TOLD].tolist()
-        wanted = Wanted(chain=plan.chain, setup=case.setup, hold=None, seed=plan.seed, first_run=0, runs=0)
-        found.update(chains.reasons(wanted, runs))
+        found.update(chains.reasons(plan.wanted(case), runs))
     return dict(found.most_common())
 
 

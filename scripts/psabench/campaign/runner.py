@@ -33,6 +33,11 @@ class Plan:
     def origin(self, case: Case) -> Origin:
         return chains.origin(self.chain, case.setup, case.hold, self.seed)
 
+    def wanted(self, case: Case, first_run: int = 0, runs: int = 0) -> Wanted:
+        """Some runs of a case."""
+        part = {"first_run": first_run, "runs": runs}
+        return Wanted(chain=self.chain, setup=case.setup, hold=case.hold, seed=self.seed, **part)
+
     def rows(self, store: Store, case: Case) -> Rows:
         """Of a case that is complete."""
         return store.rows(self.origin(case), self.runs)
@@ -52,16 +57,7 @@ def missing(plan: Plan, store: Store) -> list[Wanted]:
         for first in range(0, plan.runs, chain.part_runs):
             runs = min(chain.part_runs, plan.runs - first)
             if there.get(first, 0) < runs:
-                wanted.append(
-                    Wanted(
-                        chain=plan.chain,
-                        setup=case.setup,
-                        hold=case.hold,
-                        seed=plan.seed,
-                        first_run=first,
-                        runs=runs,
-                    )
-                )
+                wanted.append(plan.wanted(case, first, runs))
     return wanted
 
 
