@@ -49,14 +49,9 @@ class Emulator:
         self.argv = [str(find_emulator()), *([str(scenario)] if scenario else []), "--pace", pace, "--until-eof"]
         for can in cans:
             self.argv += ["--can", can]
-        if seed is not None:
-            self.argv += ["--seed", str(seed)]
-        if self.control_path:
-            self.argv += ["--control", str(self.control_path)]
-        if self.truth_path:
-            self.argv += ["--truth", str(self.truth_path)]
-        if scpi:
-            self.argv += ["--scpi", "all:0"]
+        paths = {"--control": self.control_path, "--truth": self.truth_path}
+        for option, value in {"--seed": seed, **paths, "--scpi": "all:0" if scpi else None}.items():
+            self.argv += [] if value is None else [option, str(value)]
         self.argv += [str(x) for x in extra]
         self.endpoints: list[dict[str, str]] = []
         self._stderr = (self.directory / "stderr").open("w+b")
