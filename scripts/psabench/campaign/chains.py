@@ -39,8 +39,11 @@ class Chain:
     title: str
     run_s: float  # one run, one core
     part_runs: int  # of a part in the store: what an interrupt may cost
-    compute: Callable[[Setup, int, int, int], Rows]  # set-up, seed, first run, runs
-    emulates: bool = False  # an emulator and the host's procedure, not the algebra
+    model: Callable[..., nav_mc.Errors] | None = None  # of the algebra; None: an emulator and the host's procedure
+
+    @property
+    def emulates(self) -> bool:
+        return self.model is None
 
     @property
     def holds(self) -> bool:
@@ -53,6 +56,15 @@ class Chain:
     def build(self) -> str:
         """Of what computes here: digest of its files."""
         return builds.wire() if self.emulates else builds.algebra()
+
+    def compute(self, setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
+        """Errors of runs without a hold."""
+        if self.model is None:
+            from psabench.campaign import emulated  # the boards and cantools: the algebra does without
+
+            return emulated.runs(emulated.platforms(self.name), setup, seed, first_run, runs)
+        e = self.model(config(setup), seed, first_run=first_run, runs=runs)
+        return _columns(np.degrees(e.platform_rad), np.degrees(e.heading_rad), e.drift_radps / nav.DEGPH, e.quality)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +111,7 @@ def reasons(w: Wanted, runs: Sequence[int]) -> Mapping[str, int]:
     """Why these runs have no heading, or one in doubt, and how many each: they are run again, the same each time."""
     from psabench.campaign import emulated
 
-    platforms = emulated.live if w.chain == "wire" else emulated.recorded()
+    platforms = emulated.platforms(w.chain)
     return Counter(words for k in runs for words in emulated.why(platforms, w.setup, _seed(w), k))
 
 
@@ -187,32 +199,8 @@ def hold_config(setup: Setup, hold: Hold) -> nav_mc.HoldConfig:
     return nav_mc.HoldConfig(**{**_fields_of(nav_mc.HoldConfig, _in_si(hold)), **own})
 
 
-def _closed(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
-    return _errors(nav_mc.closed(config(setup), seed, first_run=first_run, runs=runs))
-
-
-def _samples(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
-    return _errors(nav_mc.samples(config(setup), seed, first_run=first_run, runs=runs))
-
-
-def _errors(e: nav_mc.Errors) -> Rows:
-    return _columns(np.degrees(e.platform_rad), np.degrees(e.heading_rad), e.drift_radps / nav.DEGPH, e.quality)
-
-
 def _columns(*columns: nav.Floats) -> Rows:
     return np.stack(columns, axis=1).astype(CELL)
-
-
-def _emulated(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
-    from psabench.campaign import emulated  # the boards and cantools: the algebra does without
-
-    return emulated.runs(emulated.recorded(), setup, seed, first_run, runs)
-
-
-def _wire(setup: Setup, seed: int, first_run: int, runs: int) -> Rows:
-    from psabench.campaign import emulated
-
-    return emulated.runs(emulated.live, setup, seed, first_run, runs)
 
 
 # ---- what there is
@@ -231,12 +219,10 @@ def versions() -> str:
 CHAINS: Mapping[str, Chain] = {
     c.name: c
     for c in (
-        Chain(name="closed", title="closed form", run_s=1e-7, part_runs=1 << 18, compute=_closed),
-        Chain(name="samples", title="sample by sample", run_s=2e-5, part_runs=1 << 13, compute=_samples),
-        Chain(
-            name="emulated", title="emulator in free pace", run_s=0.15, part_runs=20, compute=_emulated, emulates=True
-        ),
-        Chain(name="wire", title="live through the wire", run_s=0.7, part_runs=1, compute=_wire, emulates=True),
+        Chain(name="closed", title="closed form", run_s=1e-7, part_runs=1 << 18, model=nav_mc.closed),
+        Chain(name="samples", title="sample by sample", run_s=2e-5, part_runs=1 << 13, model=nav_mc.samples),
+        Chain(name="emulated", title="emulator in free pace", run_s=0.15, part_runs=20),
+        Chain(name="wire", title="live through the wire", run_s=0.7, part_runs=1),
     )
 }
 

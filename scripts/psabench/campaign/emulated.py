@@ -220,6 +220,11 @@ def params(setup: Setup) -> GyrocompassParams:
 Platforms = Callable[[Scenario], AbstractContextManager[PlatformBench]]
 
 
+def platforms(chain: str) -> Platforms:
+    """Of a chain, "emulated" or "wire"."""
+    return live if chain == "wire" else recorded()
+
+
 def recorded() -> Platforms:
     """An emulator a run, in free pace. What the units tell of themselves is asked for once."""
     plates: Plates = {}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import NullLocator
 
 from psabench.campaign.cases import Case, Study
 from psabench.campaign.claims import CLAIM_DEG, HOLD_DEG, SEVERAL_HOURS_DEG, Figures, HoldFigures, Spread
@@ -55,20 +56,21 @@ def scan(study: Study, cases: Sequence[Case], found: Mapping[str, Figures]) -> s
 def _scale(ax: Axes, study: Study, x: Sequence[float]) -> None:
     if study.log_y:
         ax.set_yscale("log")
-        marks = _marks(*ax.get_ylim())
-        ax.set_yticks(marks, [f"{m:g}" for m in marks])
-        ax.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+        _mark(ax.yaxis)
     else:
         ax.set_ylim(0.0)
     if x[-1] > 20 * x[0] > 0.0:
         ax.set_xscale("log")
-        ax.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+        ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xticks(x, [f"{v:g}" for v in x])
 
 
-def _marks(low: float, high: float) -> list[float]:
-    """Of a logarithmic axis."""
-    return [m for k in range(-4, 2) for m in (10.0**k, 2 * 10.0**k, 5 * 10.0**k) if low <= m <= high]
+def _mark(axis: Axis) -> None:
+    """1, 2, 5 of each decade of a logarithmic axis, and nothing between."""
+    low, high = axis.get_view_interval()
+    marks = [m for k in range(-4, 2) for m in (10.0**k, 2 * 10.0**k, 5 * 10.0**k) if low <= m <= high]
+    axis.set_ticks(marks, [f"{m:g}" for m in marks])
+    axis.set_minor_locator(NullLocator())
 
 
 def bars(name: str, cases: Sequence[Case], found: Mapping[str, Figures]) -> str:
@@ -96,9 +98,7 @@ def _dots(name: str, labels: Sequence[str], spreads: Sequence[Spread], what: str
             there = [(v, -i) for i, v in enumerate(numbers) if v > 1e-7]
             ax.plot(*zip(*there, strict=True), "o", ms=5, color=colour, label=label, ls="none")
         ax.set_xscale("log")
-        marks = _marks(*ax.get_xlim())
-        ax.set_xticks(marks, [f"{m:g}" for m in marks])
-        ax.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+        _mark(ax.xaxis)
         ax.set_yticks([-i for i in range(len(labels))], labels)
         ax.set_ylim(-len(labels) + 0.4, 0.6)
         ax.set_xlabel(f"error of {what}, deg; dashed: {' and '.join(f'{x:g}' for x in lines)}°")
