@@ -76,31 +76,18 @@ POSITIONS, POSITIONS_MAX = OD.POSITIONS, 32
 BEGAN, SELF_TEST, SELF_TEST_RESULT = OD.PAST, (OD.SELF_TEST, 1), (OD.SELF_TEST, 2)
 ENCODER_DEG, LEVEL_DEG = 180.0 / 2**31, 2e-6
 
-# Settings by the names that this package gives them: object and sub-index.
+# Settings by the names that this package gives them: those of an object stand at its sub-indices from the first on.
+_OBJECTS = (
+    (OD.SLEW, 1, ("slew_deg", "slew_dps", "slew_dps2", "settle_s", "settle_limit_s", "tolerance_arcmin")),
+    (OD.RUN, 1, ("count", "repeat", "window_s", "calibration_s", "freeze")),
+    (OD.LOOPS, 1, ("m1_per_s", "m2_per_s")),
+    (OD.PLACE, 1, ("latitude_deg", "speed_mps", "track_deg")),
+    (OD.HEADING, 1, ("azimuth_deg",)),
+    (OD.DRIFT, 1, ("drift1_degph", "drift2_degph")),
+    (OD.LEVEL, 2, ("zero_x_v", "zero_y_v", "scale_x_v_per_g", "scale_y_v_per_g")),
+)
 SETTINGS: Mapping[str, tuple[int, int]] = {
-    "slew_deg": (OD.SLEW, 1),
-    "slew_dps": (OD.SLEW, 2),
-    "slew_dps2": (OD.SLEW, 3),
-    "settle_s": (OD.SLEW, 4),
-    "settle_limit_s": (OD.SLEW, 5),
-    "tolerance_arcmin": (OD.SLEW, 6),
-    "count": (OD.RUN, 1),
-    "repeat": (OD.RUN, 2),
-    "window_s": (OD.RUN, 3),
-    "calibration_s": (OD.RUN, 4),
-    "freeze": (OD.RUN, 5),
-    "m1_per_s": (OD.LOOPS, 1),
-    "m2_per_s": (OD.LOOPS, 2),
-    "latitude_deg": (OD.PLACE, 1),
-    "speed_mps": (OD.PLACE, 2),
-    "track_deg": (OD.PLACE, 3),
-    "azimuth_deg": (OD.HEADING, 1),
-    "drift1_degph": (OD.DRIFT, 1),
-    "drift2_degph": (OD.DRIFT, 2),
-    "zero_x_v": (OD.LEVEL, 2),
-    "zero_y_v": (OD.LEVEL, 3),
-    "scale_x_v_per_g": (OD.LEVEL, 4),
-    "scale_y_v_per_g": (OD.LEVEL, 5),
+    name: (index, sub) for index, first, names in _OBJECTS for sub, name in enumerate(names, first)
 }
 ABORT_RANGE = {0x06090030, 0x06090031, 0x06090032}  # CiA 301, 7.2.4.3.17: value range, too high, too low
 
