@@ -44,6 +44,10 @@ FIRST_TURN_DEG = 1.0  # the gimbal begins at the first position, but for its err
 UNIT_DPS2 = 20.0  # of the unit's turns, its object 2101h; with 0 a set-up ignores what speeding up and braking take
 UNIT_DPS, FAST_PROFILE, FAST_LIMIT_DPS = 18.0, "gyro_fast", 40.0  # quicker turns want stronger torquers
 
+# Fields of a set-up that have the same names elsewhere: in a scenario's platform, in the host's procedure.
+OF_PLATFORM = ("gm_sigma_degph", "gm_tau_s", "gm_from_zero")
+OF_PROCEDURE = ("window_s", "settle_s", "slew_dps", "m1_per_s", "m2_per_s", "simplified", "gm_sigma_degph", "gm_tau_s")
+
 Scenario = dict[str, Any]
 
 
@@ -126,9 +130,7 @@ def setup_of(path: Path) -> Setup:
         latitude_deg=s["site"]["latitude_deg"],
         gimbal="corrected",
         drift_degph=p["drift_degph"][0],
-        gm_sigma_degph=p["gm_sigma_degph"],
-        gm_tau_s=p["gm_tau_s"],
-        gm_from_zero=p["gm_from_zero"],
+        **{name: p[name] for name in OF_PLATFORM},
         torquer_scale=p["torquer_scale"][0],
         beta_sys_arcmin=p["level_tilt_arcmin"][0],
         gamma_sys_arcmin=p["level_tilt_arcmin"][1],
@@ -156,9 +158,7 @@ def scenario(setup: Setup, at: Instrument) -> Scenario:
         "alpha0_deg": wrapped_deg(setup.angles_deg[0] - at.heading_deg),
         "beta0_deg": 0.5,
         "drift_degph": [setup.drift_degph, second],
-        "gm_sigma_degph": setup.gm_sigma_degph,
-        "gm_tau_s": setup.gm_tau_s,
-        "gm_from_zero": setup.gm_from_zero,
+        **{name: getattr(setup, name) for name in OF_PLATFORM},
         "torquer_scale": [setup.torquer_scale] * 2,
         "level_tilt_arcmin": [setup.beta_sys_arcmin, setup.gamma_sys_arcmin],
         "level_repeat_arcmin": setup.beta_random_arcmin,
@@ -197,19 +197,12 @@ def params(setup: Setup) -> GyrocompassParams:
     try:
         return GyrocompassParams(
             sequence=",".join(repr(a) for a in setup.angles_deg),
-            window_s=setup.window_s,
-            settle_s=setup.settle_s,
-            slew_dps=setup.slew_dps,
-            m1_per_s=setup.m1_per_s,
-            m2_per_s=setup.m2_per_s,
+            **{name: getattr(setup, name) for name in OF_PROCEDURE},
             latitude_deg=setup.latitude_deg + setup.latitude_error_arcmin / 60.0,
             method=setup.method.replace("_", "-"),
             angles="encoder" if setup.encoder else "set",
             cardan=setup.gimbal == "corrected",
-            simplified=setup.simplified,
             calibrate_s=0.0,
-            gm_sigma_degph=setup.gm_sigma_degph,
-            gm_tau_s=setup.gm_tau_s,
             angle_sd_arcmin=setup.angle_random_arcmin,
             level_sd_arcmin=setup.gamma_random_arcmin,
         )
