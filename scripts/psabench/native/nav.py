@@ -25,6 +25,7 @@ from psabench.native.navlib import (
     PositionStruct,
     RefusalStruct,
     RestStruct,
+    filled,
     library,
 )
 
@@ -186,7 +187,7 @@ def gyrocompass(
 ) -> Compass:
     """Alpha at position 1 and the drift about the measuring axis, (12)-(19) corrected. Raises Refused."""
     rows = _rows(positions)
-    fit = FitStruct(latitude_rad, int(method), int(simplified), int(ramp), _noise(noise))
+    fit = FitStruct(latitude_rad, int(method), int(simplified), int(ramp), filled(NoiseStruct, noise))
     out = CompassStruct()
     status = library().gyrocompass(rows, len(positions), c.byref(fit), c.byref(out))
     if status < 0:
@@ -260,8 +261,7 @@ def window_slope(beta_n_rad: npt.ArrayLike, s_radps: npt.ArrayLike, dt_s: float)
 def rest_s_radps(at: Rest) -> tuple[float, float]:
     """(S [rad/s], true beta [rad]) of a platform at rest, settled."""
     beta = c.c_double()
-    struct = RestStruct(**{name: getattr(at, name) for name, *_ in RestStruct._fields_})
-    return float(library().rest_s_radps(c.byref(struct), c.byref(beta))), beta.value
+    return float(library().rest_s_radps(c.byref(filled(RestStruct, at)), c.byref(beta))), beta.value
 
 
 def azimuth_drift(
@@ -295,8 +295,7 @@ def gm_window_cov(
 
 def hold_sd_rad(hold: Hold, t_s: float) -> float:
     """Standard deviation of the heading t_s after the hold began."""
-    struct = HoldStruct(**{name: getattr(hold, name) for name, *_ in HoldStruct._fields_})
-    return float(library().hold_sd_rad(c.byref(struct), t_s))
+    return float(library().hold_sd_rad(c.byref(filled(HoldStruct, hold)), t_s))
 
 
 def _check(what: str, status: int) -> None:
@@ -305,14 +304,7 @@ def _check(what: str, status: int) -> None:
 
 
 def _rows(positions: Sequence[Position]) -> c.Array[PositionStruct]:
-    names = [name for name, *_ in PositionStruct._fields_]
-    return (PositionStruct * max(len(positions), 1))(
-        *(PositionStruct(*(getattr(p, n) for n in names)) for p in positions)
-    )
-
-
-def _noise(noise: Noise) -> NoiseStruct:
-    return NoiseStruct(*(getattr(noise, name) for name, *_ in NoiseStruct._fields_))
+    return (PositionStruct * max(len(positions), 1))(*(filled(PositionStruct, p) for p in positions))
 
 
 def _array(values: npt.ArrayLike) -> Floats:

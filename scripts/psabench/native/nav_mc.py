@@ -27,6 +27,7 @@ from psabench.native.navlib import (
     McStruct,
     NoiseStruct,
     RefusalStruct,
+    filled,
     library,
 )
 
@@ -198,7 +199,7 @@ def config_struct(cfg: McConfig) -> McStruct:
             setattr(struct, name, value if isinstance(value, float) else int(value))
     struct.count = len(cfg.angles_rad)
     struct.angle_rad = (c.c_double * MAX_POSITIONS)(*cfg.angles_rad)
-    noise = NoiseStruct(*(getattr(cfg.noise, name) for name, *_ in NoiseStruct._fields_))
+    noise = filled(NoiseStruct, cfg.noise)
     struct.fit = FitStruct(cfg.latitude_rad, int(cfg.method), int(cfg.simplified), int(cfg.ramp), noise)
     return struct
 

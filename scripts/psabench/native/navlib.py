@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes as c
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 from psabench.native.shared_library import SharedLibrary
 
@@ -16,8 +16,16 @@ _D, _I, _U64 = c.c_double, c.c_int, c.c_uint64
 _DOUBLES = c.POINTER(c.c_double)
 
 
+Structure = TypeVar("Structure", bound=c.Structure)
+
+
 def _doubles(*names: str) -> list[tuple[str, Any]]:
     return [(name, _D) for name in names]
+
+
+def filled(kind: type[Structure], value: object) -> Structure:
+    """A structure from the attributes of the names of its fields."""
+    return kind(*(getattr(value, name) for name, *_ in kind._fields_))
 
 
 class PositionStruct(c.Structure):
