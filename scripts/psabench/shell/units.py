@@ -10,41 +10,22 @@ from fractions import Fraction
 from psabench.errors import expected
 
 _RAD = Fraction(180 / math.pi)  # degrees
-# Unit: quantity and how many of the quantity's first unit it is. Exact, so that 63ms is the number 0.063.
-_UNITS: Mapping[str, tuple[str, Fraction]] = {
-    "s": ("time", Fraction(1)),
-    "ms": ("time", Fraction(1, 10**3)),
-    "us": ("time", Fraction(1, 10**6)),
-    "ns": ("time", Fraction(1, 10**9)),
-    "min": ("time", Fraction(60)),
-    "h": ("time", Fraction(3600)),
-    "deg": ("angle", Fraction(1)),
-    "arcmin": ("angle", Fraction(1, 60)),
-    "arcsec": ("angle", Fraction(1, 3600)),
-    "rad": ("angle", _RAD),
-    "mrad": ("angle", _RAD / 1000),
-    "deg/s": ("rate", Fraction(1)),
-    "dps": ("rate", Fraction(1)),
-    "deg/h": ("rate", Fraction(1, 3600)),
-    "rad/s": ("rate", _RAD),
-    "deg/s^2": ("angular acceleration", Fraction(1)),
-    "dps2": ("angular acceleration", Fraction(1)),
-    "Hz": ("frequency", Fraction(1)),
-    "mHz": ("frequency", Fraction(1, 1000)),
-    "kHz": ("frequency", Fraction(1000)),
-    "MHz": ("frequency", Fraction(10**6)),
-    "V": ("voltage", Fraction(1)),
-    "mV": ("voltage", Fraction(1, 1000)),
-    "uV": ("voltage", Fraction(1, 10**6)),
-    "degC": ("temperature", Fraction(1)),
-    "K": ("difference of temperature", Fraction(1)),
-    "K/min": ("rate of temperature", Fraction(1)),
-    "K/s": ("rate of temperature", Fraction(60)),
-    "m": ("length", Fraction(1)),
-    "mm": ("length", Fraction(1, 1000)),
-    "ppm": ("ratio", Fraction(1)),
-    "m/s^2": ("acceleration", Fraction(1)),
-}
+_MILLI, _MICRO, _NANO = (Fraction(1, 10**k) for k in (3, 6, 9))
+# The units of each quantity, and how many of its first unit they are. Exact, so that 63ms is the number 0.063.
+_QUANTITIES: tuple[Mapping[str, Fraction | int], ...] = (
+    {"s": 1, "ms": _MILLI, "us": _MICRO, "ns": _NANO, "min": 60, "h": 3600},
+    {"deg": 1, "arcmin": Fraction(1, 60), "arcsec": Fraction(1, 3600), "rad": _RAD, "mrad": _RAD * _MILLI},
+    {"deg/s": 1, "dps": 1, "deg/h": Fraction(1, 3600), "rad/s": _RAD},
+    {"deg/s^2": 1, "dps2": 1},
+    {"Hz": 1, "mHz": _MILLI, "kHz": 10**3, "MHz": 10**6},
+    {"V": 1, "mV": _MILLI, "uV": _MICRO},
+    {"degC": 1},
+    {"K": 1},  # a difference of temperatures
+    {"K/min": 1, "K/s": 60},
+    {"m": 1, "mm": _MILLI},
+    {"ppm": 1},
+    {"m/s^2": 1},
+)
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _HEX = re.compile(r"0x([0-9A-Fa-f]+)|([0-9A-Fa-f]+)h")
 
@@ -60,11 +41,13 @@ def number(text: str, unit: str) -> float:
     return float(value * _ratio(suffix, unit)) if suffix else float(m.group())
 
 
+def _quantity(unit: str) -> Mapping[str, Fraction | int]:
+    return next((q for q in _QUANTITIES if unit in q), {})
+
+
 def alike(unit: str) -> list[str]:
     """Units that may be written in place of `unit`, that one first."""
-    if unit not in _UNITS:
-        return [unit] if unit else []
-    return [unit, *(u for u, (quantity, _) in _UNITS.items() if quantity == _UNITS[unit][0] and u != unit)]
+    return [unit, *(u for u in _quantity(unit) if u != unit)] if unit else []
 
 
 def _ratio(given: str, wanted: str) -> Fraction:
@@ -73,4 +56,4 @@ def _ratio(given: str, wanted: str) -> Fraction:
     if given not in alike(wanted):
         known = " ".join(alike(wanted))
         raise ValueError(expected(f"one of {known}" if known else "a bare number", repr(given), "unit"))
-    return _UNITS[given][1] / _UNITS[wanted][1]
+    return Fraction(_quantity(wanted)[given]) / _quantity(wanted)[wanted]
