@@ -31,7 +31,6 @@ _MOST_REST = 4 * BLOCK  # bytes without a time
 _MOST_WIRES = 1024
 _MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
 _MOST_DIGITS = 18  # of a time: what 64 bits hold
-_SCALE_NS = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _FS = {"fs": 1, "ps": 10**3, "ns": 10**6, "us": 10**9, "ms": 10**12, "s": 10**15}
 _FS_PER_NS = 10**6
 _TIMESCALE = re.compile(r"\$timescale\s+(1|10|100)\s*(fs|ps|ns|us|ms|s)\s+\$end")
@@ -101,9 +100,9 @@ class Vcd:
 
 def scale_name(unit_ns: int) -> str:
     """The file's unit as VCD writes it. Raises ValueError for what is no unit of VCD."""
-    for name, ns in _SCALE_NS.items():
+    for name, fs in _FS.items():
         for factor in (1, 10, 100):
-            if unit_ns == factor * ns:
+            if unit_ns * _FS_PER_NS == factor * fs:
                 return f"{factor} {name}"
     raise ValueError(expected("1, 10 or 100 of ns, us, ms or s", f"{unit_ns} ns", "VCD time unit"))
 
