@@ -20,7 +20,7 @@ from psabench.boards.unit import NMT_PREOP
 from psabench.errors import LinkError, expected
 from psabench.link.can_log import Logged
 from psabench.link.protocol_files import dbc_node, message
-from psabench.link.signals import Floats, Ints, layout
+from psabench.link.signals import Floats, layout
 from psabench.procedures.host_script import Plates, Scenario, ScriptedBench
 from psabench.procedures.platform_bench import Compensation, Look, Table, Window
 from psabench.procedures.wire_platform import WirePlatform
@@ -245,17 +245,10 @@ class _Codes(_Stream):
             self._seq = self._xy.raw(at["SEQ"])
             self._u_v = np.stack([self._xy.physical(at["X"]), self._xy.physical(at["Y"])], axis=1)
         span = self._new(self._xy.t_s)
-        return _frames(self._xy.t_s[span], self._seq[span], self._u_v[span])
-
-
-def _frames(t_s: Floats, seq: Ints, xy_v: Floats) -> Frames:
-    """Without the half of the pair that has Z and temperature."""
-    n = len(t_s)
-    none, zero, no = np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
-    u_v = np.concatenate([xy_v, none[:, None]], axis=1)
-    return Frames(
-        t_rx_s=t_s, t_sample_s=none, seq=seq, u_v=u_v, temp_code=zero, temp_channel=zero, settled=no, clipped=no
-    )
+        t_s = self._xy.t_s[span]
+        none = np.full(len(t_s), np.nan)
+        u_v = np.column_stack([self._u_v[span], none])  # without the half of the pair that has Z and temperature
+        return Frames.of(t_s, none, u_v, {"SEQ": self._seq[span]})
 
 
 class _Gyro(Gyro):

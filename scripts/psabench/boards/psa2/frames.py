@@ -46,6 +46,21 @@ class Frames:
     def __len__(self) -> int:
         return len(self.t_rx_s)
 
+    @staticmethod
+    def of(t_rx_s: Floats, t_sample_s: Floats, u_v: Floats, columns: Mapping[str, Ints]) -> Frames:
+        """The rest from raw columns by the signals' names, (n,) each, as far as there are such."""
+        absent = np.zeros(len(t_rx_s), dtype=np.int64)
+        return Frames(
+            t_rx_s=t_rx_s,
+            t_sample_s=t_sample_s,
+            seq=columns.get("SEQ", absent - 1),
+            u_v=u_v,
+            temp_code=columns.get("T", absent),
+            temp_channel=columns.get("CHANNEL", absent),
+            settled=columns.get("SETTLED", absent).astype(np.bool_),
+            clipped=columns.get("CLIP", absent).astype(np.bool_),
+        )
+
     def head(self, count: int) -> Frames:
         """The first `count` of them."""
         return replace(self, **{f.name: getattr(self, f.name)[:count] for f in fields(self)})
@@ -179,19 +194,9 @@ class FrameReader:
 
     def _samples(self, name: str, t_rx_s: Floats, t_sample_s: Floats, columns: Mapping[str, Ints]) -> Frames:
         """Of raw columns by the signals' names, (n,) each; `name` has the scale of X, Y, Z (all have the same)."""
-        absent = np.zeros(len(t_rx_s), dtype=np.int64)
-        self.counters.overruns += int(columns.get("OVERRUN", absent).sum())
+        self.counters.overruns += int(columns["OVERRUN"].sum()) if "OVERRUN" in columns else 0
         scale = next(s.scale for s in _layout(name).values() if s.unit == "V")
-        return Frames(
-            t_rx_s=t_rx_s,
-            t_sample_s=t_sample_s,
-            seq=columns.get("SEQ", absent - 1),
-            u_v=np.stack([columns[axis] * scale for axis in "XYZ"], axis=1),
-            temp_code=columns.get("T", absent),
-            temp_channel=columns.get("CHANNEL", absent),
-            settled=columns.get("SETTLED", absent).astype(np.bool_),
-            clipped=columns.get("CLIP", absent).astype(np.bool_),
-        )
+        return Frames.of(t_rx_s, t_sample_s, np.stack([columns[axis] * scale for axis in "XYZ"], axis=1), columns)
 
     def _pairs(self, xy: _Kept, zt: _Kept) -> Frames:
         columns = _columns("PSA2_XY", xy.data) | _columns("PSA2_ZT", zt.data)
