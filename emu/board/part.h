@@ -15,6 +15,10 @@ struct board_line {
     bool level;       /* before the first power-up and at rest */
 };
 
+/* A board's list of events names each once: as constants PREFIX_EV_NAME in the order of the list, and as names. */
+#define BOARD_EVENT(prefix, name)      prefix##_EV_##name,
+#define BOARD_EVENT_NAME(prefix, name) #name,
+
 struct board_counter {
     const char *name;
     size_t offset; /* of a uint32_t in the part */

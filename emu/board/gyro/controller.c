@@ -13,18 +13,7 @@ const struct board_line gyro_lines[GYRO_LINES] = {
     [GYRO_LINE_SLEW] = {"SLEW", false},     [GYRO_LINE_SETTLE] = {"SETTLE", false},
     [GYRO_LINE_WINDOW] = {"WINDOW", false}, [GYRO_LINE_FAULT] = {"FAULT", false},
 };
-const char *const gyro_events[GYRO_EVENTS] = {
-    [GYRO_EV_RES] = "RES",
-    [GYRO_EV_READY] = "READY",
-    [GYRO_EV_STEP] = "STEP",
-    [GYRO_EV_MODE] = "MODE",
-    [GYRO_EV_SLEW] = "SLEW",
-    [GYRO_EV_WINDOW] = "WINDOW",
-    [GYRO_EV_WINDOW_END] = "WINDOW_END",
-    [GYRO_EV_FAULT] = "FAULT",
-    [GYRO_EV_POWER_DOWN] = "POWER_DOWN",
-    [GYRO_EV_POWER_UP] = "POWER_UP",
-};
+const char *const gyro_events[GYRO_EVENTS] = {GYRO_EVENT_LIST(BOARD_EVENT_NAME)};
 
 /* ---- settings ---- */
 

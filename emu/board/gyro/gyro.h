@@ -43,19 +43,18 @@ enum gyro_line {
 };
 #define GYRO_STEP_PULSE_NS 100000
 
-enum gyro_event {
-    GYRO_EV_RES,
-    GYRO_EV_READY,
-    GYRO_EV_STEP,
-    GYRO_EV_MODE,
-    GYRO_EV_SLEW,   /* a turn begins */
-    GYRO_EV_WINDOW, /* a window begins */
-    GYRO_EV_WINDOW_END,
-    GYRO_EV_FAULT, /* a flag has come */
-    GYRO_EV_POWER_DOWN,
-    GYRO_EV_POWER_UP,
-    GYRO_EVENTS
-};
+#define GYRO_EVENT_LIST(X)                                                                                             \
+    X(GYRO, RES)                                                                                                       \
+    X(GYRO, READY)                                                                                                     \
+    X(GYRO, STEP)                                                                                                      \
+    X(GYRO, MODE)                                                                                                      \
+    X(GYRO, SLEW)   /* a turn begins */                                                                                \
+    X(GYRO, WINDOW) /* a window begins */                                                                              \
+    X(GYRO, WINDOW_END)                                                                                                \
+    X(GYRO, FAULT) /* a flag has come */                                                                               \
+    X(GYRO, POWER_DOWN)                                                                                                \
+    X(GYRO, POWER_UP)
+enum gyro_event { GYRO_EVENT_LIST(BOARD_EVENT) GYRO_EVENTS };
 
 /* By object, docs/reference/protocol_gyro.md; numbers as the object dictionary has them. */
 struct gyro_settings {

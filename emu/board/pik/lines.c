@@ -14,16 +14,7 @@ const struct board_line pik_lines[PIK_LINES] = {
     [PIK_LINE_FYP] = {"FYP", false}, [PIK_LINE_FYN] = {"FYN", false},    [PIK_LINE_FZP] = {"FZP", false},
     [PIK_LINE_FZN] = {"FZN", false}, BUS_LINES_AB(PIK_LINE_AB0),         BUS_LINES_D(PIK_LINE_D0),
 };
-const char *const pik_events[PIK_EVENTS] = {
-    [PIK_EV_RES] = "RES",
-    [PIK_EV_LATCH] = "LATCH",
-    [PIK_EV_FX] = "FX",
-    [PIK_EV_FY] = "FY",
-    [PIK_EV_FZ] = "FZ",
-    [PIK_EV_SATURATED] = "SATURATED",
-    [PIK_EV_POWER_DOWN] = "POWER_DOWN",
-    [PIK_EV_POWER_UP] = "POWER_UP",
-};
+const char *const pik_events[PIK_EVENTS] = {PIK_EVENT_LIST(BOARD_EVENT_NAME)};
 
 static uint64_t stuck_lines(const struct pik *b)
 {

@@ -39,17 +39,16 @@ enum pik_line {
 };
 extern const struct board_line pik_lines[PIK_LINES];
 
-enum pik_event {
-    PIK_EV_RES,   /* the controller is reset */
-    PIK_EV_LATCH, /* the counters are latched */
-    PIK_EV_FX,    /* a pulse of channel X has begun, either sign: since the last look */
-    PIK_EV_FY,
-    PIK_EV_FZ,
-    PIK_EV_SATURATED, /* a channel can no longer keep up */
-    PIK_EV_POWER_DOWN,
-    PIK_EV_POWER_UP,
-    PIK_EVENTS
-};
+#define PIK_EVENT_LIST(X)                                                                                              \
+    X(PIK, RES)   /* the controller is reset */                                                                        \
+    X(PIK, LATCH) /* the counters are latched */                                                                       \
+    X(PIK, FX)    /* a pulse of channel X has begun, either sign: since the last look */                               \
+    X(PIK, FY)                                                                                                         \
+    X(PIK, FZ)                                                                                                         \
+    X(PIK, SATURATED) /* a channel can no longer keep up */                                                            \
+    X(PIK, POWER_DOWN)                                                                                                 \
+    X(PIK, POWER_UP)
+enum pik_event { PIK_EVENT_LIST(BOARD_EVENT) PIK_EVENTS };
 extern const char *const pik_events[PIK_EVENTS];
 
 /* Addresses on the bus. */

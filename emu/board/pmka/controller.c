@@ -7,11 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-const char *const pmka_events[PMKA_EVENTS] = {
-    [PMKA_EV_RES] = "RES",           [PMKA_EV_START] = "START", [PMKA_EV_READING] = "READING",
-    [PMKA_EV_RESET] = "RESET",       [PMKA_EV_TAU] = "TAU",     [PMKA_EV_POWER_DOWN] = "POWER_DOWN",
-    [PMKA_EV_POWER_UP] = "POWER_UP",
-};
+const char *const pmka_events[PMKA_EVENTS] = {PMKA_EVENT_LIST(BOARD_EVENT_NAME)};
 
 const struct board_line pmka_lines[PMKA_LINES] = {
     [PMKA_LINE_KL1] = {"KL1", true},    [PMKA_LINE_KL2] = {"KL2", true},    [PMKA_LINE_KL3] = {"KL3", true},

@@ -53,16 +53,15 @@ enum pmka_line {
     PMKA_LINES = PMKA_LINE_D0 + 16
 };
 
-enum pmka_event {
-    PMKA_EV_RES,
-    PMKA_EV_START,   /* the first sampling instant is now */
-    PMKA_EV_READING, /* the code of K is there: the reading is complete */
-    PMKA_EV_RESET,   /* a precision reset begins */
-    PMKA_EV_TAU,     /* a beat begins */
-    PMKA_EV_POWER_DOWN,
-    PMKA_EV_POWER_UP,
-    PMKA_EVENTS
-};
+#define PMKA_EVENT_LIST(X)                                                                                             \
+    X(PMKA, RES)                                                                                                       \
+    X(PMKA, START)   /* the first sampling instant is now */                                                           \
+    X(PMKA, READING) /* the code of K is there: the reading is complete */                                             \
+    X(PMKA, RESET)   /* a precision reset begins */                                                                    \
+    X(PMKA, TAU)     /* a beat begins */                                                                               \
+    X(PMKA, POWER_DOWN)                                                                                                \
+    X(PMKA, POWER_UP)
+enum pmka_event { PMKA_EVENT_LIST(BOARD_EVENT) PMKA_EVENTS };
 
 enum pmka_cal { PMKA_CAL_NONE, PMKA_CAL_ZERO, PMKA_CAL_RESET };
 

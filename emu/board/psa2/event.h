@@ -2,19 +2,20 @@
 #ifndef PSABENCH_BOARD_PSA2_EVENT_H
 #define PSABENCH_BOARD_PSA2_EVENT_H
 
-enum psa2_event {
-    PSA2_EV_RES,        /* Res falls */
-    PSA2_EV_SETUP_DONE, /* the set-up has been carried out */
-    PSA2_EV_SYNC_A,     /* SYNC_A rises: the converters synchronise */
-    PSA2_EV_SYNC_T,     /* SYNC_T rises again: the converter synchronises */
-    PSA2_EV_DRD_A,      /* DRD_A falls */
-    PSA2_EV_DRD_T,      /* DRD_T falls */
-    PSA2_EV_INT_FALL,   /* a frame begins on the output line */
-    PSA2_EV_INT_RISE,   /* it has been sent whole */
-    PSA2_EV_POWER_DOWN,
-    PSA2_EV_POWER_UP,
-    PSA2_EVENTS
-};
+#include "board/part.h"
+
+#define PSA2_EVENT_LIST(X)                                                                                             \
+    X(PSA2, RES)        /* Res falls */                                                                                \
+    X(PSA2, SETUP_DONE) /* the set-up has been carried out */                                                          \
+    X(PSA2, SYNC_A)     /* SYNC_A rises: the converters synchronise */                                                 \
+    X(PSA2, SYNC_T)     /* SYNC_T rises again: the converter synchronises */                                           \
+    X(PSA2, DRD_A)      /* DRD_A falls */                                                                              \
+    X(PSA2, DRD_T)      /* DRD_T falls */                                                                              \
+    X(PSA2, INT_FALL)   /* a frame begins on the output line */                                                        \
+    X(PSA2, INT_RISE)   /* it has been sent whole */                                                                   \
+    X(PSA2, POWER_DOWN)                                                                                                \
+    X(PSA2, POWER_UP)
+enum psa2_event { PSA2_EVENT_LIST(BOARD_EVENT) PSA2_EVENTS };
 
 extern const char *const psa2_events[PSA2_EVENTS];
 

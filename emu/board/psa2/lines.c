@@ -10,9 +10,4 @@ const struct board_line psa2_lines[PSA2_LINES] = {
     [PSA2_LINE_INT] = {"Int", true},
 };
 
-const char *const psa2_events[PSA2_EVENTS] = {
-    [PSA2_EV_RES] = "RES",           [PSA2_EV_SETUP_DONE] = "SETUP_DONE", [PSA2_EV_SYNC_A] = "SYNC_A",
-    [PSA2_EV_SYNC_T] = "SYNC_T",     [PSA2_EV_DRD_A] = "DRD_A",           [PSA2_EV_DRD_T] = "DRD_T",
-    [PSA2_EV_INT_FALL] = "INT_FALL", [PSA2_EV_INT_RISE] = "INT_RISE",     [PSA2_EV_POWER_DOWN] = "POWER_DOWN",
-    [PSA2_EV_POWER_UP] = "POWER_UP",
-};
+const char *const psa2_events[PSA2_EVENTS] = {PSA2_EVENT_LIST(BOARD_EVENT_NAME)};

@@ -155,21 +155,7 @@ const struct board_line psd1_lines[PSD1_LINES] = {
 };
 // clang-format on
 
-const char *const psd1_events[PSD1_EVENTS] = {
-    [PSD1_EV_RES] = "RES",
-    [PSD1_EV_SETUP_DONE] = "SETUP_DONE",
-    [PSD1_EV_DR] = "DR",
-    [PSD1_EV_A0] = "A0",
-    [PSD1_EV_RFX] = "RFX",
-    [PSD1_EV_RFY] = "RFY",
-    [PSD1_EV_RFZ] = "RFZ",
-    [PSD1_EV_FL2] = "FL2",
-    [PSD1_EV_STROBE] = "STROBE",
-    [PSD1_EV_CYCLE] = "CYCLE",
-    [PSD1_EV_UC] = "UC",
-    [PSD1_EV_POWER_DOWN] = "POWER_DOWN",
-    [PSD1_EV_POWER_UP] = "POWER_UP",
-};
+const char *const psd1_events[PSD1_EVENTS] = {PSD1_EVENT_LIST(BOARD_EVENT_NAME)};
 
 static uint64_t rest_levels(const struct psd1 *b)
 {

@@ -25,22 +25,21 @@ enum psd1_line {
     PSD1_LINES = PSD1_LINE_D0 + 16
 };
 
-enum psd1_event {
-    PSD1_EV_RES,
-    PSD1_EV_SETUP_DONE,
-    PSD1_EV_DR,  /* DR falls */
-    PSD1_EV_A0,  /* a cycle begins */
-    PSD1_EV_RFX, /* RFx falls */
-    PSD1_EV_RFY,
-    PSD1_EV_RFZ,
-    PSD1_EV_FL2,    /* a word waits */
-    PSD1_EV_STROBE, /* it begins to be read */
-    PSD1_EV_CYCLE,  /* the third word has been read: the last FL2 is over */
-    PSD1_EV_UC,     /* TFS falls: a control word is sent */
-    PSD1_EV_POWER_DOWN,
-    PSD1_EV_POWER_UP,
-    PSD1_EVENTS
-};
+#define PSD1_EVENT_LIST(X)                                                                                             \
+    X(PSD1, RES)                                                                                                       \
+    X(PSD1, SETUP_DONE)                                                                                                \
+    X(PSD1, DR)  /* DR falls */                                                                                        \
+    X(PSD1, A0)  /* a cycle begins */                                                                                  \
+    X(PSD1, RFX) /* RFx falls */                                                                                       \
+    X(PSD1, RFY)                                                                                                       \
+    X(PSD1, RFZ)                                                                                                       \
+    X(PSD1, FL2)    /* a word waits */                                                                                 \
+    X(PSD1, STROBE) /* it begins to be read */                                                                         \
+    X(PSD1, CYCLE)  /* the third word has been read: the last FL2 is over */                                           \
+    X(PSD1, UC)     /* TFS falls: a control word is sent */                                                            \
+    X(PSD1, POWER_DOWN)                                                                                                \
+    X(PSD1, POWER_UP)
+enum psd1_event { PSD1_EVENT_LIST(BOARD_EVENT) PSD1_EVENTS };
 
 /* Addresses A3..A0. */
 enum psd1_register {
