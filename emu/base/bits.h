@@ -2,6 +2,7 @@
 #ifndef PSABENCH_BASE_BITS_H
 #define PSABENCH_BASE_BITS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -18,6 +19,14 @@ static inline int64_t bits_clip(int64_t v, unsigned bits)
 {
     const int64_t max = (INT64_C(1) << (bits - 1)) - 1;
     return v > max ? max : v < -max - 1 ? -max - 1 : v;
+}
+
+/* v from min to max; beyond them the end, and *beyond is set, never cleared. Not a number is beyond max. */
+static inline double bits_limit(double v, double min, double max, bool *beyond)
+{
+    if (v >= min && v <= max) return v;
+    *beyond = true;
+    return v < min ? min : max;
 }
 
 /* v / 2^shift rounded to nearest, halves towards plus infinity; defined for negative v. */

@@ -4,6 +4,7 @@
 
 #include "base/clk.h"
 
+#include <assert.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -30,6 +31,7 @@ static inline uint32_t chip_fault_word(enum chip_stuck stuck, uint32_t word, uin
 
 static inline int64_t chip_fault_hz(const struct chip_fault *f, int64_t nominal_hz)
 {
+    assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     return nominal_hz + nominal_hz * f->clock_ppm / 1000000;
 }
 

@@ -161,13 +161,17 @@ static double read_control(const struct board_node *n, const struct co_entry *e)
     return value[e->sub];
 }
 
+/* why: NULL, or why the controller does not. */
+static uint32_t answer_to(struct board_node *n, const char *why)
+{
+    if (why) board_node_reject(n, why);
+    return why ? CO_AB_STATE : CO_OK;
+}
+
 static uint32_t write_mode(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
-    const char *why = gyro_set_mode(n->board, (enum gyro_mode)v->number, t_ns);
     (void)e;
-    if (!why) return CO_OK;
-    board_node_reject(n, why);
-    return CO_AB_STATE;
+    return answer_to(n, gyro_set_mode(n->board, (enum gyro_mode)v->number, t_ns));
 }
 
 /* As the messages have it. */
@@ -204,11 +208,8 @@ static double read_self_test(const struct board_node *n, const struct co_entry *
 
 static uint32_t begin_self_test(struct board_node *n, const struct co_entry *e, const struct co_value *v, int64_t t_ns)
 {
-    const char *why = v->number != 0.0 ? gyro_self_test(n->board, t_ns) : NULL;
     (void)e;
-    if (!why) return CO_OK;
-    board_node_reject(n, why);
-    return CO_AB_STATE;
+    return answer_to(n, v->number != 0.0 ? gyro_self_test(n->board, t_ns) : NULL);
 }
 
 static const struct board_object objects[] = {

@@ -1,7 +1,5 @@
 #include "chip/ad7712/internal.h"
 
-#include <assert.h>
-
 /* Its own frequency is that of the board's oscillator, whose edges have gone on meanwhile: back to them. Counts that are kept
  * move with the number of the edge. */
 static void back_to_own(struct ad7712 *a, int64_t edge, int64_t at_ns)
@@ -27,7 +25,6 @@ static void set_clock(struct ad7712 *a, int64_t hz, int64_t t_ns)
 
 void ad7712_fault(struct ad7712 *a, const struct chip_fault *f, int64_t t_ns)
 {
-    assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ad7712_drdy(a), sdata = ad7712_sdata(a, t_ns);
     a->fault = *f;
     if (ad7712_drdy(a) != drdy && a->io.drdy) a->io.drdy(a->io.ctx, !drdy, t_ns);

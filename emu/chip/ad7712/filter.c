@@ -1,5 +1,6 @@
 #include "chip/ad7712/filter.h"
 
+#include "base/bits.h"
 #include "base/detmath.h"
 
 #include <assert.h>
@@ -123,13 +124,6 @@ void ad7712_sinc3_row(struct ad7712_sinc3 *f, const double *x, unsigned n)
     }
 }
 
-static double limit_coefficient(double v, double max, bool *beyond)
-{
-    if (v >= 0.0 && v <= max) return v;
-    *beyond = true;
-    return v < 0.0 ? 0.0 : max;
-}
-
 #define COEF_LSB 4194304.0 /* 2^22 of a zero coefficient are full scale; so are 2^22 of a full one a factor of 1 */
 
 uint32_t ad7712_code(double x, uint32_t zero, uint32_t full, bool unipolar, bool *clipped)
@@ -137,12 +131,12 @@ uint32_t ad7712_code(double x, uint32_t zero, uint32_t full, bool unipolar, bool
     const double zeroed = x - ((double)zero - AD7712_ZERO_IDEAL) / COEF_LSB;
     const double scaled = zeroed * ((double)full / COEF_LSB);
     const double code = unipolar ? 16777216.0 * scaled : 8388608.0 * (1.0 + scaled);
-    return (uint32_t)limit_coefficient(nearbyint(code), 16777215.0, clipped);
+    return (uint32_t)bits_limit(nearbyint(code), 0.0, 16777215.0, clipped);
 }
 
 uint32_t ad7712_cal_zero(double x, bool *clamped)
 {
-    return (uint32_t)limit_coefficient(nearbyint(AD7712_ZERO_IDEAL + x * COEF_LSB), 16777215.0, clamped);
+    return (uint32_t)bits_limit(nearbyint(AD7712_ZERO_IDEAL + x * COEF_LSB), 0.0, 16777215.0, clamped);
 }
 
 /* A span of zero or less gives the upper end. */
@@ -150,5 +144,5 @@ uint32_t ad7712_cal_full(double x, uint32_t zero, bool *clamped)
 {
     const double span = x - ((double)zero - AD7712_ZERO_IDEAL) / COEF_LSB;
     const double full = span > 0.0 ? nearbyint(COEF_LSB / span) : 16777216.0;
-    return (uint32_t)limit_coefficient(full, 16777215.0, clamped);
+    return (uint32_t)bits_limit(full, 0.0, 16777215.0, clamped);
 }

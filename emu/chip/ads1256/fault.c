@@ -1,6 +1,5 @@
 #include "chip/ads1256/internal.h"
 
-#include <assert.h>
 #include <stddef.h>
 
 /* From the next edge on, which keeps its instant and its number. */
@@ -13,7 +12,6 @@ static void set_clock(struct ads1256 *a, int64_t hz, int64_t t_ns)
 
 void ads1256_fault(struct ads1256 *a, const struct chip_fault *f, int64_t t_ns)
 {
-    assert(f->clock_ppm >= -500000 && f->clock_ppm <= 500000);
     const bool drdy = ads1256_drdy(a);
     a->fault = *f;
     a->io.drdy = f->drdy ? NULL : a->notify_drdy;

@@ -1,5 +1,7 @@
 #include "chip/ads1256/filter.h"
 
+#include "base/bits.h"
+
 #include <math.h>
 #include <stddef.h>
 
@@ -134,26 +136,16 @@ int64_t ads1256_cell_tau(const struct ads1256_mean *m, const struct ads1256_rate
 
 int32_t ads1256_code(double raw, int32_t ofc, uint32_t fsc, bool *clipped)
 {
-    const double code = nearbyint((raw - ofc) * fsc / ADS1256_CODE_K);
-    if (code >= -8388608.0 && code <= 8388607.0) return (int32_t)code;
-    *clipped = true;
-    return code < 0.0 ? -8388608 : 8388607;
-}
-
-static double limit_coefficient(double v, double min, double max, bool *clamped)
-{
-    if (v >= min && v <= max) return v;
-    *clamped = true;
-    return v < min ? min : max;
+    return (int32_t)bits_limit(nearbyint((raw - ofc) * fsc / ADS1256_CODE_K), -8388608.0, 8388607.0, clipped);
 }
 
 int32_t ads1256_cal_ofc(double raw_zero, bool *clamped)
 {
-    return (int32_t)limit_coefficient(nearbyint(raw_zero), -8388608.0, 8388607.0, clamped);
+    return (int32_t)bits_limit(nearbyint(raw_zero), -8388608.0, 8388607.0, clamped);
 }
 
 /* 0/0 cannot be: alpha and the ideal FSC are no zeros, and a span of zero gives the upper end. */
 uint32_t ads1256_cal_fsc(const struct ads1256_rate *r, double raw_span, bool *clamped)
 {
-    return (uint32_t)limit_coefficient(nearbyint((double)r->alpha * r->fsc_ideal / raw_span), 0.0, 16777215.0, clamped);
+    return (uint32_t)bits_limit(nearbyint((double)r->alpha * r->fsc_ideal / raw_span), 0.0, 16777215.0, clamped);
 }

@@ -115,22 +115,19 @@ void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct
     ads1256_reset_chip(a, ADS1256_OFF, 0, 0);
 }
 
-void ads1256_power_up(struct ads1256 *a, int64_t t_ns)
-{
-    sched_cancel(a->sched, &a->power_down_ev);
-    sched_cancel(a->sched, &a->start_ev);
-    a->powered_down = false;
-    ads1256_reset_chip(a, ADS1256_OFF, 0, t_ns);
-    if (a->cfg.start == ADS1256_START_AT_ONCE) ads1256_go(a, t_ns);
-    else sched_at(a->sched, &a->start_ev, t_ns + start_ns(a));
-}
-
 void ads1256_power_off(struct ads1256 *a, int64_t t_ns)
 {
     sched_cancel(a->sched, &a->power_down_ev);
     sched_cancel(a->sched, &a->start_ev);
     a->powered_down = false;
     ads1256_reset_chip(a, ADS1256_OFF, 0, t_ns);
+}
+
+void ads1256_power_up(struct ads1256 *a, int64_t t_ns)
+{
+    ads1256_power_off(a, t_ns);
+    if (a->cfg.start == ADS1256_START_AT_ONCE) ads1256_go(a, t_ns);
+    else sched_at(a->sched, &a->start_ev, t_ns + start_ns(a));
 }
 
 /* Counts a pulse shorter than t16. */
