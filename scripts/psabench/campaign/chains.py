@@ -24,6 +24,7 @@ from psabench.campaign.store import CELL, Origin, Part, Rows
 from psabench.errors import BadInput, expected
 from psabench.native import nav, nav_mc
 from psabench.native.navlib import library
+from psabench.procedures.result import fields_of
 
 ERRORS = ("platform_error_deg", "heading_error_deg", "drift_error_degph", "quality")
 DOUBTS = "doubts"  # how many the host's procedure has of a run; the algebra has none to tell
@@ -158,11 +159,6 @@ def _in_si(value: Setup | Hold) -> dict[str, Any]:
     return found
 
 
-def _fields_of(kind: type[Any], found: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that a dataclass has."""
-    return {name: value for name, value in found.items() if name in kind.__dataclass_fields__}
-
-
 def config(setup: Setup) -> nav_mc.McConfig:
     """The library's own configuration; what the estimator believes of the noise is what it is."""
     si = _in_si(setup)
@@ -179,10 +175,10 @@ def config(setup: Setup) -> nav_mc.McConfig:
         "settle_s": setup.settle_s + (setup.slew_dps / setup.slew_dps2 if setup.slew_dps2 else 0.0),
         "method": nav.Method[setup.method.upper()],
         "noise": nav.Noise(
-            **_fields_of(nav.Noise, si), angle_sd_rad=si["angle_random_rad"], level_sd_rad=si["gamma_random_rad"]
+            **fields_of(nav.Noise, si), angle_sd_rad=si["angle_random_rad"], level_sd_rad=si["gamma_random_rad"]
         ),
     }
-    return nav_mc.McConfig(**{**_fields_of(nav_mc.McConfig, si), **own})
+    return nav_mc.McConfig(**{**fields_of(nav_mc.McConfig, si), **own})
 
 
 def _droop_rad(setup: Setup) -> float:
@@ -196,7 +192,7 @@ def _droop_rad(setup: Setup) -> float:
 def hold_config(setup: Setup, hold: Hold) -> nav_mc.HoldConfig:
     """The library's configuration of the hold."""
     own = {"start": config(setup), "axis2": nav_mc.Axis2[hold.axis2.upper()]}
-    return nav_mc.HoldConfig(**{**_fields_of(nav_mc.HoldConfig, _in_si(hold)), **own})
+    return nav_mc.HoldConfig(**{**fields_of(nav_mc.HoldConfig, _in_si(hold)), **own})
 
 
 def _columns(*columns: nav.Floats) -> Rows:

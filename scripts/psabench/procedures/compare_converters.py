@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.boards.objects import PikObjects
@@ -25,6 +24,7 @@ from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, Psd1, volts
 from psabench.boards.readings import Readings
 from psabench.boards.unit import Unit
 from psabench.errors import BadInput, LinkError, expected
+from psabench.link.signals import Floats
 from psabench.procedures.head_bench import Progress
 
 NAME = "compare-converters"
@@ -34,8 +34,6 @@ AMPERE_PER_G = 1.28e-3  # of the accelerometers, from their passport
 SETTLE_S = 4.0  # from power-on until every board of the scenario is set up
 PSA2_LSB_V = 10.0 / 2**23
 PLATE = PikObjects.PLATE  # of a PIK: type, K in 0.001 Hz/V
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,16 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.errors import BenchError, expected
+from psabench.link.signals import Floats
 from psabench.procedures import compare_converters as measured
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
 from psabench.report.grading import aligned
-
-Floats = npt.NDArray[np.float64]
 
 TRUTH_EVERY_S = 0.01
 G_MPS2 = 9.8094  # of the scenario's site: an operator knows the gravity of the laboratory

@@ -20,7 +20,7 @@ from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
-from psabench.procedures.result import made_params
+from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth
 
@@ -42,15 +42,11 @@ class GyroOptions:
     params: Mapping[str, Any] = field(default_factory=dict)  # fields of the parameters, by name
 
 
-def _part(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: v for k, v in given.items() if k in kind.__dataclass_fields__}
-
-
 def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     """Every reading that was asked for. Parameters are checked before anything starts. Raises BenchError."""
     readings: ReadingParams = made_params(ReadingParams, options.procedure, options.params)
     for name in readings.readings:
-        params_of(name, _part(GyrocompassParams, options.params))
+        params_of(name, fields_of(GyrocompassParams, options.params))
     hold_params = made_params(HoldParams, options.procedure, options.params) if _holds(options) else None
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
@@ -75,7 +71,7 @@ def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progr
     with _bench(options) as bench:
         if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
             raise BadInput(expected(f"a scenario with a gyro unit, as {SCENARIO}", options.scenario, "--scenario"))
-        given = {**_site(options), **_part(GyrocompassParams, options.params)}
+        given = {**_site(options), **fields_of(GyrocompassParams, options.params)}
         p = params_of(label, given)
         platform = WirePlatform(bench, signals=p.signals)
         truth = _Truth(bench)

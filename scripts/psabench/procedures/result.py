@@ -28,10 +28,15 @@ def option(default: Any, unit: str, text: str) -> Any:
     return field(default=default, metadata={"unit": unit, "help": text})
 
 
+def fields_of(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of `given` that a dataclass has."""
+    return {name: value for name, value in given.items() if name in kind.__dataclass_fields__}
+
+
 def made_params(kind: type[Params], procedure: str, given: Mapping[str, Any]) -> Params:
     """A dataclass of parameters with those of `given` that it has. Raises BadInput for a value out of range."""
     try:
-        return kind(**{k: v for k, v in given.items() if k in kind.__dataclass_fields__})  # type: ignore[attr-defined]
+        return kind(**fields_of(kind, given))
     except ValueError as e:
         raise BadInput(f"{procedure}: {e}") from e
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.errors import expected
 from psabench.estimate import harmonics
@@ -180,7 +179,7 @@ def residual_rms_v(faces: Sequence[FaceFit]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([f.fit.residual_v for f in faces]) ** 2)))
 
 
-def unit_cov(faces: Sequence[FaceFit]) -> npt.NDArray[np.float64]:
+def unit_cov(faces: Sequence[FaceFit]) -> Array:
     """Block diagonal of the faces' unit covariances: the faces share no reading."""
     n = harmonics.HARMONICS
     out = np.zeros((n * len(faces), n * len(faces)))

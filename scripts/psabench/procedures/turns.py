@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.errors import expected
 from psabench.estimate import model
@@ -20,10 +19,8 @@ from psabench.estimate.angles import wrapped_deg
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_identifiable
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
-from psabench.procedures.result import FaceSeries, ProcedureResult, option
+from psabench.procedures.result import Array, FaceSeries, ProcedureResult, option
 from psabench.procedures.series import read_position
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.bench import Bench
 from psabench.boards.gyro.device import Flag, Gyro, Mode, Phase
@@ -259,7 +258,7 @@ class _Tape:
         self._step_s = step_s
         self.readings: dict[str, Floats] = {}  # columns, t_rx_s, turned_rad, missed
         self._before = (-1, 0.0, 0.0, 0)  # STEP of the last reading, its rate, turned_rad and missed
-        self._seq: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._seq: bits.Ints = np.zeros(0, dtype=np.int64)
         self._u_v: Floats = np.zeros((0, 3))
 
     def add(self, gyro: Gyro, level_unit: Psa2) -> None:
@@ -343,7 +342,7 @@ class _Tape:
         return x_v, y_v, int(edges[-1] - ours.sum())
 
 
-def _ahead(seq: npt.NDArray[np.int64], of: int) -> npt.NDArray[np.int64]:
+def _ahead(seq: bits.Ints, of: int) -> bits.Ints:
     """How many frames after number `of` each of consecutive frames is; the first within half a turn of the counter."""
     if not seq.size:
         return seq

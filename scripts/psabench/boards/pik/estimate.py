@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from psabench.link.signals import Floats
 
 COUNTER_BITS = 32  # of the totals in PIK_TOTALS and PIK_TOTAL_Z
 
