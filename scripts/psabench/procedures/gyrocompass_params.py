@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from psabench.errors import BadInput, expected
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Method
 from psabench.procedures.platform_bench import Table
-from psabench.procedures.result import option
+from psabench.procedures.result import fields_of, option
 
 NAME = "gyrocompass"
 
@@ -112,14 +112,7 @@ class GyrocompassParams:
 
     @property
     def table(self) -> Table:
-        return Table(
-            angles_deg=self.angles_deg,
-            repeat=self.repeat,
-            window_s=self.window_s,
-            settle_s=self.settle_s,
-            slew_dps=self.slew_dps,
-            freeze=self.freeze,
-        )
+        return Table(angles_deg=self.angles_deg, **fields_of(Table, asdict(self)))
 
 
 # The article's reading: set angles trusted, closed form, (14). Ours: fast reversals, encoder read, (13), weights.
