@@ -184,10 +184,8 @@ def _estimates(halves: Mapping[str, _Halves]) -> list[Estimate]:
     for axis in ("y", "z"):
         if axis in halves:
             h = halves[axis]
-            gap, sd = (
-                float(h.sum_v.mean() - x.sum_v.mean()),
-                u0_sd * math.sqrt(1 / h.sum_v.size + 1 / x.sum_v.size),
-            )
+            gap = float(h.sum_v.mean() - x.sum_v.mean())
+            sd = u0_sd * math.sqrt(1 / h.sum_v.size + 1 / x.sum_v.size)
             sums.append(estimate(f"closure_{axis}_v", f"u_0({axis}) − u_0(x)", "V", gap, sd, dof))
     return out + sums
 
