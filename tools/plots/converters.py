@@ -17,7 +17,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from psabench.boards.pik import estimate as pik
 from psabench.link.vcd import Vcd, read_vcd
 from psabench.places import find_emulator
 from psabench.procedures import comparison
@@ -61,7 +60,7 @@ def edges_s(vcd: Vcd, name: str) -> list[tuple[float, int]]:
 
 def integrator_v(axis: str, pulses_s: list[float], t_s: np.ndarray) -> np.ndarray:
     """Us: input, less the charge of each reset spread over TCLK. It inverts; drawn the way of the input."""
-    k = pik.coefficient_hz_per_v(rr_ohm=10e3, rin_ohm=20e3, uref_v=10.0, tclk_s=TCLK_S)
+    k = 10e3 / (20e3 * 10.0 * TCLK_S)  # Rr / (RIN UREF TCLK)
     sign = np.sign(INPUT_V[axis])
     removed = sum((np.clip((t_s - p) / TCLK_S, 0.0, 1.0) for p in pulses_s), np.zeros_like(t_s))
     return np.asarray((k * INPUT_V[axis] * t_s - sign * removed) * STEP_V)

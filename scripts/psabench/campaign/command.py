@@ -76,10 +76,11 @@ class Options:
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench campaign`. Raises BadInput."""
+    studies = (f"  {s.name:9} {s.title}" for s in STUDIES.values())
     p = Parser(
         prog="psabench campaign",
         description=ABOUT,
-        epilog=EPILOG.format(studies=_studies(), settings="\n".join(settings.lines())),
+        epilog=EPILOG.format(studies="\n".join(studies), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main)
     p.add_argument("procedure", choices=["gyrocompass"], help="procedure")
@@ -116,10 +117,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
     p.add_argument("--forget-others", action="store_true", help="delete results of other builds")
     return p.parse_args(words)
-
-
-def _studies() -> str:
-    return "\n".join(f"  {s.name:9} {s.title}" for s in STUDIES.values())
 
 
 def _main(args: argparse.Namespace) -> int:

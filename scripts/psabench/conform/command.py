@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ def _add_device(suites: Any) -> None:
         description="Check a board, emulated or real, over its interfaces.",
         epilog=DEVICE_EPILOG,
     )
-    p.set_defaults(handler=_device)
+    p.set_defaults(handler=_handler("device_command"))
     _add_board(p)
     at = p.add_argument_group("interfaces of the board (without --can: an emulator is started)")
     at.add_argument("--can", metavar="BUS", help=BUS_HELP)
@@ -122,7 +123,7 @@ def _add_recording(suites: Any) -> None:
         description="Check recordings of a board's CAN bus and lines.",
         epilog=RECORDING_EPILOG,
     )
-    p.set_defaults(handler=_recording)
+    p.set_defaults(handler=_handler("recording_command"))
     p.add_argument("files", nargs="+", type=Path, metavar="FILE")
     _add_board(p)
     add_default_node(p)
@@ -144,7 +145,7 @@ def _add_host(suites: Any) -> None:
         description="Simulate good and faulty boards for a host program and check what it reports.",
         epilog=HOST_EPILOG.replace("%", "%%"),
     )
-    p.set_defaults(handler=_host)
+    p.set_defaults(handler=_handler("host.command"))
     how = p.add_mutually_exclusive_group(required=True)
     how.add_argument("--command", metavar="COMMAND", help="command line with {can}, {pty}, {line} or {bus}")
     how.add_argument("--manual", choices=list(LINKS), help="link for a program that you start by hand when asked")
@@ -172,22 +173,13 @@ def _add_board(p: argparse.ArgumentParser) -> None:
     p.add_argument("--profile", help="profile of the board (psa-emu --list-profiles)")
 
 
-def _device(args: argparse.Namespace) -> int:
-    from psabench.conform import device_command
+def _handler(module: str) -> Callable[[argparse.Namespace], int]:
+    """`handle` of a module that is loaded when its suite runs."""
 
-    return device_command.device(args)
+    def handle(args: argparse.Namespace) -> int:
+        return int(import_module(f"psabench.conform.{module}").handle(args))
 
-
-def _recording(args: argparse.Namespace) -> int:
-    from psabench.conform import recording_command
-
-    return recording_command.handle(args)
-
-
-def _host(args: argparse.Namespace) -> int:
-    from psabench.conform.host import command
-
-    return command.host(args)
+    return handle
 
 
 def _list(args: argparse.Namespace) -> int:

@@ -19,7 +19,7 @@ from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 
 
-def device(args: argparse.Namespace) -> int:
+def handle(args: argparse.Namespace) -> int:
     """Handler of `conform device`."""
     v = variant(args.board, args.profile)
     folder = args.out or OUT / f"{v.board}-{v.profile}"

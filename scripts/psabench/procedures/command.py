@@ -163,7 +163,7 @@ def _parser_of(command: Command) -> Parser:
     p = Parser(
         prog=f"psabench run {command.name}",
         usage=f"psabench run {command.name} [-h] [option...]",
-        description=_sentence(command.summary),
+        description=f"{command.summary[0].upper()}{command.summary[1:]}.",
         epilog=f"examples:\n{command.examples}{command.notes}",
     )
     p.set_defaults(handler=command.handler, procedure=command.name)
@@ -195,10 +195,6 @@ def _default(value: Any) -> str:
     if value is None or isinstance(value, bool):
         return {None: "none", True: "yes", False: "no"}[value]
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _sentence(summary: str) -> str:
-    return f"{summary[0].upper()}{summary[1:]}."
 
 
 def _table() -> str:

@@ -47,7 +47,8 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     readings: ReadingParams = made_params(ReadingParams, options.procedure, options.params)
     for name in readings.readings:
         params_of(name, fields_of(GyrocompassParams, options.params))
-    hold_params = made_params(HoldParams, options.procedure, options.params) if _holds(options) else None
+    holds = options.procedure == heading_hold.NAME
+    hold_params = made_params(HoldParams, options.procedure, options.params) if holds else None
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
 
@@ -61,10 +62,6 @@ def facts(options: GyroOptions) -> dict[str, str]:
         "seed": "of the scenario" if options.seed is None else str(options.seed),
         "pace": "real time" if options.real_time else "simulated time",
     }
-
-
-def _holds(options: GyroOptions) -> bool:
-    return options.procedure == heading_hold.NAME
 
 
 def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:

@@ -160,10 +160,6 @@ def _with_control(bench: Bench) -> bool:
     return bench.pace != "real"
 
 
-def _with_scpi(bench: Bench) -> bool:
-    return bool(bench.addresses)
-
-
 _FOR = Arg(name="for_s", kind=Kind.REAL, unit="s", low=0, high=86400, what="of the bench's time")
 _AT = Arg(name="t_s", kind=Kind.REAL, unit="s", low=0, high=1e9, what="simulated time since power-on")
 _EVENT = Arg(name="event", choices=EVENTS, strict=False, what="of a board")
@@ -197,7 +193,14 @@ ROWS: tuple[Row, ...] = (
     *dut.ROWS,
     row("can.send", "Sends a frame and lists what comes within 20 ms.", _send, _FRAME, here=dut.here),
     row("can.listen", "Lists the frames that come.", _listen, replace(_FOR, optional=True), here=dut.here),
-    row("scpi.send", "Sends a line; shows the answer to a query.", _scpi, _INSTRUMENT, _LINE, here=_with_scpi),
+    row(
+        "scpi.send",
+        "Sends a line; shows the answer to a query.",
+        _scpi,
+        _INSTRUMENT,
+        _LINE,
+        here=lambda bench: bool(bench.addresses),
+    ),
 )
 HANDLERS: Mapping[str, Handler] = {row.command.name: row.run for row in ROWS}
 UNSAID = {"save", "help"}  # what a script need not say again

@@ -15,9 +15,9 @@ G_MPS2 = 9.8  # as the article has it
     ids=["PIK", "PIK-6"],
 )
 def test_figures_of_the_article(tclk_s: float, k_hz_per_v: float, sv_mps: float, ma_v_per_g: float) -> None:
-    k = pik.coefficient_hz_per_v(rr_ohm=10e3, rin_ohm=20e3, uref_v=10.0, tclk_s=tclk_s)
+    k = 10e3 / (20e3 * 10.0 * tclk_s)  # Rr / (RIN UREF TCLK)
     assert k == pytest.approx(k_hz_per_v, rel=1e-12)
-    ma = pik.implied_scale_v_per_g(k, sv_mps, G_MPS2)
+    ma = G_MPS2 / (sv_mps * k)  # of which the article's printed weight speaks
     assert ma == pytest.approx(ma_v_per_g, rel=1e-4)
     assert pik.pulse_mps(k, ma, G_MPS2) == pytest.approx(sv_mps, rel=1e-12)
     assert pik.pulse_vs(k) * k == pytest.approx(1.0)

@@ -17,11 +17,6 @@ from psabench.link.signals import Floats
 COUNTER_BITS = 32  # of the totals in PIK_TOTALS and PIK_TOTAL_Z
 
 
-def coefficient_hz_per_v(*, rr_ohm: float, rin_ohm: float, uref_v: float, tclk_s: float) -> float:
-    """K of the parts, Hz/V."""
-    return rr_ohm / (rin_ohm * uref_v * tclk_s)
-
-
 def pulse_vs(k_hz_per_v: float) -> float:
     """What a pulse is worth at the input, V s."""
     return 1.0 / k_hz_per_v
@@ -30,11 +25,6 @@ def pulse_vs(k_hz_per_v: float) -> float:
 def pulse_mps(k_hz_per_v: float, ma_v_per_g: float, g_mps2: float) -> float:
     """SV, what a pulse is worth as a velocity, m/s."""
     return g_mps2 / (ma_v_per_g * k_hz_per_v)
-
-
-def implied_scale_v_per_g(k_hz_per_v: float, sv_mps: float, g_mps2: float) -> float:
-    """Ma that makes a pulse worth sv_mps: what the article's printed weight says of its accelerometer, V/g."""
-    return g_mps2 / (sv_mps * k_hz_per_v)
 
 
 def unwrapped(totals: Sequence[float] | Floats, bits: int = COUNTER_BITS) -> Floats:

@@ -30,14 +30,10 @@ PASSIVE_ERRORS, OFF_ERRORS = 16, 32  # error frames that bring TEC over 127 and 
 @cache
 def pdos(board: str) -> dict[str, int]:
     """Messages of a board with their identifiers at node 0, in the order of its TPDOs."""
-    names = [str(m.name) for m in database().messages if _sender(m) == board.upper()]
+    names = [str(m.name) for m in database().messages if board.upper() in m.senders[:1]]
     mine = [n for n in names if not n.endswith(SERVICES) and n not in ("NMT", "SYNC")]
     order = [str(t["message"]) for t in _yaml(board)["tpdos"]]
     return {n: int(message(n).frame_id) - dbc_node(board) for n in sorted(mine, key=order.index)}
-
-
-def _sender(m: Any) -> str:
-    return str(m.senders[0]) if m.senders else ""
 
 
 @cache

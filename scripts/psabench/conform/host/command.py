@@ -32,7 +32,7 @@ def link_of(args: argparse.Namespace) -> str:
     return named[0]
 
 
-def host(args: argparse.Namespace) -> int:
+def handle(args: argparse.Namespace) -> int:
     """Handler of `conform host`."""
     if not 0.01 <= args.speed <= 1000:
         raise BadInput(expected("0.01 to 1000", f"{args.speed:g}", "--speed"))

@@ -88,7 +88,7 @@ def _accel(found: Sequence[Burst]) -> list[Message]:
     """A command byte says how many bytes belong to it (sources 1.3)."""
     made, k = [], 0
     while k < len(found):
-        n = _length([_value(b) for b in found[k : k + 2]])
+        n = _length([int(b.sent or "0", 2) for b in found[k : k + 2]])
         made.append(_message(found[k : k + n]))
         k += n
     return made
@@ -138,10 +138,6 @@ def _message(parts: Sequence[Burst]) -> Message:
 def _bytes(word: str) -> bytes:
     """Whole bytes of a word, most significant bit first; bits beyond them are left out."""
     return bytes(int(word[k : k + BYTE], 2) for k in range(0, len(word) - BYTE + 1, BYTE))
-
-
-def _value(b: Burst) -> int:
-    return int(b.sent or "0", 2)
 
 
 @dataclass(frozen=True, slots=True)
