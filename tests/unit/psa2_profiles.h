@@ -54,4 +54,28 @@ static inline struct psa2_profile psa2_profile_file(const char *name)
     return p;
 }
 
+/* Every field, and the steps of the set-up, which are a list of texts. */
+static inline void psa2_assert_same(const struct psa2_profile *got, const struct psa2_profile *want, const char *name)
+{
+    for (unsigned i = 0; i < psa2_fields.count; i++) {
+        const struct field *f = &psa2_fields.row[i];
+        const bool words = strcmp(f->key, "word") == 0;
+        const size_t size = f->type == FIELD_TEXT   ? strlen(want->name) + 1
+                            : f->type == FIELD_REAL ? sizeof(double)
+                            : f->type == FIELD_BOOL ? sizeof(bool)
+                            : words                 ? sizeof want->word
+                            : f->type == FIELD_LIST ? 0
+                                                    : sizeof(unsigned);
+        if (memcmp((const char *)want + f->offset, (const char *)got + f->offset, size) != 0)
+            fail_msg("%s: %s differs", name, f->key);
+    }
+    assert_int_equal(got->setup_count, want->setup_count);
+    for (unsigned i = 0; i < want->setup_count; i++) {
+        assert_int_equal(got->setup[i].on, want->setup[i].on);
+        assert_int_equal(got->setup[i].action, want->setup[i].action);
+        assert_int_equal(got->setup[i].count, want->setup[i].count);
+        assert_memory_equal(got->setup[i].bytes, want->setup[i].bytes, sizeof want->setup[i].bytes);
+    }
+}
+
 #endif

@@ -59,25 +59,7 @@ static void each_field_of_a_profile_is_that_of_its_file(void **state)
         struct psa2_profile got;
         char why[300];
         if (!api_psa2_profile((unsigned)i, &got, why, sizeof why)) fail_msg("%s", why);
-        for (unsigned k = 0; k < psa2_fields.count; k++) {
-            const struct field *f = &psa2_fields.row[k];
-            const bool words = strcmp(f->key, "word") == 0;
-            const size_t size = f->type == FIELD_TEXT   ? strlen(want.name) + 1
-                                : f->type == FIELD_REAL ? sizeof(double)
-                                : f->type == FIELD_BOOL ? sizeof(bool)
-                                : words                 ? sizeof want.word
-                                : f->type == FIELD_LIST ? 0
-                                                        : sizeof(unsigned);
-            if (memcmp((const char *)&want + f->offset, (const char *)&got + f->offset, size) != 0)
-                fail_msg("%s: %s differs", names[i], f->key);
-        }
-        assert_int_equal(got.setup_count, want.setup_count);
-        for (unsigned k = 0; k < want.setup_count; k++) {
-            assert_int_equal(got.setup[k].on, want.setup[k].on);
-            assert_int_equal(got.setup[k].action, want.setup[k].action);
-            assert_int_equal(got.setup[k].count, want.setup[k].count);
-            assert_memory_equal(got.setup[k].bytes, want.setup[k].bytes, sizeof want.setup[k].bytes);
-        }
+        psa2_assert_same(&got, &want, names[i]);
     }
 }
 

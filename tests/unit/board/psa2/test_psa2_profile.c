@@ -33,25 +33,7 @@ static void the_default_is_the_file_article(void **state)
     struct psa2_profile want;
     fields_default(&psa2_fields, &want);
     const struct psa2_profile got = psa2_profile_file("article");
-    for (unsigned i = 0; i < psa2_fields.count; i++) {
-        const struct field *f = &psa2_fields.row[i];
-        const bool words = strcmp(f->key, "word") == 0;
-        const size_t size = f->type == FIELD_TEXT   ? strlen(want.name) + 1
-                            : f->type == FIELD_REAL ? sizeof(double)
-                            : f->type == FIELD_BOOL ? sizeof(bool)
-                            : words                 ? sizeof want.word
-                            : f->type == FIELD_LIST ? 0
-                                                    : sizeof(unsigned);
-        if (memcmp((const char *)&want + f->offset, (const char *)&got + f->offset, size) != 0)
-            fail_msg("%s differs", f->key);
-    }
-    assert_int_equal(got.setup_count, want.setup_count);
-    for (unsigned i = 0; i < want.setup_count; i++) {
-        assert_int_equal(got.setup[i].on, want.setup[i].on);
-        assert_int_equal(got.setup[i].action, want.setup[i].action);
-        assert_int_equal(got.setup[i].count, want.setup[i].count);
-        assert_memory_equal(got.setup[i].bytes, want.setup[i].bytes, sizeof want.setup[i].bytes);
-    }
+    psa2_assert_same(&got, &want, "article");
 }
 
 /* From "article", with these fields changed: the sentence. */
