@@ -52,7 +52,6 @@ TIER = "TIER={tier}"  # in a command: the tests of tests/tiers.toml that it runs
 REST = ("rest", "all")
 STEPS: list[Step] = [
     Step("build", [*STRICT, "all"], 600),
-    Step("lint", [*MAKE, "lint", "LINT=test"], 600, tiers=["test"]),
     # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
     Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
     Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
@@ -63,6 +62,7 @@ STEPS: list[Step] = [
     # The long ones first, and what fits beside them last: both lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"], tiers=REST),
     Step("Python tests and golden traces", [*MAKE, "pytest", TIER], 1800, beside=True, builds=["bench-bin"]),
+    Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
     Step("end to end on the host", [*MAKE, "e2e", TIER], 1800, beside=True, builds=["all"]),
     Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 1200, beside=True, builds=["all"]),
     Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
