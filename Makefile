@@ -14,7 +14,7 @@ WERROR    ?=#                         1: a warning is an error, as in make test
 BUILD     ?= build$(if $(filter clang%,$(notdir $(CC))),-clang)$(if $(SAN),-san)
 FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
-SAN_E2E   := $(wildcard $(addprefix tests/e2e/*/test_,$(addsuffix .py,bad_* unit tools canopen faults_random cycles)))
+SAN_E2E   := $(wildcard $(addprefix tests/e2e/*/test_,$(addsuffix .py,bad_* unit tools canopen faults_random cycles outputs text_ports)))
 # Build a part only, say DIRS='base chip' T=test_ads1282, while the rest does not compile.
 DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench app api
 UNIT      := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from psabench.report.whole_file import replace_file
+from psabench.link.own import replace_file
 
 
 def marks(name: str) -> tuple[str, str]:

@@ -160,8 +160,9 @@ RULES = {
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
     "one-word-functions-python": Rule(one_word_functions, 926, 926),
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 46_500, 46_500),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 38_000, 38_000),
+    # 46,500 and 38,000 before full disks, second owners, exhausted limits and foreign peers (docs/limits.md).
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 47_300, 47_300),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 38_500, 38_500),
     "tracked-files": Rule(lambda root: len(tracked(root)), 1_400, 1_400),
 }
 

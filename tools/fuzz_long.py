@@ -19,7 +19,7 @@ from pathlib import Path
 from threading import Event, RLock
 
 import between
-from psabench.report.whole_file import replace_file
+from psabench.link.own import replace_file
 from sources import digest
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -60,6 +60,7 @@ class Status:
     frames: int  # CAN frames that this program has received
     late: int | None  # events that the emulator ran late
     lost: int  # samples missing between the frames received
+    files: tuple[tuple[str, float, str], ...]  # that grow: kind, bytes, why it has ended early or ""
 
 
 class Bench(AbstractContextManager["Bench"]):
@@ -402,6 +403,7 @@ class Bench(AbstractContextManager["Bench"]):
             frames=sum(h.received for h in self.hosts.values()),
             late=counters.get("pace", {}).get("late"),
             lost=sum(u.frames.counters.lost for u in self.units.values()),
+            files=tuple((f["kind"], float(f["bytes"]), f.get("error", "")) for f in counters.get("files", ())),
         )
 
     def _maybe(self, command: str, **args: object) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, output_error
 from psabench.options import Parser
 
 # Module and help line of each command. The module and its libraries are loaded when the command is called (`parse`).
@@ -69,8 +69,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as e:
-        print(f"psabench: {e.filename or 'output'}: {e.strerror or e}", file=sys.stderr)
-        return BadInput.exit_status
+        error = output_error(e.filename or "output", e)
+        print(f"psabench: {error}", file=sys.stderr)
+        return error.exit_status
     except KeyboardInterrupt:
         print("psabench: interrupted; what was measured is kept", file=sys.stderr)
         return 130

@@ -6,7 +6,9 @@ kernel (`socketcand:0`), so any number of emulators run side by side.
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import selectors
 import signal
 import subprocess
@@ -20,6 +22,7 @@ from psabench.errors import BadInput, BenchError
 from psabench.link.control import Control
 from psabench.places import executable, find_emulator, own_emulators
 
+READY = re.compile(r'(?P<key>\w+)=(?P<value>"(?:[^"\\]|\\.)*"|\S*)')  # of a ready line
 START_S = 20.0  # timeout for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
 STOP_S = 10.0
 
@@ -145,7 +148,13 @@ class Emulator:
                 text += chunk
         for line in text.decode().splitlines():
             if line.startswith("ready ") and line != "ready all":
-                self.endpoints.append(dict(w.split("=", 1) for w in line.split()[1:]))
+                self.endpoints.append(dict(_key_value(m) for m in READY.finditer(line)))
+
+
+def _key_value(m: re.Match[str]) -> tuple[str, str]:
+    """A value with a space in it is a string of JSON."""
+    value = m["value"]
+    return m["key"], json.loads(value) if value.startswith('"') else value
 
 
 class Forked:

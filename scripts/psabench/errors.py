@@ -5,6 +5,11 @@ Every message says what, where, and what would be right. Bad arguments of functi
 
 from __future__ import annotations
 
+import errno
+
+# What the machine lacks; any other reason why a file cannot be written lies in the path that the user gave.
+MACHINE = {errno.ESTALE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+
 
 def expected(what: str, got: object = None, where: object = "") -> str:
     """The text of an error about an input: `<where>: expected <what>, got <value>`.
@@ -25,6 +30,19 @@ class BadInput(BenchError):
     """The user's input (file, option, name) cannot be used."""
 
     exit_status = 2
+
+
+class OutputError(BenchError):
+    """The machine could not store what was to be written: full disk, quota, read error, file removed."""
+
+
+def output_error(where: object, e: OSError, stored: str = "") -> BenchError:
+    """The error of a file that could not be written: OutputError, or BadInput where another path would do.
+
+    stored: what of it is on the disk.
+    """
+    kind = OutputError if e.errno in MACHINE else BadInput
+    return kind("; ".join(filter(None, (f"{where}: {e.strerror or e}", stored))))
 
 
 class TimeOut(BenchError):

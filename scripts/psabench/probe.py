@@ -19,12 +19,13 @@ class Probe:
         levels = self._bench.control.call("lines", **_unit(unit)).result["lines"]
         return {str(name): int(level) for name, level in levels.items()}
 
-    def start(self, path: str | Path, unit: str | None = None) -> None:
-        """Record the lines of a unit (the first) into a VCD file from now on."""
-        self._bench.control.call("vcd.start", path=os.path.abspath(path), **_unit(unit))
+    def start(self, path: str | Path, unit: str | None = None, limit_mb: float | None = None) -> None:
+        """Record the lines of a unit (the first) into a VCD file from now on, up to limit_mb (1000)."""
+        limit = {} if limit_mb is None else {"limit_mb": limit_mb}
+        self._bench.control.call("vcd.start", path=os.path.abspath(path), **_unit(unit), **limit)
 
     def stop(self) -> None:
-        """End the recording; the file gets its closing time."""
+        """End the recording; the file gets its closing time. ControlError: it has ended before, and what it holds."""
         self._bench.control.call("vcd.stop")
 
     def flush(self) -> None:

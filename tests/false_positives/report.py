@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import between
-from psabench.report.whole_file import replace_file
+from psabench.link.own import replace_file
 
 from tests.false_positives.design import ERRORS_PPM, SEEDS, profiles
 from tests.false_positives.verdict import Alarm, Result, worst

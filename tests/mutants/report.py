@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import between
-from psabench.report.whole_file import replace_file
+from psabench.link.own import replace_file
 
 from tests.mutants.declared import load
 from tests.mutants.verdict import KILLED, WRONG, Result

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.errors import BadInput, expected
+from psabench.link.own import output_text
 from psabench.options import LINE_HZ, Parser, add_board, node_of, positive
 
 EPILOG = """\
@@ -41,7 +42,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 def _decode(args: argparse.Namespace) -> int:
     if args.line and args.board != "psa2":
         raise BadInput(expected("a CAN log for this board (leave --line out)", args.board, "--line"))
-    with args.out.open("w", encoding="utf-8") if args.out else _Stdout() as out:
+    if args.out and args.out.exists() and args.file.exists() and args.out.samefile(args.file):
+        raise BadInput(expected("another file than the one that is read", args.out, "--out"))
+    with output_text(args.out) if args.out else _Stdout() as out:
         return _decode_line(args, out) if args.line else _decode_can(args, out)
 
 

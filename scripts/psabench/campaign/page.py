@@ -103,7 +103,7 @@ def verdict(c: Campaign) -> str:
 
 
 def write(folder: Path, c: Campaign) -> Path:
-    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises as write_report."""
     return write_report(folder, result_dict(c), html_page(c))
 
 

@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, output_error
+from psabench.link.sqlite_errors import as_os_error
 
 FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
 APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
@@ -229,7 +230,8 @@ class Store(AbstractContextManager["Store"]):
         try:
             yield
         except BaseException:
-            self._do("ROLLBACK")
+            if self._db.in_transaction:  # a full disk has ended it already: its error is the one to tell
+                self._do("ROLLBACK")
             raise
         self._do("COMMIT")
 
@@ -240,6 +242,6 @@ class Store(AbstractContextManager["Store"]):
         try:
             return self._db.execute(sql, values)
         except sqlite3.OperationalError as e:  # locked, read-only, disk full
-            raise BadInput(f"{self.path}: {e}") from e
+            raise output_error(self.path, as_os_error(e)) from e
         except sqlite3.DatabaseError as e:
             raise BadInput(expected("a store of results", f"a damaged or other file ({e})", self.path)) from e

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from psabench.conform.capture.log import CanFrame, Capture, LineLog
 from psabench.conform.verdict import Failed
+from psabench.link.own import replace_file
 from psabench.report.drawing import Panel, Section, render
-from psabench.report.whole_file import replace_file
 
 BEFORE_NS, AFTER_NS = 30_000, 120_000
 MOST_LINES, MOST_FRAMES = 12, 200
@@ -22,7 +22,7 @@ class Excerpts:
     folder: Path
 
     def keep(self, test: str, broken: Failed, capture: Capture | None) -> tuple[str, ...]:
-        """Names of the files in the folder. Raises OSError."""
+        """Names of the files in the folder. Raises OSError, OutputError."""
         made: list[str] = []
         if capture is not None and capture.lines is not None and broken.at_ns is not None:
             made += self._lines(test, broken, capture.lines, round(broken.at_ns))

@@ -13,8 +13,8 @@ from xml.etree import ElementTree as ET
 
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict, conforms
+from psabench.link.own import replace_file
 from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
-from psabench.report.whole_file import replace_file
 
 FORMAT = 1  # of conform.json
 ORDER = tuple(Verdict)
@@ -118,14 +118,14 @@ def unseen(run: Run) -> dict[str, int]:
 
 
 def write(folder: Path, run: Run) -> Path:
-    """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises OSError."""
+    """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises as write_report."""
     page = write_report(folder, as_dict(run), html_page(run, folder), "conform.json")
     replace_file(folder / "junit.xml", junit(run))
     return page
 
 
 def publish(folder: Path, run: Run, *, everything: bool, first: Sequence[str] = ()) -> int:
-    """Write the report and print what it says, after `first`; the exit status of the command. Raises OSError."""
+    """Write the report and print what it says, after `first`; the exit status of the command. Raises as write."""
     page = write(folder, run)
     for line in [*first, *lines(run, everything=everything)]:
         print(line)

@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import can
-from can.io.generic import MessageWriter
-from can.io.logger import MESSAGE_WRITERS
 
 from psabench.boards.devices import reader_of
 from psabench.boards.psa2.frames import FrameCounters
-from psabench.errors import BadInput, LinkError, expected
+from psabench.errors import BenchError, LinkError
 from psabench.link.can_host import CanHost, Message, WallClock
+from psabench.link.log_file import LogFile
 
-LOOK_S = 0.2  # real time between looks whether Ctrl-C was pressed
-FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
+LOOK_S = 0.2  # real time between looks whether Ctrl-C was pressed, and at the file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recorded:
-    """What went into the file, which is complete whatever ended the recording."""
+    """What went into the file, which is readable whatever ended the recording."""
 
-    messages: int
+    stored: int
+    received: int
     first_s: float
     last_s: float
     counters: FrameCounters
     broken: str | None  # why the link ended, if it did
+    unstored: BenchError | None  # why the file could not take all that was received
 
 
 def record(
@@ -39,20 +40,19 @@ def record(
 
     node, board: whose stream is counted.
 
-    Call it on the main thread. The file is closed properly in every case, and holds just the messages that are counted.
-    Raises BadInput for an ending that python-can does not know.
+    Call it on the main thread. The file is closed properly in every case, and holds just the messages that are counted
+    as stored. Raises BadInput as LogFile does.
     """
-    if path.suffix not in FORMATS:
-        raise BadInput(expected(f"an ending of {' '.join(FORMATS)}", path.suffix or "none", path))
     reader = reader_of(board, node)
     stamps: list[float] = []  # of the first and the last message
-    messages = 0
-    with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host, _writer(path) as log:
+    received = 0
+    with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
+        log = LogFile(path)
 
         def keep(m: Message) -> None:
-            nonlocal messages
+            nonlocal received
+            received += 1
             log(m)
-            messages += 1
             stamps[1:] = [m.timestamp]
             reader.on_message(m)
             if len(reader) >= 4096:
@@ -61,12 +61,21 @@ def record(
         host.listeners.append(keep)
         broken = None
         try:
-            _receive(host, for_s, count, pressed)
+            _receive(host, for_s, count, lambda: pressed() or log.error is not None, log.check)
         except LinkError as e:
             broken = str(e)
+        finally:
+            stored = log.close()
         reader.take()
-        first_s, last_s = (stamps[0], stamps[-1]) if stamps else (0.0, 0.0)
-        return Recorded(messages=messages, first_s=first_s, last_s=last_s, counters=reader.counters, broken=broken)
+        return Recorded(
+            stored=stored,
+            received=received,
+            first_s=stamps[0] if stamps else 0.0,
+            last_s=stamps[-1] if stamps else 0.0,
+            counters=reader.counters,
+            broken=broken,
+            unstored=log.error,
+        )
 
 
 @contextmanager
@@ -80,17 +89,17 @@ def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _writer(path: Path) -> MessageWriter:
-    try:
-        return can.Logger(str(path))
-    except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
-
-
-def _receive(host: CanHost, for_s: float | None, count: int | None, stop: Callable[[], bool]) -> None:
+def _receive(
+    host: CanHost, for_s: float | None, count: int | None, stop: Callable[[], bool], look: Callable[[], object]
+) -> None:
+    """Receive until it is over, with a look at the file every LOOK_S of real time."""
     deadline_s = None if for_s is None else host.clock.now_s() + for_s
+    look_s = time.monotonic() + LOOK_S
     while not stop() and (count is None or host.received < count):
         left_s = LOOK_S if deadline_s is None else min(LOOK_S, deadline_s - host.clock.now_s())
         if left_s <= 0.0:
             return
         host.receive(left_s)
+        if time.monotonic() >= look_s:
+            look()
+            look_s = time.monotonic() + LOOK_S

@@ -17,7 +17,8 @@ examples:
   psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        one minute, for CANalyzer
   psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
 
-Stops at --for, --count, Ctrl-C, SIGTERM or when the link fails (exit status 3); the file is complete in each case.
+Stops at --for, --count, Ctrl-C, SIGTERM, or with exit status 3 when the link fails, the disk is full or the file is
+removed. The file is readable in each case and holds the messages counted as stored.
 lost: missing frame numbers; torn: frames with one half only; overruns: conversions that the board missed.
 """
 
@@ -45,8 +46,11 @@ def _record(args: argparse.Namespace) -> int:
     node = node_of(args)
     r = record(open_bus(args.can), args.file, node, args.for_s, args.count, args.board)
     c = r.counters
-    print(f"{r.messages} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
+    print(f"{r.stored} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
     print(f"frames of node {node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")
+    if r.unstored:
+        print(f"psabench: {r.unstored}; stored {r.stored} of {r.received} messages", file=sys.stderr)
+        return r.unstored.exit_status
     if r.broken:
         print(f"psabench: {r.broken}; the recording up to there is complete", file=sys.stderr)
         return 3

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from psabench.errors import expected
 from psabench.estimate.face import Face
+from psabench.link.own import output_text
 from psabench.procedures.head_bench import Reading
 
 COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
@@ -20,24 +20,24 @@ class CsvRecorder(AbstractContextManager["CsvRecorder"]):
     """`Watch(record=recorder)`. Rows survive Ctrl-C, an exception and the death of the process."""
 
     def __init__(self, path: Path) -> None:
-        """Raises OSError when the file cannot be made; an earlier file of that name is replaced."""
+        """Raises BadInput or OutputError when the file cannot be made; an earlier file of that name is replaced."""
         self.path = path
         self.rows = 0
-        self._file: IO[str] = path.open("w", newline="", encoding="utf-8")
+        self._stack = ExitStack()
+        self._file: IO[str] = self._stack.enter_context(output_text(path, lambda: f"stored {self.rows} readings"))
         self._csv = csv.writer(self._file, lineterminator="\n")
         self._csv.writerow(COLUMNS)
 
     def __call__(self, r: Reading) -> None:
+        """Store a reading. Raises OSError, which leaving the context names the file of."""
         # repr of a float is the shortest text that reads back to the same bits
         row = (r.face.value if name == "face" else getattr(r, name) for name in COLUMNS)
         self._csv.writerow([repr(x) if isinstance(x, float) else x for x in row])
         self._file.flush()
         self.rows += 1
 
-    def __exit__(self, *_: object) -> None:
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
+    def __exit__(self, *exc: Any) -> None:
+        self._stack.__exit__(*exc)
 
 
 def load_csv(path: Path) -> tuple[Reading, ...]:

@@ -38,7 +38,7 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
     """Write report.html and result.json into `folder` (made when missing), each whole or not at all.
 
     Returns the page. `facts` (seed, profile, version...) go into both as they are. Raises ValueError for no section,
-    OSError from the disk.
+    OSError and OutputError from the disk.
     """
     if not sections:
         raise ValueError(expected("at least one section", "none", "report"))

@@ -16,7 +16,7 @@ TITLE = "Five generations of converters, one motion"
 
 
 def write(folder: Path, c: Comparison) -> Path:
-    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises as write_report."""
     return write_report(folder, comparison.result_dict(c), html_page(c))
 
 

@@ -29,7 +29,7 @@ CAPTIONS = {
 
 
 def write(folder: Path, sections: Sequence[GyroSection], facts: Mapping[str, str]) -> Path:
-    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises OSError."""
+    """result.json and report.html into `folder`, each whole or not at all; returns the page. Raises as write_report."""
     data = {
         "format": FORMAT,
         "facts": dict(facts),

@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from psabench.report.whole_file import replace_file
+from psabench.link.own import replace_file
 
 PAGE = """<!doctype html>
 <html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width, initial-scale=1">
@@ -64,7 +64,7 @@ sub { font-size: .72em; line-height: 0; }
 def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: str = "result.json") -> Path:
     """Writes `data` and report.html into `folder` (made if missing), each whole or not at all; returns the page.
 
-    Raises OSError.
+    Raises OSError, OutputError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     replace_file(folder / json_name, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from psabench.boards.psd1 import waveform as waveform_psd1
-from psabench.errors import expected
+from psabench.errors import BenchError, expected
+from psabench.link.own import replace_file
 from psabench.link.vcd import Vcd, read_vcd
 from psabench.report.drawing import Panel, Section, Tag, need, render
 
@@ -154,11 +155,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"usage: python -m psabench.report.waveform RUN.vcd {'|'.join(pictures)} OUT.svg", file=sys.stderr)
         return 2
     try:
-        svg = pictures[args[1]](read_vcd(Path(args[0])))
-        Path(args[2]).write_text(svg, encoding="utf-8")
+        replace_file(Path(args[2]), pictures[args[1]](read_vcd(Path(args[0]))))
     except (OSError, ValueError) as err:
         print(f"waveform: {args[0]}: {err}", file=sys.stderr)
         return 2
+    except BenchError as err:
+        print(f"waveform: {err}", file=sys.stderr)
+        return err.exit_status
     return 0
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import NS, Bench, slices_s
-from psabench.errors import BadInput, BenchError, expected
+from psabench.errors import BenchError, expected
 from psabench.instruments import KINDS, Instrument
 from psabench.link.can_host import Message
+from psabench.link.own import replace_file
 from psabench.link.protocol_files import message_name
 from psabench.shell import dut
 from psabench.shell.commands import EVENTS, OBJECTS, Arg, Kind
@@ -127,10 +128,7 @@ def _expect(session: Context, args: Args) -> Mapping[str, Any]:
 def _save(session: Context, args: Args) -> Mapping[str, Any]:
     path = Path(str(args["file"]))
     text = session.transcript.script()
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as e:
-        raise BadInput(f"save {path}: {e.strerror}") from e
+    replace_file(path, text)
     return {"file": str(path), "lines": text.count("\n")}
 
 

@@ -2,13 +2,12 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import can
 import pytest
 from psabench.link import record as module
+from psabench.link.log_file import LogFile
 from psabench.link.record import record
 
 
@@ -32,23 +31,20 @@ def test_ctrl_c_falls_between_two_messages(
     path = tmp_path / f"bus{ending}"
     written = 0
 
-    @contextmanager
-    def interrupted(path: Path) -> Iterator[Callable[[can.Message], None]]:
-        def write(m: can.Message) -> None:
+    class Interrupted(LogFile):
+        def __call__(self, m: can.Message) -> bool:
             nonlocal written
             written += 1
             if when == "before" and written == 3:
                 os.kill(os.getpid(), signal.SIGINT)
-            log(m)
+            stored = super().__call__(m)
             if when == "after" and written == 3:
                 os.kill(os.getpid(), signal.SIGINT)
+            return stored
 
-        with can.Logger(str(path)) as log:
-            yield write
-
-    monkeypatch.setattr(module, "_writer", interrupted)
+    monkeypatch.setattr(module, "LogFile", Interrupted)
     handler = signal.getsignal(signal.SIGINT)
     recorded = record(Endless(), path, node=5, for_s=10.0, count=None)
     assert signal.getsignal(signal.SIGINT) is handler
     with can.LogReader(path) as logged:
-        assert len(list(logged)) == recorded.messages == 3
+        assert len(list(logged)) == recorded.stored == 3

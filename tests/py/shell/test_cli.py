@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from psabench import cli
 from psabench import options as arguments
-from psabench.link import lineport, record, record_command
+from psabench.link import lineport, log_file, record_command
 from psabench.link.protocol_files import dbc_node
 from psabench.procedures import command as run_command
 from psabench.procedures import compare_converters, gyro_params, run_table
@@ -364,7 +364,7 @@ def test_help_names_every_command_with_its_help_line(
 def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
     assert arguments.LINE_HZ == lineport.SAMPLE_HZ
     shown = re.findall(r"\.[a-z0-9]+", record_command.FORMATS)
-    assert set(shown) | {".mf4"} == {*record.FORMATS, ".mf4"}  # .mf4 with asammdf
+    assert set(shown) | {".mf4"} == {*log_file.FORMATS, ".mf4"}  # .mf4 with asammdf
     assert list(run_table.ON_THE_HEAD) == list(PROCEDURES)
     assert list(run_table.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
     assert run_table.COMPARE[0] == compare_converters.NAME

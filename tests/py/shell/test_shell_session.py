@@ -81,7 +81,7 @@ def test_a_session_is_saved_as_a_script_that_does_the_same(tmp_path: Path) -> No
 
 
 def test_where_it_cannot_be_saved_one_line_says_so() -> None:
-    with pytest.raises(BadInput, match="save /nowhere/x: No such file"):
+    with pytest.raises(BadInput, match="/nowhere/x: No such file"):
         Session(fake()[1]).do("save /nowhere/x")
 
 

@@ -192,6 +192,7 @@ class FakeBench:
             frames=7,
             late=1,
             lost=2,
+            files=(),
         )
 
 

@@ -1,0 +1,241 @@
+"""A log of python-can's formats of which one knows how much is on the disk.
+
+python-can's writers buffer, and one of them (SQLite) writes on a thread of its own, whose failure it does not report.
+Here a message counts when it is stored: after an error the file is cut behind its last whole record and read back.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import can
+from can.io.generic import MessageWriter, TextIOMessageWriter
+from can.io.logger import MESSAGE_WRITERS
+from can.io.mf4 import MF4Writer
+from typing_extensions import Buffer
+
+from psabench.errors import BadInput, BenchError, OutputError, expected, output_error
+from psabench.link.own import Owned
+from psabench.link.sqlite_errors import as_os_error
+
+FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
+MF4_MESSAGE, MF4_LEAST = 128, 65_536  # bytes of a message before compression, at most, and of the file's own blocks
+
+
+class LogFile:
+    """Writes messages into a file of its own. `error` is what ended it, if the machine did."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadInput for an unknown ending, a path that cannot be written, a file of another process."""
+        if path.suffix not in FORMATS:
+            raise BadInput(expected(f"an ending of {' '.join(FORMATS)}", path.suffix or "none", path))
+        self.path = path
+        self.error: BenchError | None = None
+        self._written = 0
+        self._owned = Owned(path)
+        try:
+            self._writer = WRITERS.get(path.suffix, MESSAGE_WRITERS[path.suffix])(path)
+        except NotImplementedError as e:
+            self._owned.release()
+            raise BadInput(f"{path}: {e}") from e
+        except OSError as e:
+            self._owned.release()
+            raise output_error(path, e) from e
+
+    def __call__(self, message: can.Message) -> bool:
+        """Write it; False when that, or what was written before it, failed: then `close` says what is stored."""
+        if self.error is None:
+            with self._errors_kept():
+                self._writer(message)
+                self._written += 1
+        return self.error is None
+
+    def check(self) -> bool:
+        """Push what is buffered out and see whether the file is there and has room. False: it is over."""
+        if self.error is None:
+            with self._errors_kept():
+                if isinstance(self._writer, TextIOMessageWriter):
+                    self._writer.file.flush()
+                elif isinstance(self._writer, Checked):
+                    self._writer.check()
+                if self._owned.gone():
+                    raise FileNotFoundError
+        return self.error is None
+
+    @contextmanager
+    def _errors_kept(self) -> Iterator[None]:
+        """Keeps the first error of the work."""
+        try:
+            yield
+        except OSError as e:
+            if self._owned.gone():
+                self.error = self.error or OutputError(f"{self.path}: moved, removed or replaced while it was written")
+            self.error = self.error or output_error(self.path, e)
+
+    def close(self) -> int:
+        """Close the file and return how many messages it holds."""
+        self.check()
+        with self._errors_kept():
+            self._writer.stop()
+        try:
+            return self._stored()
+        finally:
+            self._owned.release()
+
+    def _stored(self) -> int:
+        if self.error is None:
+            return self._written
+        if self._owned.gone() or not self.path.is_file():  # a device or a pipe cannot be read back
+            return 0
+        if isinstance(self._writer, Checked):
+            return self._writer.stored(self._written)
+        return _cut_lines(self.path)
+
+
+class Checked(MessageWriter):
+    """A writer that says what has failed and what it has stored. `stop` raises OSError for an error it kept."""
+
+    def check(self) -> None:
+        """Raises OSError for an error that the writer kept for itself, or that is about to come."""
+
+    def stored(self, written: int) -> int:
+        """Messages in the file, of those written, after `stop`."""
+        raise NotImplementedError
+
+
+class Whole(io.FileIO):
+    """An unbuffered file that takes all of the data or raises OSError."""
+
+    def write(self, data: Buffer, /) -> int:
+        view, done = memoryview(data), 0
+        while done < len(view):
+            done += super().write(view[done:]) or 0
+        return done
+
+
+class Blf(can.BLFWriter, Checked):
+    """A container that does not fit is taken back: the file ends with a whole one, and its header counts it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._cut = path, False
+        super().__init__(Whole(path, "wb"))
+
+    def _flush(self) -> None:
+        begin, size = self.file.tell(), self.uncompressed_size
+        try:
+            super()._flush()
+        except OSError:
+            self._cut, self.uncompressed_size = True, size
+            self._buffer, self._buffer_size = [], 0
+            self.file.seek(self.file.truncate(begin))
+            raise
+
+    def stop(self) -> None:
+        if self._cut:
+            messages = _read(self._path)
+            self.object_count = len(messages)
+            if messages and self.start_timestamp is not None:
+                self.stop_timestamp = self.start_timestamp + messages[-1]  # the header does not have the start yet
+        super().stop()
+
+    def stored(self, written: int) -> int:
+        return int(self.object_count)
+
+
+class Db(Checked):
+    """The table of python-can's SqliteWriter, which stops with what its thread has not yet stored, and says nothing."""
+
+    BATCH = 500  # messages of one transaction
+    TABLE = "(ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB)"
+
+    def __init__(self, path: Path) -> None:
+        self._rows: list[tuple[float, int, bool, bool, bool, int, bytes]] = []
+        self._stored = 0
+        with _sqlite_errors():
+            self._db = sqlite3.connect(path)
+            self._db.execute(f"CREATE TABLE IF NOT EXISTS messages {self.TABLE}")
+
+    def on_message_received(self, m: can.Message) -> None:
+        extended, remote, error = m.is_extended_id, m.is_remote_frame, m.is_error_frame
+        self._rows.append((m.timestamp, m.arbitration_id, extended, remote, error, m.dlc, bytes(m.data)))
+        if len(self._rows) >= self.BATCH:
+            self.check()
+
+    def check(self) -> None:
+        """Commit what was collected."""
+        with _sqlite_errors(), self._db:
+            self._db.executemany("INSERT INTO messages VALUES (?, ?, ?, ?, ?, ?, ?)", self._rows)
+        self._stored += len(self._rows)
+        self._rows.clear()
+
+    def stop(self) -> None:
+        try:
+            self.check()
+        finally:
+            self._db.close()
+
+    def stored(self, written: int) -> int:
+        return self._stored
+
+
+@contextmanager
+def _sqlite_errors() -> Iterator[None]:
+    try:
+        yield
+    except sqlite3.Error as e:
+        raise as_os_error(e) from e
+
+
+class Mf4(MF4Writer, Checked):
+    """The format is written at the end: the recording ends while there is room for it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._messages, self._saved = path, 0, False
+        super().__init__(path)
+
+    def on_message_received(self, m: can.Message) -> None:
+        super().on_message_received(m)
+        self._messages += 1
+
+    def check(self) -> None:
+        kept, free = MF4_MESSAGE * self._messages, shutil.disk_usage(self._path.parent).free
+        if free < kept + MF4_LEAST:
+            full = os.strerror(errno.ENOSPC)
+            raise OSError(errno.ENOSPC, f"{full}: {free} bytes are left, up to {kept} are kept until the end")
+
+    def stop(self) -> None:
+        try:
+            super().stop()
+            self._saved = True
+        finally:
+            if not self._saved:
+                os.truncate(self._path, 0)  # a part of such a file cannot be read
+
+    def stored(self, written: int) -> int:
+        return written if self._saved else 0
+
+
+WRITERS: dict[str, Callable[[Path], MessageWriter]] = {".blf": Blf, ".db": Db, ".mf4": Mf4}
+
+
+def _cut_lines(path: Path) -> int:
+    """Cut a file of lines behind its last whole one; how many messages it has."""
+    text = path.read_bytes()
+    os.truncate(path, text.rfind(b"\n") + 1)
+    if path.suffix == ".txt":  # printed messages, a line each; nothing reads them back
+        return text.count(b"\n")
+    return len(_read(path))
+
+
+def _read(path: Path) -> list[float]:
+    """Stamps of the messages in a file, which may hold none and no header."""
+    with suppress(EOFError, ValueError, StopIteration), can.LogReader(path) as messages:
+        return [m.timestamp for m in messages]
+    return []
