@@ -50,7 +50,11 @@ static _Noreturn void run_child(struct service *s, const struct options *o, int 
         fflush(out);
         _exit(SERVICE_MACHINE);
     }
-    ports_ready(&s->ports, o, out);
+    cJSON *endpoints = ports_endpoints(&s->ports, o);
+    char *text = cJSON_PrintUnformatted(endpoints);
+    fprintf(out, "%s\n", text ? text : "out of memory");
+    cJSON_free(text);
+    cJSON_Delete(endpoints);
     fclose(out);
     exit(service_live(s));
 }
@@ -72,13 +76,15 @@ static size_t read_all(int fd, char *text, size_t cap)
 
 static bool put_result(pid_t pid, char *text, cJSON *result, char *why)
 {
-    if (strncmp(text, failure, sizeof failure - 1) == 0 || !strstr(text, "ready all\n")) {
+    const bool failed = strncmp(text, failure, sizeof failure - 1) == 0;
+    cJSON *endpoints = failed ? NULL : cJSON_Parse(text);
+    if (!endpoints) {
         text[strcspn(text, "\n")] = '\0';
-        snprintf(why, CONTROL_WHY_MAX, "%.240s", text[0] ? text + sizeof failure - 1 : "the child ended at once");
+        snprintf(why, CONTROL_WHY_MAX, "%.240s", failed ? text + sizeof failure - 1 : "the child ended at once");
         return false;
     }
     cJSON_AddNumberToObject(result, "pid", pid);
-    ports_add_endpoints(result, text);
+    cJSON_AddItemToObject(result, "endpoints", endpoints);
     return true;
 }
 

@@ -75,8 +75,13 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     if (!i) return why_fail(why, cap, "--scpi %s: out of memory", o->arg);
     i->all = all;
     i->kind = kind;
-    i->port = (struct scpi_port){
-        .links = all->links, .opened = on_opened, .line = on_line, .busy = on_busy, .closed = on_closed, .ctx = i};
+    i->port = (struct scpi_port){.kind = kind->name,
+                                 .links = all->links,
+                                 .opened = on_opened,
+                                 .line = on_line,
+                                 .busy = on_busy,
+                                 .closed = on_closed,
+                                 .ctx = i};
     if (many && o->link) snprintf(i->link, sizeof i->link, "%s.%s", o->link, kind->name);
     const char *name = many && o->link ? i->link : o->link;
     const uint16_t port = o->port ? (uint16_t)(o->port + offset) : 0;
@@ -85,7 +90,11 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
         all->port[all->count++] = i;
         return true;
     }
+    const long owner = i->port.pty.owner;
     free(i);
+    if (err == -EBUSY)
+        return why_fail(why, cap, "--scpi %s: expected a link that no other process serves, got one of pid %ld", o->arg,
+                        owner);
     if (err == -EADDRINUSE)
         return why_fail(why, cap,
                         "--scpi %s: expected a free port of 127.0.0.1 or 0 (any free port), got %u, which is in use",
@@ -127,18 +136,6 @@ bool instruments_open(struct instruments *all, const struct options *o, char *wh
         if (!open_ports(all, &o->scpi[i], why, cap)) return false;
     }
     return true;
-}
-
-void instruments_ready(const struct instruments *all, FILE *out)
-{
-    for (unsigned k = 0; k < all->count; k++) {
-        const struct instrument *i = all->port[k];
-        const struct pty *pty = &i->port.pty;
-        if (!i->port.terminal) fprintf(out, "ready scpi=%s host=127.0.0.1 port=%u\n", i->kind->name, i->port.port);
-        else
-            fprintf(out, "ready scpi=%s pty=%s%s%s\n", i->kind->name, pty->path, pty->name ? " link=" : "",
-                    pty->name ? pty->name : "");
-    }
 }
 
 void instruments_close(struct instruments *all)

@@ -33,9 +33,6 @@ bool instruments_check(const struct instruments *all, const struct options *o, c
  * is closed by instruments_close() in either case. */
 bool instruments_open(struct instruments *all, const struct options *o, char *why, size_t cap);
 
-/* One `ready scpi=...` line for each. */
-void instruments_ready(const struct instruments *all, FILE *out);
-
 /* After anything that may have changed the bench: conditions of all sessions. */
 void instruments_look(struct instruments *all, int64_t t_ns);
 

@@ -4,7 +4,11 @@
 #include "bench/bench.h"
 
 #include <poll.h>
+#include <stdio.h>
 #include <time.h>
+
+#define BUSY_TURNS 32u                 /* one after the other with input: then a look at the signals */
+#define SLOW_NS    INT64_C(2000000000) /* wall time; a reader that is merely busy is back by then */
 
 /* ---- time */
 
@@ -72,6 +76,57 @@ static void advance_time(struct loop *l)
     }
 }
 
+/* ---- news of links */
+
+enum { NOTICES_MAX = 1000 }; /* a page that knocks without end must not fill a log */
+
+static void say_news(struct loop *l, const struct link *k, const char *what)
+{
+    char text[256];
+    if (l->notices > NOTICES_MAX) return;
+    const bool last = l->notices++ == NOTICES_MAX;
+    snprintf(text, sizeof text, "%s: %s", last ? "links" : k->who,
+             last ? "further news of this kind is left out" : what);
+    l->say(text);
+}
+
+static void say_notices(struct loop *l)
+{
+    for (struct link *k = l->links->first; k; k = k->next) {
+        if (k->notice) say_news(l, k, k->notice);
+        k->notice = NULL;
+    }
+}
+
+/* A run of step pace is over when its output has been taken. */
+static bool waits_for_rest(const struct loop *l)
+{
+    return l->run == LOOP_RUNNING && l->sched->now_ns == l->until_ns && links_pending(l->links) > 0;
+}
+
+static bool waits_for_reader(const struct loop *l)
+{
+    const bool moving = l->started && (l->pace->kind == PACE_FREE || l->run == LOOP_RUNNING);
+    return moving && l->pace->kind != PACE_WALL && (links_full(l->links) || waits_for_rest(l));
+}
+
+/* Each reader once, when time has waited SLOW_NS for it. */
+static void watch_readers(struct loop *l)
+{
+    if (!waits_for_reader(l)) {
+        l->full_since_ns = 0;
+        return;
+    }
+    const int64_t clock_ns = pace_clock_ns();
+    if (!l->full_since_ns) l->full_since_ns = clock_ns;
+    if (clock_ns - l->full_since_ns < SLOW_NS) return;
+    for (struct link *k = l->links->first; k; k = k->next) {
+        if (!(k->full || (k->pending && waits_for_rest(l))) || k->gone || k->slow) continue;
+        k->slow = true;
+        say_news(l, k, "does not read; simulated time waits for it");
+    }
+}
+
 /* ---- waiting */
 
 /* How long ppoll may sleep, real ns: 0 not at all, SCHED_NEVER until something happens. */
@@ -88,6 +143,8 @@ static int64_t timeout_ns(const struct loop *l)
         if (due_ns < SCHED_NEVER)
             wait_ns = min_ns(wait_ns, l->pace->origin_ns + (due_ns > at_ns ? due_ns : at_ns) - clock_ns);
     }
+    if (l->full_since_ns && clock_ns - l->full_since_ns < SLOW_NS)
+        wait_ns = min_ns(wait_ns, l->full_since_ns + SLOW_NS - clock_ns);
     const bool running = l->started && (l->pace->kind == PACE_FREE || l->run == LOOP_RUNNING);
     if (running && !links_full(l->links) && (l->pace->kind == PACE_FREE || l->sched->now_ns < l->until_ns)) return 0;
     if (l->run == LOOP_ARMED && l->taken(l->ctx, l->after_taken)) return 0;
@@ -151,6 +208,14 @@ static bool may_skip_poll(struct loop *l)
     return !l->links->first && l->started && l->pace->kind == PACE_FREE && l->pace->turns % TURNS != 0;
 }
 
+/* ppoll() with a descriptor that is ready returns without the signal that is pending, each time as long as a peer floods
+ * us: without descriptors it is taken. */
+static void take_signals(const sigset_t *unblocked)
+{
+    const struct timespec none = {0};
+    (void)ppoll(NULL, 0, &none, unblocked);
+}
+
 static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
 {
     struct link *polled[LOOP_LINKS_MAX];
@@ -161,10 +226,13 @@ static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
     const int64_t ns = timeout_ns(l);
     const struct timespec t = {.tv_sec = (time_t)(ns / 1000000000), .tv_nsec = (long)(ns % 1000000000)};
     const int ready = ppoll(p, n, ns == SCHED_NEVER ? NULL : &t, unblocked);
+    l->busy_turns = ready > 0 ? l->busy_turns + 1 : 0;
+    if (l->busy_turns % BUSY_TURNS == BUSY_TURNS - 1) take_signals(unblocked);
     /* Input is stamped with the simulated time of its arrival: first bring the simulation there. */
     if (ready > 0 && l->started && l->pace->kind == PACE_WALL) run_wall(l);
     if (ready > 0) serve_polled(l, polled, p, n);
     serve_timers(l);
+    say_notices(l);
     links_reap(l->links);
 }
 
@@ -207,6 +275,7 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
         const bool armed = l->run == LOOP_ARMED;
         if (!armed) advance_time(l);
         flush_all(l);
+        watch_readers(l);
         if (step_over(l)) {
             l->run = LOOP_IDLE;
             l->run_done(l->ctx);
@@ -230,6 +299,7 @@ void loop_drain(struct loop *l, int timeout_ms)
         if (poll(p, n, 10) > 0) serve_polled(l, polled, p, n);
         serve_timers(l);
         flush_all(l);
+        say_notices(l);
         links_reap(l->links);
         const size_t now = links_pending(l->links);
         if (now != last) progress_ns = pace_clock_ns();

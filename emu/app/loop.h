@@ -2,7 +2,7 @@
  *
  * A turn: run what is due at this pace, flush every link, wait for input or the next event, deliver input stamped with the
  * simulated instant, fire the links' timers, reap. In step and free pace time stands still while a link's output is above
- * its high-water mark, so that nothing is lost on the way to a slow reader. */
+ * its high-water mark, so that nothing is lost on the way to a slow reader; a reader that keeps it waiting is named. */
 #ifndef PSABENCH_APP_LOOP_H
 #define PSABENCH_APP_LOOP_H
 
@@ -12,7 +12,7 @@
 
 #include <signal.h>
 
-#define LOOP_LINKS_MAX 256u
+#define LOOP_LINKS_MAX 640u /* all that the endpoints of one emulator can have: ports.c */
 
 struct loop {
     struct sched *sched;
@@ -23,12 +23,16 @@ struct loop {
     void (*moved)(void *ctx, int64_t now_ns); /* after time has moved: traces and files follow */
     void (*run_done)(void *ctx);              /* a run of step pace is over and its output with the kernel */
     bool (*taken)(void *ctx, uint64_t count); /* so many frames of CAN clients, or no more before time moves */
+    void (*say)(const char *text);            /* news of a link, for the user */
     void *ctx;
     /* read-only outside loop.c */
     bool quit, started;
     enum { LOOP_IDLE, LOOP_ARMED, LOOP_RUNNING } run; /* step pace: ARMED waits for one look at all input */
     int64_t until_ns;                                 /* of the run */
     uint64_t after_taken;
+    int64_t full_since_ns; /* wall time since when time waits for a reader; 0: it does not */
+    unsigned notices;      /* said so far */
+    unsigned busy_turns;   /* one after the other, with a descriptor that was ready */
 };
 
 /* Runs until quit, end_ns, or *stop becomes non-zero: set by a handler of SIGINT or SIGTERM, which the caller has blocked

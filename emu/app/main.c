@@ -5,6 +5,7 @@
 #include "base/text.h"
 #include "base/why.h"
 #include "command/exact.h"
+#include "link/own_file.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -20,6 +21,15 @@ static int print_error(int status, const char *why)
     return status;
 }
 
+/* What was printed is out, or the reason why it is not. */
+static int end_stdout(void)
+{
+    char why[128];
+    if (fflush(stdout) == 0 && !ferror(stdout)) return SERVICE_DONE;
+    snprintf(why, sizeof why, "stdout: %s", strerror(errno));
+    return print_error(SERVICE_MACHINE, why);
+}
+
 static void override_scenario(struct scenario *s, const struct options *o)
 {
     if (o->seed_given) s->seed = o->seed;
@@ -30,17 +40,28 @@ static void override_scenario(struct scenario *s, const struct options *o)
     if (o->start) s->start = true;
 }
 
-/* The scenario with every key, to a file or, for NULL, to stdout. */
-static bool write_resolved(const struct scenario *s, const char *path)
+/* The scenario with every key. */
+static bool print_scenario(const struct scenario *s, FILE *out)
 {
     cJSON *j = scenario_dump(s);
     char *text = cJSON_Print(j);
-    FILE *out = path ? fopen(path, "wbe") : stdout;
-    bool ok = text && out && fprintf(out, "%s\n", text) >= 0;
-    if (out) ok = (path ? fclose(out) : fflush(out)) == 0 && ok;
+    errno = text ? 0 : ENOMEM;
+    const bool ok = text && fprintf(out, "%s\n", text) >= 0 && fflush(out) == 0;
     cJSON_free(text);
     cJSON_Delete(j);
     return ok;
+}
+
+/* --resolved: SERVICE_DONE, or the exit status with one line in why. */
+static int write_resolved(const struct scenario *s, const char *path, char *why, size_t cap)
+{
+    bool user = false;
+    FILE *out = own_file_output("--resolved ", path, &user, why, cap);
+    if (!out) return user ? SERVICE_INPUT : SERVICE_MACHINE;
+    const bool whole = print_scenario(s, out);
+    if (!whole) why_fail(why, cap, "--resolved %.800s: %s; the file is not complete", path, strerror(errno));
+    fclose(out);
+    return whole ? SERVICE_DONE : SERVICE_MACHINE;
 }
 
 /* The scenario of the snapshot or the options, and its bench. */
@@ -59,7 +80,7 @@ static int dump_scenario(const struct options *o, struct scenario *s, struct ben
 {
     char why[1024];
     if (!load_bench(o, NULL, s, bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
-    return write_resolved(s, NULL) ? SERVICE_DONE : print_error(SERVICE_MACHINE, "--dump: stdout cannot be written");
+    return print_scenario(s, stdout) ? SERVICE_DONE : print_error(SERVICE_MACHINE, "--dump: stdout cannot be written");
 }
 
 /* The scenario with every key as one line, its numbers to the last bit. The caller free()s it. */
@@ -76,10 +97,8 @@ static int run_bench(const struct options *o, const struct snapshot *from, struc
 {
     char why[1024];
     if (!load_bench(o, from, scenario, bench, why, sizeof why)) return print_error(SERVICE_INPUT, why);
-    if (o->resolved && !write_resolved(scenario, o->resolved)) {
-        snprintf(why, sizeof why, "--resolved %s: %s", o->resolved, strerror(errno));
-        return print_error(SERVICE_MACHINE, why);
-    }
+    const int resolved = o->resolved ? write_resolved(scenario, o->resolved, why, sizeof why) : SERVICE_DONE;
+    if (resolved != SERVICE_DONE) return print_error(resolved, why);
     const int watched = o->unit ? bench_find_unit(scenario, o->unit) : 0;
     if (watched < 0) {
         why_expected(why, sizeof why, "--unit", WHY_TEXT(o->unit), "a unit of the scenario");
@@ -96,7 +115,7 @@ static int run_bench(const struct options *o, const struct snapshot *from, struc
     free(line);
     if (!open) return print_error(refused ? SERVICE_INPUT : SERVICE_MACHINE, why);
     if (signal_number == SIGINT) return SERVICE_INT;
-    return service->vcd_failed ? SERVICE_MACHINE : SERVICE_DONE;
+    return service->incomplete ? SERVICE_MACHINE : SERVICE_DONE;
 }
 
 static int restore_bench(const struct options *o, struct scenario *scenario, struct bench *bench,
@@ -114,9 +133,10 @@ int main(int argc, char *argv[])
 {
     struct options o;
     char why[1024];
+    signal(SIGXFSZ, SIG_IGN); /* a limit of the file size is an error of write(), as a full disk is */
     if (!options_parse(argc, argv, &o, why, sizeof why)) return print_error(SERVICE_INPUT, why);
-    if (o.action == OPTIONS_HELP) return !options_print_help(stdout);
-    if (o.action == OPTIONS_VERSION) return puts("psa-emu " VERSION) < 0;
+    if (o.action == OPTIONS_HELP) options_print_help(stdout);
+    if (o.action == OPTIONS_VERSION) puts("psa-emu " VERSION);
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
     if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);
@@ -125,7 +145,7 @@ int main(int argc, char *argv[])
         if (!list_files(stdout, folder, why, sizeof why)) return print_error(SERVICE_MACHINE, why);
     }
     if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
-    if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return SERVICE_DONE;
+    if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return end_stdout();
     struct scenario *scenario = malloc(sizeof *scenario);
     struct bench *bench = malloc(sizeof *bench);
     struct service *service = malloc(sizeof *service);

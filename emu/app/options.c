@@ -2,6 +2,7 @@
 #include "app/options.h"
 
 #include "base/why.h"
+#include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
 
 #include <errno.h>
@@ -336,6 +337,8 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     *o = (struct options){
         .pace = PACE_WALL, .for_ns = INT64_MAX, .vcd_unit_ns = 10, .line_hz = 8000000, .truth_every_ns = 10000000};
     struct target t = {o, why, cap, NULL};
+    for (int i = 1; i < argc; i++) /* paths are repeated in JSON */
+        if (!utf8_valid(argv[i])) return why_fail(why, cap, "argument %d: expected UTF-8", i);
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
         return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");

@@ -1,18 +1,27 @@
-#define _GNU_SOURCE /* open_memstream, strtok_r */
 #include "app/ports.h"
 
+#include "app/loop.h"
 #include "base/why.h"
+#include "link/own_file.h"
 
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, int err)
+static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, int err, const struct pty *pty)
 {
     static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
-    return why_fail(why, cap, "%s%s: %s", option, arg, err == -EEXIST ? expected : strerror(-err));
+    if (err != -EBUSY) return why_fail(why, cap, "%s%s: %s", option, arg, err == -EEXIST ? expected : strerror(-err));
+    return why_fail(why, cap, "%s%s: expected a link that no other process serves, got one of pid %ld", option, arg,
+                    pty->owner);
 }
+
+/* Every link that there can be has its place in the loop: a listener and its clients, a pty and its watch. */
+_Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
+                                     INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
+                                     2 * OPTIONS_BUS_MAX + 3,
+               "LOOP_LINKS_MAX");
 
 /* ---- CAN */
 
@@ -32,7 +41,8 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
 static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
-    return !err || fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "", err);
+    return !err ||
+           fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "", err, &c->slcan.pty);
 }
 
 static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -59,8 +69,9 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
 
 static bool open_log(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
-    const int err = can_log_open(&c->log, hub->bus, hub->name, o->arg, hub->epoch_ns);
-    return !err || why_fail(why, cap, "--can log:%s: %s", o->arg, strerror(-err));
+    long owner = 0;
+    const int err = can_log_open(&c->log, hub->bus, hub->name, o->arg, hub->epoch_ns, &owner);
+    return !err || own_file_fail("--can log:", o->arg, err, owner, &c->refused, why, cap);
 }
 
 /* The hub of a bus, the first of all for no name; NULL: there is no such bus. */
@@ -94,6 +105,7 @@ static bool open_can(struct ports *p, const struct options *o, char *why, size_t
         c->hubs = all ? p->hubs : 1;
         c->bus = p->hubs > 1 && !all ? hub->name : NULL;
         if (!open[c->kind](hub, c, &o->can[i], why, cap)) {
+            p->refused = c->refused;
             free(c);
             return false;
         }
@@ -137,9 +149,10 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     p->line = calloc(1, sizeof *p->line);
     const int err = p->line ? line_pty_open(p->line, &p->links, &source, name) : -ENOMEM;
     if (!err) return true;
+    const struct pty pty = p->line ? p->line->pty : (struct pty){0};
     free(p->line);
     p->line = NULL;
-    return fail_pty(why, cap, "--line ", o->line, err);
+    return fail_pty(why, cap, "--line ", o->line, err, &pty);
 }
 
 /* ---- bus ports: cycles of the parallel buses of units as lines of text */
@@ -217,8 +230,9 @@ static bool open_bus_port(struct ports *p, struct bench *b, const struct options
         p->bus[p->bus_count++] = bus;
         return true;
     }
+    const struct pty pty = bus->pty.pty;
     free(bus);
-    return fail_pty(why, cap, "--bus-port ", o->arg, err);
+    return fail_pty(why, cap, "--bus-port ", o->arg, err, &pty);
 }
 
 static bool open_bus_ports(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
@@ -240,10 +254,12 @@ static void close_bus_port(struct bus_port *p)
 static bool open_socket(struct ctl_server *s, const char *option, const char *path, char *why, size_t cap)
 {
     if (!path) return true;
-    const int err = ctl_listen(s, path);
+    long owner = 0;
+    const int err = ctl_listen(s, path, &owner);
     if (!err) return true;
     if (err == -EADDRINUSE)
-        return why_fail(why, cap, "--%s %s: expected a free path, got one that another process uses", option, path);
+        return why_fail(why, cap, "--%s %s: expected a free path, got one that another process uses, pid %ld", option,
+                        path, owner);
     if (err == -EEXIST)
         return why_fail(why, cap, "--%s %s: expected a new path or a socket, got another file", option, path);
     if (err == -ENAMETOOLONG) return why_fail(why, cap, "--%s %s: expected a path of up to 107 bytes", option, path);
@@ -253,15 +269,17 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
 static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     if (!o->vcd) return true;
-    p->vcd = fopen(o->vcd, "wbe");
-    if (!p->vcd) return why_fail(why, cap, "--vcd %s: %s", o->vcd, strerror(errno));
-    return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns) ||
+    p->vcd = own_file_output("--vcd ", o->vcd, &p->refused, why, cap);
+    if (!p->vcd) return false;
+    return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns, 0) ||
            why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);
 }
 
 void ports_init(struct ports *p, struct bench *b, const struct options *o)
 {
-    p->control.listen.fd = p->truth.listen.fd = -1;
+    p->control.listen.link.fd = p->truth.listen.link.fd = -1;
+    p->control.name = "control socket";
+    p->truth.name = "truth port";
     p->control.links = p->truth.links = &p->links;
     p->scpi.links = &p->links;
     p->hubs = b->buses;
@@ -292,68 +310,113 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
-static void put_key(FILE *out, const char *key, const char *value)
+/* ---- what there is: one object for each endpoint, also the lines of standard output */
+
+static cJSON *add_endpoint(cJSON *all, const char *kind, const char *what)
 {
-    if (value) fprintf(out, " %s=%s", key, value);
+    cJSON *e = cJSON_CreateObject();
+    cJSON_AddStringToObject(e, kind, what);
+    cJSON_AddItemToArray(all, e);
+    return e;
 }
 
-static void put_pty(FILE *out, const struct pty *pty)
+static void add_key(cJSON *e, const char *key, const char *value)
 {
-    put_key(out, "pty", pty->path);
-    put_key(out, "link", pty->name);
+    if (value) cJSON_AddStringToObject(e, key, value);
 }
 
-static void ready_can(const struct ports_can *c, FILE *out)
+static void add_port(cJSON *e, unsigned port)
 {
-    fprintf(out, "ready ");
-    if (c->kind == OPTIONS_SOCKETCAND) fprintf(out, "can=socketcand host=127.0.0.1 port=%u", c->socketcand.port);
-    if (c->kind == OPTIONS_SLCAN) {
-        fprintf(out, "can=slcan");
-        put_pty(out, &c->slcan.pty);
-    }
+    char number[12];
+    snprintf(number, sizeof number, "%u", port);
+    add_key(e, "host", "127.0.0.1");
+    add_key(e, "port", number);
+}
+
+static void add_pty(cJSON *e, const struct pty *pty)
+{
+    add_key(e, "pty", pty->path);
+    add_key(e, "link", pty->name);
+}
+
+static void add_can(const struct ports_can *c, cJSON *all)
+{
+    static const char *const kinds[] = {
+        [OPTIONS_SOCKETCAND] = "socketcand", [OPTIONS_SLCAN] = "slcan", [OPTIONS_SOCKETCAN] = "socketcan"};
+    const bool log = c->kind == OPTIONS_CAN_LOG;
+    cJSON *e = add_endpoint(all, log ? "log" : "can", log ? c->log.path : kinds[c->kind]);
+    if (c->kind == OPTIONS_SOCKETCAND) add_port(e, c->socketcand.port);
+    if (c->kind == OPTIONS_SLCAN) add_pty(e, &c->slcan.pty);
     if (c->kind == OPTIONS_SOCKETCAN) {
-        const struct can_client *client = &c->socketcan.can;
-        fprintf(out, "can=socketcan channel=%s fd=%s", client->name, client->node.fd ? "true" : "false");
+        add_key(e, "channel", c->socketcan.can.name);
+        add_key(e, "fd", c->socketcan.can.node.fd ? "true" : "false");
     }
-    if (c->kind == OPTIONS_CAN_LOG) fprintf(out, "log=%s", c->log.path);
-    put_key(out, "bus", c->bus);
-    fprintf(out, "\n");
+    add_key(e, "bus", c->bus);
 }
 
-void ports_ready(const struct ports *p, const struct options *o, FILE *out)
+static void add_line(const struct ports *p, const struct options *o, cJSON *all)
 {
-    for (unsigned i = 0; i < p->can_count; i++) ready_can(p->can[i], out);
-    if (p->line) {
-        fprintf(out, "ready line=sampled hz=%" PRId64, o->line_hz);
-        put_pty(out, &p->line->pty);
-        fprintf(out, "\n");
-    }
+    char hz[24];
+    if (!p->line) return;
+    cJSON *e = add_endpoint(all, "line", "sampled");
+    snprintf(hz, sizeof hz, "%" PRId64, o->line_hz);
+    add_key(e, "hz", hz);
+    add_pty(e, &p->line->pty);
+}
+
+static void add_instrument(const struct instrument *i, cJSON *all)
+{
+    cJSON *e = add_endpoint(all, "scpi", i->kind->name);
+    if (i->port.terminal) add_pty(e, &i->port.pty);
+    else add_port(e, i->port.port);
+}
+
+cJSON *ports_endpoints(const struct ports *p, const struct options *o)
+{
+    cJSON *all = cJSON_CreateArray();
+    for (unsigned i = 0; i < p->can_count; i++) add_can(p->can[i], all);
+    add_line(p, o, all);
     for (unsigned i = 0; i < p->bus_count; i++) {
         const struct bus_port *b = p->bus[i];
-        fprintf(out, "ready bus=pty unit=%s", b->bench->scenario.units[b->unit].name);
-        put_pty(out, &b->pty.pty);
-        fprintf(out, "\n");
+        cJSON *e = add_endpoint(all, "bus", "pty");
+        add_key(e, "unit", b->bench->scenario.units[b->unit].name);
+        add_pty(e, &b->pty.pty);
     }
-    instruments_ready(&p->scpi, out);
-    if (o->vcd) fprintf(out, "ready vcd=%s\n", o->vcd);
-    if (o->control) fprintf(out, "ready control=%s\n", o->control);
-    if (o->truth) fprintf(out, "ready truth=%s\n", o->truth);
-    fprintf(out, "ready all\n");
-    fflush(out);
+    for (unsigned k = 0; k < p->scpi.count; k++) add_instrument(p->scpi.port[k], all);
+    if (o->vcd) add_endpoint(all, "vcd", o->vcd);
+    if (o->control) add_endpoint(all, "control", o->control);
+    if (o->truth) add_endpoint(all, "truth", o->truth);
+    return all;
 }
 
-bool ports_logs_whole(struct ports *p, void (*say)(const char *text))
+/* As it is, or as a string of JSON where a space, a quote or a control character would end it early. */
+static void put_value(const cJSON *value, FILE *out)
 {
-    bool whole = true;
-    for (unsigned i = 0; i < p->can_count; i++) {
-        char text[512];
-        const int err = p->can[i]->kind == OPTIONS_CAN_LOG ? can_log_flush(&p->can[i]->log) : 0;
-        if (!err) continue;
-        snprintf(text, sizeof text, "--can log:%.400s: %s; it is not complete", p->can[i]->log.path, strerror(-err));
-        say(text);
-        whole = false;
+    const char *text = value->valuestring;
+    bool plain = *text != '\0';
+    for (const char *c = text; *c; c++) plain &= (unsigned char)*c > ' ' && *c != '"' && *c != '\\';
+    char *quoted = plain ? NULL : cJSON_PrintUnformatted(value);
+    fputs(quoted ? quoted : text, out);
+    cJSON_free(quoted);
+}
+
+bool ports_ready(const struct ports *p, const struct options *o, FILE *out)
+{
+    cJSON *all = ports_endpoints(p, o);
+    const cJSON *e, *value;
+    cJSON_ArrayForEach(e, all)
+    {
+        fprintf(out, "ready");
+        cJSON_ArrayForEach(value, e)
+        {
+            fprintf(out, " %s=", value->string);
+            put_value(value, out);
+        }
+        fprintf(out, "\n");
     }
-    return whole;
+    fprintf(out, "ready all\n");
+    cJSON_Delete(all);
+    return fflush(out) == 0 && !ferror(out);
 }
 
 static void close_can(struct ports_can *c)
@@ -387,7 +450,7 @@ static void close_all(struct ports *p)
 void ports_close(struct ports *p)
 {
     close_all(p);
-    *p = (struct ports){.control.listen.fd = -1, .truth.listen.fd = -1};
+    *p = (struct ports){.control.listen.link.fd = -1, .truth.listen.link.fd = -1};
 }
 
 void ports_abandon(struct ports *p)
@@ -400,41 +463,4 @@ void ports_abandon(struct ports *p)
     for (unsigned i = 0; i < p->bus_count; i++) p->bus[i]->pty.pty.name = NULL;
     p->control.path = p->truth.path = "";
     close_all(p);
-}
-
-/* ---- the ready lines as JSON */
-
-/* ready key=value key=value: an object. */
-static void add_one(cJSON *endpoints, char *line)
-{
-    char *rest = NULL;
-    cJSON *e = cJSON_CreateObject();
-    for (char *word = strtok_r(line, " ", &rest); word; word = strtok_r(NULL, " ", &rest)) {
-        char *value = strchr(word, '=');
-        if (!value) continue;
-        *value = '\0';
-        cJSON_AddStringToObject(e, word, value + 1);
-    }
-    if (e->child) cJSON_AddItemToArray(endpoints, e);
-    else cJSON_Delete(e);
-}
-
-void ports_add_endpoints(cJSON *result, char *text)
-{
-    char *rest = NULL;
-    cJSON *endpoints = cJSON_AddArrayToObject(result, "endpoints");
-    for (char *line = strtok_r(text, "\n", &rest); line; line = strtok_r(NULL, "\n", &rest)) add_one(endpoints, line);
-}
-
-bool ports_describe(const struct ports *p, const struct options *o, cJSON *result)
-{
-    char *text = NULL;
-    size_t len;
-    FILE *out = open_memstream(&text, &len);
-    if (!out) return false;
-    ports_ready(p, o, out);
-    const bool whole = fclose(out) == 0;
-    if (whole) ports_add_endpoints(result, text);
-    free(text);
-    return whole;
 }

@@ -20,6 +20,7 @@ struct ports_can {
     enum options_can_kind kind;
     const char *bus; /* its bus where there are several; NULL: all of them, or the only one */
     unsigned hubs;   /* socketcand: how many it serves */
+    bool refused;    /* it could not be opened, and another path would do */
     union {
         struct socketcand_server socketcand;
         struct slcan_pty slcan;
@@ -47,31 +48,27 @@ struct ports {
     struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;
+    bool refused; /* a file could not be opened, and another path would do */
 };
 
 /* Whether the bench has the buses and instruments that the options name; nothing is opened. False with one line in why. */
 bool ports_check(struct ports *p, const struct bench *b, const struct options *o, char *why, size_t cap);
 
 /* Opens what the options ask for, checked; links and hubs of p are set up first with bench, epoch and say. False with one line in
- * why: what, where, what would be right. ports_close() in either case. */
+ * why: what, where, what would be right; p->refused: the fault is the user's. ports_close() in either case. */
 void ports_init(struct ports *p, struct bench *b, const struct options *o); /* the hubs; nothing is opened yet */
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap);
 
-/* Prints one `ready key=value ...` line for each endpoint, then `ready all`. */
-void ports_ready(const struct ports *p, const struct options *o, FILE *out);
-
-/* What the logs of frames still hold goes into their files; false when one of them is not complete, which is said. */
-bool ports_logs_whole(struct ports *p, void (*say)(const char *text));
+/* Prints one `ready key=value ...` line for each endpoint, then `ready all`. A value with a space, a quote or a control
+ * character is printed as a string of JSON. False: out did not take them. */
+bool ports_ready(const struct ports *p, const struct options *o, FILE *out);
 
 void ports_close(struct ports *p);
 
 /* In the child of a fork: closes all, but leaves the names of sockets and links to the parent, and the hubs as they are. */
 void ports_abandon(struct ports *p);
 
-/* Adds an array "endpoints", an object for each `ready key=value ...` line of text, which is cut up. */
-void ports_add_endpoints(cJSON *result, char *text);
-
-/* The same of open ports. False without memory. */
-bool ports_describe(const struct ports *p, const struct options *o, cJSON *result);
+/* An array, an object of strings for each endpoint: what the ready lines have. The caller's. */
+cJSON *ports_endpoints(const struct ports *p, const struct options *o);
 
 #endif

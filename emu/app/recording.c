@@ -1,41 +1,168 @@
-/* Recordings: VCD files of lines, the log of the truth. */
+/* Files that grow while the emulator runs: VCD of lines, logs of CAN buses, the log of the truth. Each is looked at after
+ * time has moved, and ends with a whole line and a word on stderr whatever ends it: full disk, limit, removed file. */
+#define _GNU_SOURCE /* fileno */
 #include "app/service.h"
+#include "link/own_file.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-void service_recording_error(struct service *s, const char *what_now)
+#define LOOK_NS INT64_C(1000000000) /* wall time between looks whether the files are still there */
+
+enum { STORED_MAX = 96, TAIL = 4096 };
+
+/* ---- what is left of a file */
+
+/* "stored 1310680 bytes, edges before 0.104 s": the last time of a VCD that ends with a whole line. */
+static void describe_vcd(struct service *s, char stored[STORED_MAX])
 {
-    const int err = vcd_error(&s->bench->vcd);
-    if (!err) return;
-    fprintf(stderr, "psa-emu: VCD file %s: %s; %s\n", s->vcd_path, strerror(err), what_now);
-    s->vcd_failed = true;
+    char tail[TAIL + 1];
+    const int fd = fileno(s->ports.vcd);
+    const off_t size = own_file_cut(fd), from = size > TAIL ? size - TAIL : 0;
+    const ssize_t n = size ? pread(fd, tail, (size_t)(size - from), from) : 0;
+    tail[n > 0 ? n : 0] = '\0';
+    const char *time = strrchr(tail, '#');
+    const double t_s = time ? (double)strtoll(time + 1, NULL, 10) * (double)s->bench->vcd.unit_ns * 1e-9 : 0.0;
+    snprintf(stored, STORED_MAX, "stored %lld bytes, edges before %.9f s", (long long)size, t_s);
 }
+
+/* A pipe or a device cannot be read back. */
+static void describe_stored(struct service *s, char stored[STORED_MAX])
+{
+    struct stat st;
+    const int fd = fileno(s->ports.vcd);
+    if (own_file_removed(fd)) snprintf(stored, STORED_MAX, "stored 0 bytes");
+    else if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode)) describe_vcd(s, stored);
+    else snprintf(stored, STORED_MAX, "wrote %" PRIu64 " bytes", s->bench->vcd.bytes);
+}
+
+/* One line on stderr. */
+static void report(const char *what, const char *path, const char *reason, const char *stored)
+{
+    fprintf(stderr, "psa-emu: %s %s: %s; %s; the run continues\n", what, path, reason, stored);
+}
+
+/* The limit of vcd.start is no fault: the exit status is that of the run. */
+static void end_vcd(struct service *s, int error)
+{
+    char stored[STORED_MAX], limit[64];
+    const struct vcd *v = &s->bench->vcd;
+    snprintf(limit, sizeof limit, "its limit of %g MB is reached", (double)v->max_bytes * 1e-6);
+    const char *reason = v->limited ? limit : own_file_strerror(error);
+    describe_stored(s, stored);
+    report("VCD file", s->vcd_path, reason, stored);
+    snprintf(s->vcd_why, sizeof s->vcd_why, "%.100s: %.64s; %.80s", s->vcd_path, reason, stored);
+    if (!v->limited) s->incomplete = true;
+}
+
+/* ---- looking */
+
+static void check_vcd(struct service *s, bool look)
+{
+    struct vcd *v = &s->bench->vcd;
+    if (look && !v->error && own_file_gone(fileno(s->ports.vcd), s->vcd_path)) {
+        vcd_flush(v); /* where it was moved to it is whole */
+        vcd_fail(v, ESTALE);
+    }
+    const int error = vcd_error(v);
+    if (error) end_vcd(s, error);
+}
+
+static void check_log(struct service *s, struct can_log *l, bool look)
+{
+    char stored[STORED_MAX];
+    if (look) can_log_look(l);
+    if (!l->error || l->reported) return;
+    l->reported = true;
+    snprintf(stored, sizeof stored, "stored %" PRIu64 " of %" PRIu64 " frames so far", l->stored, l->frames);
+    report("CAN log", l->path, own_file_strerror(l->error), stored);
+    s->incomplete = true;
+}
+
+static void check_truth(struct service *s, bool look)
+{
+    char stored[STORED_MAX];
+    struct truth_log *l = &s->truth_log;
+    if (look && own_file_gone(fileno(l->out), s->o->truth_log)) l->error = ESTALE;
+    if (!l->error || l->reported) return;
+    l->reported = true;
+    (void)own_file_cut(fileno(l->out));
+    snprintf(stored, sizeof stored, "stored %" PRIu64 " lines", own_file_removed(fileno(l->out)) ? 0 : l->lines);
+    report("truth log", s->o->truth_log, own_file_strerror(l->error), stored);
+    s->incomplete = true;
+}
+
+static void check_all(struct service *s, bool look)
+{
+    if (s->bench->recording) check_vcd(s, look);
+    for (unsigned i = 0; i < s->ports.can_count; i++)
+        if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) check_log(s, &s->ports.can[i]->log, look);
+    if (s->truth_log.out) check_truth(s, look);
+}
+
+void service_check_files(struct service *s)
+{
+    const int64_t now_ns = pace_clock_ns();
+    const bool look = now_ns >= s->look_ns;
+    if (look) s->look_ns = now_ns + LOOK_NS;
+    check_all(s, look);
+}
+
+void service_end_files(struct service *s)
+{
+    const bool recorded = s->bench->recording;
+    bench_finish(s->bench);
+    s->bench->recording = recorded; /* until its end was looked at */
+    for (unsigned i = 0; i < s->ports.can_count; i++)
+        if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) (void)can_log_flush(&s->ports.can[i]->log);
+    check_all(s, true);
+    s->bench->recording = false;
+    const bool reported = s->truth_log.reported;
+    const int error = truth_log_close(&s->truth_log);
+    if (!error || reported) return;
+    report("truth log", s->o->truth_log, own_file_strerror(error), "its end is missing");
+    s->incomplete = true;
+}
+
+/* ---- commands */
 
 static bool do_vcd_flush(void *ctx, char *why)
 {
     struct service *s = ctx;
-    if (s->bench->recording) vcd_flush(&s->bench->vcd);
-    else snprintf(why, CONTROL_WHY_MAX, "no recording; start one with --vcd FILE or vcd.start");
-    return s->bench->recording;
+    if (!s->bench->recording) {
+        snprintf(why, CONTROL_WHY_MAX, "no recording; start one with --vcd FILE or vcd.start");
+        return false;
+    }
+    vcd_flush(&s->bench->vcd);
+    check_vcd(s, true);
+    snprintf(why, CONTROL_WHY_MAX, "%s", s->vcd_why);
+    return !s->vcd_why[0];
 }
 
-static bool do_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
+static bool do_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why)
 {
     struct service *s = ctx;
+    bool user;
     if (s->bench->recording) {
         snprintf(why, CONTROL_WHY_MAX, "a recording is running; stop it with vcd.stop");
         return false;
     }
-    FILE *file = fopen(path, "wbe");
-    if (!file) {
-        snprintf(why, CONTROL_WHY_MAX, "%.200s: %s", path, strerror(errno));
+    struct stat st;
+    if (stat(path, &st) == 0 && S_ISFIFO(st.st_mode)) { /* all would stand still until it has a reader */
+        snprintf(why, CONTROL_WHY_MAX, "%.100s: expected a file, got a pipe; --vcd takes one", path);
         return false;
     }
+    FILE *file = own_file_output("", path, &user, why, CONTROL_WHY_MAX);
+    if (!file) return false;
     s->ports.vcd = file;
+    s->vcd_why[0] = '\0';
     snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
-    return bench_record(s->bench, unit, file, s->o->vcd_unit_ns);
+    return bench_record(s->bench, unit, file, s->o->vcd_unit_ns, max_bytes);
 }
 
 static bool do_vcd_stop(void *ctx, char *why)
@@ -45,11 +172,13 @@ static bool do_vcd_stop(void *ctx, char *why)
         snprintf(why, CONTROL_WHY_MAX, "no recording");
         return false;
     }
-    bench_record_end(s->bench);
-    service_recording_error(s, "the recording is incomplete");
+    vcd_close(&s->bench->vcd, s->bench->sched.now_ns - TRACE_LAG_NS);
+    check_vcd(s, true);
+    s->bench->recording = false;
     fclose(s->ports.vcd);
     s->ports.vcd = NULL;
-    return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s", s->vcd_why);
+    return !s->vcd_why[0];
 }
 
 const struct control_recording service_recording = {.start = do_vcd_start, .stop = do_vcd_stop, .flush = do_vcd_flush};
@@ -57,8 +186,47 @@ const struct control_recording service_recording = {.start = do_vcd_start, .stop
 bool service_open_truth_log(struct service *s, char *why, size_t cap)
 {
     if (!s->o->truth_log) return true;
-    FILE *out = fopen(s->o->truth_log, "wbe");
+    FILE *out = own_file_output("--truth-log ", s->o->truth_log, &s->refused, why, cap);
     if (out) truth_log_open(&s->truth_log, out, s->o->truth_every_ns, &s->truth, &s->bench->sched);
-    else snprintf(why, cap, "--truth-log %s: %s", s->o->truth_log, strerror(errno));
     return out != NULL;
+}
+
+/* ---- what there is, for counters */
+
+static cJSON *add_file(cJSON *files, const char *kind, const char *path, double bytes, int error)
+{
+    cJSON *f = cJSON_CreateObject();
+    cJSON_AddStringToObject(f, "kind", kind);
+    cJSON_AddStringToObject(f, "path", path);
+    cJSON_AddNumberToObject(f, "bytes", bytes);
+    if (error) cJSON_AddStringToObject(f, "error", own_file_strerror(error));
+    cJSON_AddItemToArray(files, f);
+    return f;
+}
+
+static double size_of(int fd)
+{
+    struct stat st;
+    return fstat(fd, &st) < 0 ? 0.0 : (double)st.st_size;
+}
+
+void service_describe_files(void *ctx, cJSON *result)
+{
+    const struct service *s = ctx;
+    cJSON *files = cJSON_AddArrayToObject(result, "files");
+    const struct vcd *v = &s->bench->vcd;
+    if (s->bench->recording) {
+        cJSON *f = add_file(files, "vcd", s->vcd_path, (double)(v->bytes + v->len), v->error);
+        if (v->max_bytes) cJSON_AddNumberToObject(f, "max_bytes", (double)v->max_bytes);
+    }
+    for (unsigned i = 0; i < s->ports.can_count; i++) {
+        const struct can_log *l = &s->ports.can[i]->log;
+        if (s->ports.can[i]->kind == OPTIONS_CAN_LOG)
+            add_file(files, "can log", l->path, size_of(l->fd) + (double)l->len, l->error);
+    }
+    if (s->truth_log.out)
+        add_file(files, "truth log", s->o->truth_log, size_of(fileno(s->truth_log.out)), s->truth_log.error);
+    cJSON *journal = cJSON_AddObjectToObject(result, "journal");
+    cJSON_AddNumberToObject(journal, "bytes", (double)s->journal.len);
+    cJSON_AddNumberToObject(journal, "max_bytes", JOURNAL_MAX);
 }

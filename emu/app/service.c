@@ -47,7 +47,10 @@ int service_run(struct service *s)
     sigaction(SIGPIPE, &ignore, NULL);
     sigaction(SIGCHLD, &ignore, NULL); /* forked benches go their own way */
     if (!s->powered) service_power_up(s);
-    ports_ready(&s->ports, s->o, stdout);
+    if (!ports_ready(&s->ports, s->o, stdout)) {
+        service_say("stdout: the ready lines could not be written");
+        s->incomplete = true;
+    }
     return run_and_drain(s);
 }
 
@@ -71,16 +74,9 @@ static void print_counters(struct service *s)
 
 void service_close(struct service *s)
 {
-    const bool recorded = s->bench->recording;
-    bench_finish(s->bench);
-    if (recorded) service_recording_error(s, "the recording is incomplete");
+    service_end_files(s);
     if (s->loop.started && !s->o->quiet) print_counters(s);
-    if (!truth_log_close(&s->truth_log)) {
-        fprintf(stderr, "psa-emu: --truth-log %s: the file is incomplete\n", s->o->truth_log);
-        s->vcd_failed = true;
-    }
     service_sweep_detached(s, true);
-    if (!ports_logs_whole(&s->ports, service_say)) s->vcd_failed = true;
     ports_close(&s->ports);
     control_run_forget(&s->control);
     journal_free(&s->journal);
@@ -92,5 +88,5 @@ int service_live(struct service *s)
     s->loop.quit = false;
     const int signal_number = run_and_drain(s);
     service_close(s);
-    return signal_number == SIGINT ? SERVICE_INT : s->vcd_failed ? SERVICE_MACHINE : SERVICE_DONE;
+    return signal_number == SIGINT ? SERVICE_INT : s->incomplete ? SERVICE_MACHINE : SERVICE_DONE;
 }

@@ -24,9 +24,11 @@ struct service {
     struct fault_engine faults;
     struct control control, truth;
     struct timeline timeline;
-    struct ctl_client *runner; /* who waits for the answer to `run` */
-    char vcd_path[1024];       /* of the recording, --vcd or vcd.start */
-    bool vcd_failed;           /* the recording is not complete, and this was reported */
+    struct ctl_client *runner;     /* who waits for the answer to `run` */
+    char vcd_path[4096];           /* of the recording, --vcd or vcd.start; Linux takes no longer path */
+    char vcd_why[CONTROL_WHY_MAX]; /* why it has ended early; "": it has not */
+    bool incomplete;               /* a file is not complete, and this was reported */
+    int64_t look_ns;               /* wall time of the next look whether the files are there */
     struct journal journal;
     const char *scenario; /* resolved, one line of JSON */
     bool powered;         /* the bench comes from a snapshot */
@@ -69,13 +71,16 @@ void service_print_clients(struct service *s);
 
 /* recording.c */
 extern const struct control_recording service_recording;
-void service_recording_error(struct service *s, const char *what_now); /* on stderr, if there is one */
+void service_check_files(struct service *s); /* what has failed is said, and ends whole */
+void service_end_files(struct service *s);   /* all goes into the files, and is looked at */
+void service_describe_files(void *ctx, cJSON *result);
 bool service_open_truth_log(struct service *s, char *why, size_t cap);
 
 /* service_save.c */
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);
 void service_journal(void *ctx, const struct control_command *row, const cJSON *args, bool done, int64_t t_ns);
-void service_follow(struct service *s); /* the journal begins */
+void service_follow(struct service *s);        /* the journal begins */
+void service_check_journal(struct service *s); /* says before it is full, and when */
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap);
 
 /* In the child of a fork, whose descriptors lead nowhere: everything of the parent's is closed but the bench. */

@@ -45,7 +45,7 @@ static void do_quit(void *ctx)
 static bool do_endpoints(void *ctx, cJSON *result)
 {
     const struct service *s = ctx;
-    return ports_describe(&s->ports, s->o, result);
+    return cJSON_AddItemToObject(result, "endpoints", ports_endpoints(&s->ports, s->o));
 }
 
 static void do_pace(void *ctx, struct control_pace *out)
@@ -86,6 +86,7 @@ static void make_view(struct service *s)
                                                  .snapshot = service_snapshot,
                                                  .fork = service_fork,
                                                  .endpoints = do_endpoints,
+                                                 .files = service_describe_files,
                                                  .journal = service_journal}};
     bench_view(b, &s->view);
     s->view.faults = &s->faults;
@@ -139,7 +140,8 @@ static void on_moved(void *ctx, int64_t now_ns)
     journal_moved(&s->journal);
     service_sweep_detached(s, false);
     snapshot_release_lines(&s->observers, s->bench);
-    if (s->bench->recording) service_recording_error(s, "the recording ends here, the run continues");
+    service_check_files(s);
+    service_check_journal(s);
 }
 
 static void run_done(void *ctx)
@@ -197,6 +199,7 @@ static void init_service(struct service *s, struct bench *b, const struct option
                             .moved = on_moved,
                             .run_done = run_done,
                             .taken = service_taken,
+                            .say = service_say,
                             .ctx = s};
     ports_init(&s->ports, b, o);
     service_follow(s);
@@ -230,5 +233,8 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     s->refused =
         (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, b, o, why, cap);
     if (o->until_eof) until_eof(&s->input, &s->ports.links, &s->loop.quit);
-    return !s->refused && ports_open(&s->ports, b, o, why, cap) && service_open_truth_log(s, why, cap);
+    if (s->refused) return false;
+    if (ports_open(&s->ports, b, o, why, cap)) return service_open_truth_log(s, why, cap);
+    s->refused = s->ports.refused;
+    return false;
 }

@@ -28,6 +28,12 @@ void service_follow(struct service *s)
     for (unsigned i = 0; i < s->ports.hubs; i++) journal_follow(&s->journal, &s->ports.hub[i], i);
 }
 
+void service_check_journal(struct service *s)
+{
+    char news[JOURNAL_NEWS_MAX];
+    if (journal_news(&s->journal, s->bench->sched.now_ns, news)) service_say(news);
+}
+
 bool service_restore(struct service *s, const struct snapshot *from, char *why, size_t cap)
 {
     struct snapshot_world w = {.bench = s->bench,

@@ -147,22 +147,17 @@ void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
     sched_ev(&b->power, on_power, b);
 }
 
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns)
+bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes)
 {
     struct unit *u = &b->unit[unit];
     const struct vcd_cfg cfg = {.out = out,
                                 .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
                                 .unit_ns = unit_ns,
+                                .max_bytes = max_bytes,
                                 .mask = TRACE_FIRST(u->type->line_count),
                                 .from_ns = b->sched.now_ns};
     b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));
     return b->recording;
-}
-
-void bench_record_end(struct bench *b)
-{
-    vcd_close(&b->vcd, b->sched.now_ns - TRACE_LAG_NS);
-    b->recording = false;
 }
 
 void bench_power_up(struct bench *b)

@@ -54,11 +54,9 @@ void bench_init(struct bench *b, const struct scenario *s, unsigned watched);
 /* Index of the unit of that name, or -1. */
 int bench_find_unit(const struct scenario *s, const char *name);
 
-/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. False: no such time unit. */
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns);
-
-/* Ends the recording TRACE_LAG_NS before now: what comes later may not all be known yet. */
-void bench_record_end(struct bench *b);
+/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. max_bytes: as struct vcd_cfg has
+ * it. False: no such time unit. */
+bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes);
 
 void bench_power_up(struct bench *b);
 

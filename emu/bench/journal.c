@@ -175,6 +175,27 @@ void journal_moved(struct journal *j)
     j->ran = true;
 }
 
+/* ---- how full it is */
+
+bool journal_news(struct journal *j, int64_t now_ns, char news[JOURNAL_NEWS_MAX])
+{
+    static const unsigned steps[] = {50, 90};
+    enum { STEPS = sizeof steps / sizeof *steps };
+    const double now_s = (double)now_ns * 1e-9;
+    if (j->lost && j->said <= STEPS) {
+        j->said = STEPS + 1;
+        snprintf(news, JOURNAL_NEWS_MAX, "input log: %s; snapshots are not possible from now on", j->lost);
+        return true;
+    }
+    if (j->said >= STEPS || j->len <= JOURNAL_MAX / 100 * steps[j->said]) return false;
+    snprintf(
+        news, JOURNAL_NEWS_MAX,
+        "input log: %u %% of %u MiB are used after %.0f s of simulated time; at this rate it is full at %.0f s, and "
+        "snapshots are not possible from then on",
+        steps[j->said++], JOURNAL_MAX >> 20, now_s, now_s * (double)JOURNAL_MAX / (double)j->len);
+    return true;
+}
+
 /* ---- reading */
 
 static bool get_count(const cJSON *json, const char *name, double max, double *out)

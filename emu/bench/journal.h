@@ -20,6 +20,7 @@
 
 #define JOURNAL_MAX      (64u << 20) /* bytes; a million frames and more */
 #define JOURNAL_LINE_MAX 8192u
+#define JOURNAL_NEWS_MAX 256u
 
 struct journal;
 
@@ -37,6 +38,7 @@ struct journal {
     size_t len, cap;
     const char *lost; /* why it is not complete; NULL: it is */
     int64_t last_ns;  /* of the last entry */
+    unsigned said;    /* announcements of how full it is */
     int64_t moved_ns; /* time stood still here since it last moved */
     bool ran;         /* what is due at last_ns has run since the last entry */
     uint64_t watched[CONTROL_UNITS_MAX];
@@ -58,6 +60,10 @@ void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c
 
 /* Time has moved: call after each run of the scheduler, before anything else comes in. */
 void journal_moved(struct journal *j);
+
+/* The next announcement, each once: half full, nearly full, with the instant at which it will be at the rate so far; lost.
+ * False: none is due. */
+bool journal_news(struct journal *j, int64_t now_ns, char news[JOURNAL_NEWS_MAX]);
 
 /* Clients that began or ceased to observe lines since time last moved; before the text is used. */
 void journal_watchers(struct journal *j);

@@ -8,6 +8,7 @@
 
 #include "control/control.h"
 
+#include <stdint.h>
 #include <stdio.h>
 
 struct truth_log {
@@ -15,7 +16,9 @@ struct truth_log {
     struct control *truth;
     struct sched *sched;
     int64_t every_ns;
-    bool failed; /* a line could not be written, or there is no memory */
+    int error; /* errno of the first line that could not be written; what follows is not */
+    uint64_t lines;
+    bool reported; /* the owner's: that it failed was said */
     struct sched_ev ev;
 };
 
@@ -23,7 +26,7 @@ struct truth_log {
  * commands of the truth port. */
 void truth_log_open(struct truth_log *l, FILE *out, int64_t every_ns, struct control *truth, struct sched *s);
 
-/* False: something is missing in the file. */
-bool truth_log_close(struct truth_log *l);
+/* 0, or the errno of the first line that is missing. */
+int truth_log_close(struct truth_log *l);
 
 #endif

@@ -52,7 +52,8 @@ struct control_sim { /* the time */
 };
 
 struct control_recording { /* of the lines of a unit, as VCD; start NULL: there is none */
-    bool (*start)(void *ctx, const char *path, unsigned unit, char *why);
+    /* max_bytes: where a recording ends by itself; 0: it does not. */
+    bool (*start)(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why);
     bool (*stop)(void *ctx, char *why);
     bool (*flush)(void *ctx, char *why);
 };
@@ -72,6 +73,7 @@ struct control_process { /* of the emulator; NULL: not here */
     bool (*snapshot)(void *ctx, const char *path, struct cJSON *result, char *why);
     bool (*fork)(void *ctx, const struct control_fork *f, struct cJSON *result, char *why);
     bool (*endpoints)(void *ctx, struct cJSON *result); /* adds "endpoints", where programs connect; false: no memory */
+    void (*files)(void *ctx, struct cJSON *result); /* adds "files" and "journal": what grows, and how large it is */
     /* A command that changes the bench's future was carried out; args as it was given. */
     void (*journal)(void *ctx, const struct control_command *row, const struct cJSON *args, bool done, int64_t t_ns);
 };

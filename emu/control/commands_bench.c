@@ -51,6 +51,7 @@ static enum control_outcome do_counters(const struct control_call *call)
     cJSON *control = cJSON_AddObjectToObject(call->result, "control");
     cJSON_AddNumberToObject(control, "commands", call->control->commands);
     cJSON_AddNumberToObject(control, "refused", call->control->refused);
+    if (call->bench->process.files) call->bench->process.files(call->bench->ctx, call->result);
     cJSON *units = cJSON_AddObjectToObject(call->result, "units");
     for (unsigned i = 0; i < call->bench->units; i++) {
         describe_unit_counters(call->bench, i, cJSON_AddObjectToObject(units, call->bench->unit[i]->cfg.name));
@@ -80,7 +81,7 @@ static const struct control_command rows[] = {
      CONTROL_ARGS({"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated time to run"},
       {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "wait until this many frames in all have come from CAN clients, or a client's queue of 128 is full; then run"}), .run = do_run},
     {"frames", "Reads the frame counters of each CAN client and its connection number (came): delivered, taken (received from it), dropped, overrun (lost in the kernel), refused (rejected).", NULL, .run = do_frames},
-    {"counters", "Reads the counters of pace, bus, clients and units, or of one unit.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
+    {"counters", "Reads the counters of pace, bus, clients, files, input log and units, or of one unit.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
     {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = describe_units},
     {"endpoints", "Lists the endpoints as the ready lines do: CAN adapters, instruments, line port, sockets.", NULL, .run = do_endpoints},
     {"unit.reset", "Resets a unit (PSA-2: a pulse on Res).", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_unit_reset, .changes = true},

@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#define VCD_LIMIT_MB 1000.0 /* some three minutes of a PSA-2 */
+
 static bool check_until(const struct control_bench *b, const struct control_value *v, struct control_error *why)
 {
     unsigned event;
@@ -60,7 +62,9 @@ static enum control_outcome do_vcd_start(const struct control_call *call)
 {
     const struct control_bench *b = call->bench;
     if (!b->recording.start || !b->units) return control_reject(call->control, "state", "no recordings on this bench");
-    const bool done = b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, call->control->error.why);
+    const double limit_mb = call->v[2].given ? call->v[2].real : VCD_LIMIT_MB;
+    const bool done = b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, (uint64_t)(limit_mb * 1e6),
+                                         call->control->error.why);
     return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
 
@@ -93,7 +97,8 @@ static const struct control_command rows[] = {
      CONTROL_ARGS({"what", CONTROL_CHOICE, true, .what = "topic", .choices = control_topics}), .run = do_unsubscribe},
     {"lines", "Reads the levels of a unit's lines; with a line fault, those of 0.2 ms ago.", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
     {"vcd.start", "Starts recording the lines of a unit to a VCD file. A converter word or STEP pulse that is in progress at the start is not recorded.",
-     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; an existing file is replaced"}, FIRST_UNIT), .run = do_vcd_start},
+     CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; an existing file is replaced"}, FIRST_UNIT,
+      {"limit_mb", CONTROL_REAL, true, "MB", 0.1, 1e6, .what = "size at which the recording ends; default: 1000", .def = VCD_LIMIT_MB}), .run = do_vcd_start},
     {"vcd.stop", "Stops the recording; it ends 0.2 ms before now, since later edges are not final.", NULL, .run = do_vcd_stop},
     {"vcd.flush", "Flushes the recording to the VCD file with a closing time (in the first 0.2 ms: the header only).", NULL, .run = do_vcd_flush},
 };

@@ -1,10 +1,14 @@
 #include "control/control.h"
 
 #include "command/args.h"
+#include "command/exact.h"
+#include "command/utf8.h"
 #include "control/commands.h"
 #include "control/internal.h"
 
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
@@ -79,6 +83,27 @@ void control_run_forget(struct control *c)
 
 /* ---- one line */
 
+#define ID_LIMIT 9007199254740992.0 /* 2^53: whole numbers below it come back as they were */
+
+static bool is_repeatable(const cJSON *id)
+{
+    const cJSON *item;
+    cJSON_ArrayForEach(item, id)
+    {
+        if (!is_repeatable(item)) return false;
+    }
+    return !cJSON_IsNumber(id) || fabs(id->valuedouble) < ID_LIMIT;
+}
+
+/* As text, with every digit of its numbers: cJSON would print fifteen. NULL for one that a reply could not repeat. */
+static cJSON *copy_id(cJSON *id)
+{
+    char *text = is_repeatable(id) ? exact_line(id) : NULL;
+    cJSON *copy = text ? cJSON_CreateRaw(text) : NULL;
+    free(text);
+    return copy;
+}
+
 static enum control_outcome dispatch_request(struct control *c, const cJSON *request, cJSON *result, int64_t t_ns)
 {
     if (!cJSON_IsObject(request)) {
@@ -100,14 +125,27 @@ static enum control_outcome dispatch_request(struct control *c, const cJSON *req
     return control_call(c, name->valuestring, cJSON_GetObjectItemCaseSensitive(request, "args"), result, t_ns);
 }
 
+/* cJSON would end the string there. */
+static bool has_escaped_nul(const char *line)
+{
+    for (const char *at = line; (at = strchr(at, '\\')) && at[1]; at += 2)
+        if (strncmp(at + 1, "u0000", 5) == 0) return true;
+    return false;
+}
+
 const char *control_line(struct control *c, const char *line, int64_t t_ns)
 {
-    cJSON *request = line ? cJSON_ParseWithOpts(line, NULL, true) : NULL; /* true: and nothing behind it */
+    const bool text = line && utf8_valid(line) && !has_escaped_nul(line);
+    cJSON *request = text ? cJSON_ParseWithOpts(line, NULL, true) : NULL; /* true: and nothing behind it */
     cJSON *result = cJSON_CreateObject();
-    cJSON *id = cJSON_DetachItemFromObjectCaseSensitive(request, "id");
+    cJSON *given = cJSON_DetachItemFromObjectCaseSensitive(request, "id"), *id = given ? copy_id(given) : NULL;
     c->commands++;
     c->started = NULL;
-    const enum control_outcome outcome = dispatch_request(c, request, result, t_ns);
+    enum control_outcome outcome = CONTROL_REJECTED;
+    if (line && !text) (void)control_reject(c, "syntax", "expected a line of UTF-8 without NUL");
+    else if (given && !id) (void)control_reject(c, "syntax", "id: expected numbers below 2^53 in it");
+    else outcome = dispatch_request(c, request, result, t_ns);
+    cJSON_Delete(given);
     cJSON_Delete(request);
     if (outcome != CONTROL_LATER) return control_reply(c, id, outcome == CONTROL_DONE, result, t_ns);
     cJSON_Delete(result);

@@ -1,3 +1,4 @@
+#include "command/utf8.h"
 #include "control/internal.h"
 
 #include <inttypes.h>
@@ -38,6 +39,7 @@ const char *control_reply(struct control *c, cJSON *id, bool ok, cJSON *result, 
     }
     cJSON_Delete(result);
     c->refused++;
+    utf8_clean(c->error.why); /* a name in it may have been cut within a character */
     cJSON *error = cJSON_AddObjectToObject(reply, "error");
     cJSON_AddStringToObject(error, "code", c->error.code);
     cJSON_AddStringToObject(error, "text", c->error.why);

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE /* accept4 */
+#define _GNU_SOURCE /* struct ucred, SOCK_NONBLOCK */
 #include "link/ctl_sock.h"
 
 #include <errno.h>
@@ -20,11 +20,14 @@ struct ctl_client {
 
 enum { OUT_MAX = 1 << 20, PUSH_HIGH = OUT_MAX / 2 };
 
+static const char no_text[] = "\xFF"; /* for a line with a NUL in it: what is behind that would be dropped unseen */
+
 static void on_line(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns)
 {
     struct ctl_client *c = (struct ctl_client *)t;
     if (r == LINES_LINE && strspn(line, " \t\r") == len) return;
     c->due = true;
+    if (r == LINES_LINE && memchr(line, '\0', len)) line = no_text;
     c->server->line(c->server->ctx, c, r == LINES_LINE ? line : NULL, t_ns);
 }
 
@@ -83,17 +86,38 @@ static void on_flush(struct link *l, int64_t t_ns)
     let_run(c);
 }
 
-static void on_connection(struct link *l, int64_t t_ns)
+/* Process at the other end, 0: not known. */
+static long peer_pid(int fd)
+{
+    struct ucred peer = {0};
+    socklen_t len = sizeof peer;
+    return getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &len) < 0 ? 0 : peer.pid;
+}
+
+static void turn_away(struct ctl_server *s, int fd)
+{
+    char reply[160];
+    const int n = snprintf(reply, sizeof reply,
+                           "{\"id\":null,\"ok\":false,\"error\":{\"code\":\"state\",\"text\":\"%s: expected up to %u "
+                           "clients, got one more\"}}\n",
+                           s->name, CTL_CLIENTS_MAX);
+    s->listen.link.notice = "too many clients: connection closed";
+    (void)!write(fd, reply, (size_t)n);
+    shutdown(fd, SHUT_WR); /* with input unread, close() alone would reset it, and the reply be lost */
+    close(fd);
+}
+
+static void on_connection(struct listener *l, int fd, int64_t t_ns)
 {
     struct ctl_server *s = (struct ctl_server *)l;
+    char who[LINK_WHO_MAX];
     (void)t_ns;
-    const int fd = accept4(l->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (fd < 0) return;
+    snprintf(who, sizeof who, "%s, client of pid %ld", s->name, peer_pid(fd));
     const struct text_link_cfg cfg = {
-        .fd = fd, .end = '\n', .line_max = CTL_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
+        .who = who, .fd = fd, .end = '\n', .line_max = CTL_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
     struct ctl_client *c = s->clients < CTL_CLIENTS_MAX ? text_link_new(sizeof *c, &cfg, &ops) : NULL;
     if (!c) {
-        close(fd);
+        turn_away(s, fd);
         return;
     }
     c->server = s;
@@ -103,43 +127,45 @@ static void on_connection(struct link *l, int64_t t_ns)
 }
 
 /* A socket without a server behind it is stale. 0 when the path may be used. */
-static int clear_path(const struct sockaddr_un *a)
+static int clear_path(const struct sockaddr_un *a, long *owner)
 {
     struct stat st;
     if (lstat(a->sun_path, &st) < 0) return 0;
     if (!S_ISSOCK(st.st_mode)) return -EEXIST;
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return -errno;
-    const bool alive = connect(fd, (const struct sockaddr *)a, sizeof *a) == 0;
+    const bool connected = connect(fd, (const struct sockaddr *)a, sizeof *a) == 0;
+    const bool alive = connected || errno == EAGAIN; /* its backlog is full */
+    *owner = connected ? peer_pid(fd) : 0;
     close(fd);
     if (alive) return -EADDRINUSE;
     unlink(a->sun_path);
     return 0;
 }
 
-int ctl_listen(struct ctl_server *s, const char *path)
+int ctl_listen(struct ctl_server *s, const char *path, long *owner)
 {
     struct sockaddr_un a = {.sun_family = AF_UNIX};
     if (strlen(path) >= sizeof a.sun_path) return -ENAMETOOLONG;
     strcpy(a.sun_path, path);
-    int err = clear_path(&a);
+    int err = clear_path(&a, owner);
     if (err) return err;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return -errno;
-    if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0 || listen(fd, 8) < 0) {
+    if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0 || listen(fd, LISTENER_BACKLOG) < 0) {
         err = -errno;
         close(fd);
         return err;
     }
     s->path = path;
-    s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
-    links_add_last(s->links, &s->listen);
+    listener_open(&s->listen, fd, s->name, on_connection);
+    links_add_last(s->links, &s->listen.link);
     return 0;
 }
 
 void ctl_close(struct ctl_server *s)
 {
-    if (s->listen.fd < 0) return;
-    link_close(&s->listen);
+    if (s->listen.link.fd < 0) return;
+    listener_close(&s->listen);
     unlink(s->path);
 }

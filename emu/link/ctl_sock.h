@@ -5,6 +5,7 @@
 #ifndef PSABENCH_LINK_CTL_SOCK_H
 #define PSABENCH_LINK_CTL_SOCK_H
 
+#include "link/listener.h"
 #include "link/text_link.h"
 
 #define CTL_LINE_MAX    4096u
@@ -13,7 +14,8 @@
 struct ctl_client;
 
 struct ctl_server {
-    struct link listen; /* first */
+    struct listener listen; /* first */
+    const char *name;       /* for messages: "control socket" */
     struct links *links;
     const char *path;
     uint32_t clients;
@@ -24,8 +26,9 @@ struct ctl_server {
 };
 
 /* The callbacks, ctx and links are filled in by the caller; path is kept by pointer. A socket left behind by a process that
- * has ended is replaced. 0, or -errno: -EADDRINUSE the socket is in use, -EEXIST the path is no socket, -ENAMETOOLONG. */
-int ctl_listen(struct ctl_server *s, const char *path);
+ * has ended is replaced. 0, or -errno: -EADDRINUSE the socket is in use by the process *owner (0: not known), -EEXIST the
+ * path is no socket, -ENAMETOOLONG. */
+int ctl_listen(struct ctl_server *s, const char *path, long *owner);
 void ctl_close(struct ctl_server *s); /* and removes the path */
 
 /* Sends one line (without its LF). */

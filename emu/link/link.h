@@ -10,12 +10,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum { LINK_WHO_MAX = 96 };
+
 struct link {
     int fd;            /* -1: not in use */
     bool want_read;    /* false: the loop leaves input in the kernel (back-pressure) */
     bool want_write;   /* true while output waits */
     bool full;         /* output is above its high-water mark: in step and free pace time stands still meanwhile */
     bool gone;         /* to be reaped: release() is the last call */
+    bool slow;         /* the loop's: said that time waits for it */
     size_t pending;    /* bytes of output not yet handed to the kernel */
     unsigned timer_ms; /* > 0: timer() is called once, this wall time from now; zeroed by the loop when it takes note */
     void (*readable)(struct link *l, int64_t t_ns);
@@ -23,8 +26,10 @@ struct link {
     void (*timer)(struct link *l, int64_t t_ns); /* may be NULL */
     void (*release)(struct link *l);             /* free what the link is in; may be NULL */
     void *ctx;
-    int64_t timer_due_ns; /* the loop's: wall time, 0 while none is armed */
-    struct link *next;    /* the loop's list */
+    char who[LINK_WHO_MAX]; /* in messages: what it is, and which one */
+    const char *notice;     /* news for the user, said by the loop: "<who>: <notice>" */
+    int64_t timer_due_ns;   /* the loop's: wall time, 0 while none is armed */
+    struct link *next;      /* the loop's list */
 };
 
 /* In order of service: a control socket comes after the CAN links, so that frames sent before a command arrive before it. */

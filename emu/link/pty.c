@@ -1,9 +1,12 @@
 #define _GNU_SOURCE /* ptsname_r, inotify */
 #include "link/pty.h"
 
+#include "link/own_file.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/inotify.h>
@@ -13,6 +16,13 @@
 /* Wall time from a going to the question who is left. Whoever opens the port again at once comes meanwhile, and his coming
  * is seen: while the kernel is asked, no one's is. */
 enum { ASK_MS = 37 };
+
+static int open_slave(const char *path)
+{
+    const int fd = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0) own_port_lock(fd);
+    return fd;
+}
 
 static int make_raw(int fd)
 {
@@ -34,7 +44,7 @@ static bool in_use(struct pty *p)
     inotify_rm_watch(p->watch.fd, p->watch_id); /* our own open and close are not a client's */
     close(p->slave);
     const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
-    p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    p->slave = open_slave(p->path);
     if (!used) make_raw(p->slave); /* the last one to close takes the settings along */
     start_watch(p);
     return used;
@@ -80,13 +90,17 @@ static void points_to(const char *name, char *path, size_t cap)
     path[n > 0 ? n : 0] = '\0';
 }
 
-/* A link to a pty is a leftover of ours; anything else belongs to another program. */
-static int make_name(const char *path, const char *name)
+/* A link to a pty that no process serves is a leftover of ours; anything else belongs to another program. The kernel gives the
+ * number of a leftover's pty to others: only a lock shows that it is served. */
+static int make_name(struct pty *p, const char *name)
 {
     char old[64];
     points_to(name, old, sizeof old);
-    if (strncmp(old, "/dev/pts/", 9) == 0) unlink(name);
-    return symlink(path, name) < 0 ? -errno : 0;
+    const bool ours = strncmp(old, "/dev/pts/", 9) == 0;
+    if (ours && strcmp(old, p->path) != 0) p->owner = own_port_owner(old);
+    if (p->owner) return -EBUSY;
+    if (ours) unlink(name);
+    return symlink(p->path, name) < 0 ? -errno : 0;
 }
 
 static int open_pair(struct pty *p)
@@ -97,7 +111,7 @@ static int open_pair(struct pty *p)
     p->line = p->master;
     const int err = ptsname_r(p->master, p->path, sizeof p->path);
     if (err) return -err;
-    p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    p->slave = open_slave(p->path);
     return p->slave < 0 ? -errno : make_raw(p->slave);
 }
 
@@ -111,14 +125,17 @@ static void watch_opens(struct pty *p)
         close(p->watch.fd);
         p->watch.fd = -1;
     }
-    if (p->watch.fd < 0) p->openers = 1;
+    snprintf(p->watch.who, sizeof p->watch.who, "pty %s", p->path);
+    if (p->watch.fd >= 0) return;
+    p->watch.notice = "no inotify instance is left (fs.inotify.max_user_instances): one client is assumed to be there";
+    p->openers = 1;
 }
 
 int pty_open(struct pty *p, const char *name)
 {
     *p = (struct pty){.master = -1, .slave = -1, .watch.fd = -1};
     int err = open_pair(p);
-    if (!err && name) err = make_name(p->path, name);
+    if (!err && name) err = make_name(p, name);
     if (err) {
         pty_close(p);
         return err;

@@ -1,4 +1,5 @@
 /* A pseudo-terminal that represents a serial port: raw, with a symbolic link to it; counts the programs that have it open.
+ * The slave is locked (own_file.h): who wants the same link sees that the port is served, and by whom.
  *
  * Our own descriptor of the slave stays open, so that the port and its settings outlive each client and the master never
  * reads an error. Clients are counted by watching the slave's node; where that cannot be done one client is assumed. */
@@ -17,13 +18,14 @@ struct pty {
     int line, watch_id; /* the master's descriptor, whoever owns it; inotify's number of the watch */
     char path[64];      /* /dev/pts/N */
     const char *name;   /* symbolic link to it, or NULL */
+    long owner;         /* after -EBUSY: process whose port the link leads to */
     int openers;        /* clients that have the slave open */
     void (*opened)(void *ctx, bool open, int64_t t_ns); /* first client came, last one left */
     void *ctx;
 };
 
 /* Opens the pair; the caller adds the watch to the loop's links. name: symbolic link to make (an old link to a pty is
- * replaced, anything else is rejected with -EEXIST); may be
+ * that no process serves is replaced; one that a process serves is rejected with -EBUSY, anything else with -EEXIST); may be
  * NULL. 0, or -errno with nothing left behind. */
 int pty_open(struct pty *p, const char *name);
 

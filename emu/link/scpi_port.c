@@ -3,6 +3,7 @@
 #include "link/tcp.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -67,15 +68,17 @@ static void on_release(struct link *l)
 static const struct text_link_ops tcp_ops = {
     .line = on_line, .ready = on_ready, .was_read = tcp_quick_ack, .closed = on_closed};
 
-static struct text_link_cfg link_cfg(int fd)
+static struct text_link_cfg link_cfg(const char *who, int fd)
 {
     return (struct text_link_cfg){
-        .fd = fd, .end = '\n', .line_max = SCPI_PORT_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
+        .who = who, .fd = fd, .end = '\n', .line_max = SCPI_PORT_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_MAX};
 }
 
 static struct scpi_peer *peer_new(struct scpi_port *port, int fd)
 {
-    const struct text_link_cfg cfg = link_cfg(fd);
+    char who[LINK_WHO_MAX];
+    snprintf(who, sizeof who, "scpi %s, client 127.0.0.1:%u", port->kind, tcp_peer_port(fd));
+    const struct text_link_cfg cfg = link_cfg(who, fd);
     struct scpi_peer *p = text_link_new(sizeof *p, &cfg, &tcp_ops);
     if (!p) return NULL;
     p->port = port;
@@ -86,14 +89,14 @@ static struct scpi_peer *peer_new(struct scpi_port *port, int fd)
     return NULL;
 }
 
-static void on_connection(struct link *l, int64_t t_ns)
+static void on_connection(struct listener *l, int fd, int64_t t_ns)
 {
     struct scpi_port *port = (struct scpi_port *)l;
     (void)t_ns;
-    const int fd = tcp_accept(l->fd);
-    if (fd < 0) return;
+    tcp_no_delay(fd);
     struct scpi_peer *p = port->clients < SCPI_PORT_CLIENTS_MAX ? peer_new(port, fd) : NULL;
     if (!p) {
+        l->link.notice = "too many clients: connection closed"; /* SCPI has no word for it */
         close(fd);
         return;
     }
@@ -107,8 +110,10 @@ int scpi_port_tcp(struct scpi_port *p, uint16_t port)
     const int fd = tcp_listen(&port);
     if (fd < 0) return fd;
     p->port = port;
-    p->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
-    links_add_first(p->links, &p->listen);
+    char who[LINK_WHO_MAX];
+    snprintf(who, sizeof who, "scpi %s, port %u", p->kind, port);
+    listener_open(&p->listen, fd, who, on_connection);
+    links_add_first(p->links, &p->listen.link);
     return 0;
 }
 
@@ -128,9 +133,11 @@ static const struct text_link_ops pty_ops = {.line = on_line, .ready = on_ready,
 
 int scpi_port_pty(struct scpi_port *p, const char *name)
 {
-    const struct text_link_cfg cfg = link_cfg(-1);
+    char who[LINK_WHO_MAX];
+    snprintf(who, sizeof who, "scpi %s", p->kind);
+    const struct text_link_cfg cfg = link_cfg(who, -1);
     struct scpi_peer *t = calloc(1, sizeof *t);
-    p->listen = (struct link){.fd = -1};
+    p->listen = (struct listener){.link.fd = -1, .spare = -1};
     if (t) t->port = p;
     int err = t && open_session(t) ? 0 : -ENOMEM;
     if (!err) err = text_link_open_pty(&t->io, &p->pty, &cfg, &pty_ops, p->links, name);
@@ -146,7 +153,7 @@ int scpi_port_pty(struct scpi_port *p, const char *name)
 
 void scpi_port_close(struct scpi_port *p)
 {
-    link_close(&p->listen);
+    listener_close(&p->listen);
     if (p->terminal) p->terminal->io.link.gone = true;
     if (p->terminal) pty_close(&p->pty);
     p->terminal = NULL;

@@ -6,6 +6,7 @@
 #ifndef PSABENCH_LINK_SCPI_PORT_H
 #define PSABENCH_LINK_SCPI_PORT_H
 
+#include "link/listener.h"
 #include "link/pty.h"
 #include "link/text_link.h"
 
@@ -15,7 +16,8 @@
 struct scpi_peer;
 
 struct scpi_port {
-    struct link listen; /* first: TCP; fd -1 of a pty */
+    struct listener listen; /* first: TCP; fd -1 of a pty */
+    const char *kind;       /* for messages */
     struct links *links;
     struct pty pty;
     struct scpi_peer *terminal; /* who sits at the pty */

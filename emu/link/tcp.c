@@ -1,5 +1,7 @@
-#define _GNU_SOURCE /* accept4 */
+#define _GNU_SOURCE /* SOCK_NONBLOCK */
 #include "link/tcp.h"
+
+#include "link/listener.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
@@ -18,7 +20,7 @@ int tcp_listen(uint16_t *port)
     const int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return -errno;
     setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&a, len) < 0 || listen(fd, 16) < 0 ||
+    if (bind(fd, (struct sockaddr *)&a, len) < 0 || listen(fd, LISTENER_BACKLOG) < 0 ||
         getsockname(fd, (struct sockaddr *)&a, &len) < 0) {
         const int err = errno;
         close(fd);
@@ -28,12 +30,17 @@ int tcp_listen(uint16_t *port)
     return fd;
 }
 
-int tcp_accept(int listener)
+void tcp_no_delay(int fd)
 {
     const int on = 1;
-    const int fd = accept4(listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (fd >= 0) setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    return fd;
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+uint16_t tcp_peer_port(int fd)
+{
+    struct sockaddr_in peer = {0};
+    socklen_t len = sizeof peer;
+    return getpeername(fd, (struct sockaddr *)&peer, &len) < 0 ? 0 : ntohs(peer.sin_port);
 }
 
 void tcp_quick_ack(int fd)

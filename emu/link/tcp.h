@@ -7,8 +7,11 @@
 /* Listens, non-blocking, at *port; 0: a free one, which is reported. The descriptor, or -errno. */
 int tcp_listen(uint16_t *port);
 
-/* A connection of a server, non-blocking, whose small segments go out at once; -1: none. */
-int tcp_accept(int listener);
+/* Small segments of a connection go out at once. */
+void tcp_no_delay(int fd);
+
+/* Port of the other end of a connection; 0: not known. */
+uint16_t tcp_peer_port(int fd);
 
 /* After a read: what is asked next need not wait for the acknowledgement of the packet before. */
 void tcp_quick_ack(int fd);

@@ -1,7 +1,9 @@
 #include "link/text_link.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 static void refresh_link(struct text_link *t)
@@ -19,6 +21,14 @@ static void end_link(struct text_link *t, int64_t t_ns)
     if (t->ops->closed) t->ops->closed(t, t_ns);
 }
 
+/* What it has sent is dropped: nothing of it is obeyed. */
+static void hang_up(struct text_link *t)
+{
+    t->link.notice = "HTTP or TLS, as a web browser sends it: connection closed";
+    t->in_pos = t->in_len = 0;
+    t->eof = true;
+}
+
 /* Hands over lines until there are no more or the owner takes no more. */
 static void take_lines(struct text_link *t, int64_t t_ns)
 {
@@ -28,10 +38,22 @@ static void take_lines(struct text_link *t, int64_t t_ns)
         size_t used;
         const enum lines_result r = lines_feed(&t->lines, t->in + t->in_pos, t->in_len - t->in_pos, &used);
         t->in_pos += used;
-        if (r != LINES_MORE) t->ops->line(t, r, t->lines.buf, t->lines.len, t_ns);
+        if (r == LINES_LINE && !t->pty && http_line(t->lines.buf, t->lines.len)) hang_up(t);
+        else if (r != LINES_MORE) t->ops->line(t, r, t->lines.buf, t->lines.len, t_ns);
     }
     t->taking = false;
     if (t->in_pos == t->in_len && t->eof) end_link(t, t_ns);
+}
+
+/* No protocol of ours begins like HTTP or TLS. A pty is not looked at: no page reaches it. */
+static bool is_browser(struct text_link *t)
+{
+    if (t->pty || t->first_len == sizeof t->first) return false;
+    const size_t room = sizeof t->first - t->first_len;
+    const size_t n = t->in_len < room ? t->in_len : room;
+    memcpy(t->first + t->first_len, t->in, n);
+    t->first_len += n;
+    return http_begins(t->first, t->first_len);
 }
 
 static void on_readable(struct link *l, int64_t t_ns)
@@ -44,6 +66,7 @@ static void on_readable(struct link *l, int64_t t_ns)
     t->in_pos = 0;
     t->in_len = n > 0 ? (size_t)n : 0;
     t->eof = n <= 0;
+    if (is_browser(t)) hang_up(t);
     take_lines(t, t_ns);
     refresh_link(t);
 }
@@ -73,6 +96,7 @@ static bool init_link(struct text_link *t, const struct text_link_cfg *cfg, cons
     }
     lines_init(&t->lines, line, cfg->line_max + 1, cfg->end);
     t->link = (struct link){.fd = cfg->fd, .want_read = true, .readable = on_readable, .flush = text_link_flush};
+    snprintf(t->link.who, sizeof t->link.who, "%s", cfg->who);
     return true;
 }
 
@@ -116,6 +140,7 @@ int text_link_open_pty(struct text_link *t, struct pty *p, const struct text_lin
         return -ENOMEM;
     }
     t->pty = p;
+    snprintf(t->link.who, sizeof t->link.who, "%s %s", cfg->who, p->path);
     t->link.fd = p->master;
     p->master = -1; /* the link's now */
     p->opened = on_opened;

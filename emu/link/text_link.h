@@ -6,6 +6,7 @@
 #ifndef PSABENCH_LINK_TEXT_LINK_H
 #define PSABENCH_LINK_TEXT_LINK_H
 
+#include "link/http.h"
 #include "link/lines.h"
 #include "link/link.h"
 #include "link/outbuf.h"
@@ -26,6 +27,7 @@ struct text_link_ops {
 };
 
 struct text_link_cfg {
+    const char *who; /* for messages, as of struct link */
     int fd;          /* non-blocking; owned by the link from here on. Not of a pty */
     char end;        /* of a line */
     size_t line_max; /* longest line */
@@ -40,11 +42,13 @@ struct text_link {
     struct lines lines;
     struct outbuf out;
     size_t out_high;
-    bool hold;   /* output is kept back */
-    bool stall;  /* the same, and no client waits for it */
-    bool taking; /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
-    bool eof;    /* the peer sends no more */
-    bool ended;  /* closed() has been called */
+    bool hold;             /* output is kept back */
+    bool stall;            /* the same, and no client waits for it */
+    bool taking;           /* lines are being handed over: an owner that flushes meanwhile is not handed the next one */
+    bool eof;              /* the peer sends no more */
+    bool ended;            /* closed() has been called */
+    char first[HTTP_LOOK]; /* what a socket's peer began with */
+    size_t first_len;
     char in[4096];
     size_t in_pos, in_len;
 };

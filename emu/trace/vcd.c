@@ -14,7 +14,12 @@ static char code_of(unsigned sig)
 static void write_out(struct vcd *v)
 {
     errno = 0;
+    if (!v->error && v->max_bytes && v->bytes + v->len > v->max_bytes) {
+        v->limited = true;
+        vcd_fail(v, EFBIG);
+    }
     if (!v->error && v->len > 0 && fwrite(v->buf, 1, v->len, v->out) != v->len) v->error = errno ? errno : EIO;
+    v->bytes += v->error ? 0 : v->len;
     v->len = 0;
 }
 
@@ -208,6 +213,7 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->trace = t;
     v->out = cfg->out;
     v->unit_ns = cfg->unit_ns;
+    v->max_bytes = cfg->max_bytes;
     if (!put_timescale(v, cfg->unit_ns)) return false;
     put_names(v, cfg->scope, cfg->mask);
     v->from_ns = cfg->from_ns > t->done_ns ? cfg->from_ns : t->done_ns;
@@ -242,4 +248,9 @@ int vcd_error(struct vcd *v)
     if (v->reported) return 0;
     v->reported = v->error != 0;
     return v->error;
+}
+
+void vcd_fail(struct vcd *v, int error)
+{
+    if (!v->error) v->error = error;
 }

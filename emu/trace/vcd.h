@@ -19,11 +19,12 @@
 #define VCD_BUF     65536u
 
 struct vcd_cfg {
-    FILE *out;         /* open for writing; not closed here */
-    const char *scope; /* no spaces; sigrok drops it, viewers show it */
-    uint32_t unit_ns;  /* 1, 10, 100, 1000 ..., 100000000 */
-    uint64_t mask;     /* bit i: signal i; the signals must have been added before */
-    int64_t from_ns;   /* the file begins here, or at the trace's done_ns when later: see vcd_open() */
+    FILE *out;          /* open for writing; not closed here */
+    const char *scope;  /* no spaces; sigrok drops it, viewers show it */
+    uint32_t unit_ns;   /* 1, 10, 100, 1000 ..., 100000000 */
+    uint64_t mask;      /* bit i: signal i; the signals must have been added before */
+    uint64_t max_bytes; /* a longer file ends with EFBIG; 0: any length */
+    int64_t from_ns;    /* the file begins here, or at the trace's done_ns when later: see vcd_open() */
 };
 
 struct vcd { /* read-only outside vcd.c */
@@ -43,8 +44,10 @@ struct vcd { /* read-only outside vcd.c */
     unsigned prefix_len;
     char prefix[24]; /* ... and four more */
     int error;       /* errno of the first write that failed */
+    bool limited;    /* EFBIG, at max_bytes */
     bool reported;
     uint64_t changes;
+    uint64_t bytes, max_bytes; /* handed to out */
     size_t len;
     char buf[VCD_BUF];
 };
@@ -63,5 +66,8 @@ void vcd_close(struct vcd *v, int64_t t_ns);
 
 /* errno of the first failed write, once; 0 if there is none, or none since. */
 int vcd_error(struct vcd *v);
+
+/* From outside: its file is lost, or large enough. Nothing more is written. */
+void vcd_fail(struct vcd *v, int error);
 
 #endif

@@ -244,7 +244,8 @@ static void listen_for_control(struct world *w)
     if (!mkdtemp(control_dir)) abort();
     (void)snprintf(control_path, sizeof control_path, "%s/control", control_dir);
     (void)atexit(remove_control);
-    if (ctl_listen(&w->control, control_path)) abort();
+    long owner = 0;
+    if (ctl_listen(&w->control, control_path, &owner)) abort();
 }
 
 /* Once: to open and close the port's watch takes the kernel 10 ms. The ports stay, those who use them come and go. */
@@ -256,7 +257,8 @@ static void open_ports(struct world *w)
     w->host = (struct can_node){.name = "host", .fd = true, .order = CAN_ORDER_FIFO};
     can_attach(&w->bus, &w->host);
     w->hub = (struct can_hub){.bus = &w->bus, .links = &w->links, .say = say};
-    w->control = (struct ctl_server){.links = &w->links, .line = on_line, .gone = on_gone, .ctx = w};
+    w->control =
+        (struct ctl_server){.links = &w->links, .name = "control socket", .line = on_line, .gone = on_gone, .ctx = w};
     if (socketcand_listen(&w->socketcand, &w->hub, 1, 0)) abort();
     if (slcan_pty_open(&w->slcan, &w->hub, NULL)) abort();
     listen_for_control(w);

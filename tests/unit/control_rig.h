@@ -59,9 +59,9 @@ static inline void on_push(void *ctx, void *client, const char *line)
     snprintf(asked.pushed, sizeof asked.pushed, "%s", line);
 }
 
-static inline bool on_vcd_start(void *ctx, const char *path, unsigned unit, char *why)
+static inline bool on_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why)
 {
-    (void)ctx;
+    (void)ctx, (void)max_bytes;
     snprintf(asked.path, sizeof asked.path, "%s", path);
     snprintf(why, CONTROL_WHY_MAX, "no room");
     asked.unit = unit;

@@ -1,10 +1,9 @@
-#define _GNU_SOURCE /* O_CLOEXEC */
 #include "link/can/can_log.h"
 
 #include "base/can_text.h"
+#include "link/own_file.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -29,15 +28,33 @@ static char *put_stamp(char *at, int64_t t_ns)
     return at + STAMP;
 }
 
+/* The lines that came before the error are stored, without what there is of the next one. */
+static void end_whole(struct can_log *l, size_t written)
+{
+    for (size_t i = 0; i < written; i++) l->stored += l->text[i] == '\n';
+    (void)own_file_cut(l->fd);
+}
+
 int can_log_flush(struct can_log *l)
 {
+    if (l->error) return -l->error;
     for (size_t at = 0; at < l->len && !l->error;) {
         const ssize_t n = write(l->fd, l->text + at, l->len - at);
         if (n > 0) at += (size_t)n;
         else if (n < 0 && errno != EINTR) l->error = errno;
+        if (l->error) end_whole(l, at);
     }
+    if (!l->error) l->stored = l->frames;
     l->len = 0;
     return -l->error;
+}
+
+void can_log_look(struct can_log *l)
+{
+    if (l->error || !own_file_gone(l->fd, l->path)) return;
+    (void)can_log_flush(l);
+    l->error = ESTALE;
+    if (own_file_removed(l->fd)) l->stored = 0;
 }
 
 static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
@@ -56,14 +73,15 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
 
 /* ---- file ---- */
 
-int can_log_open(struct can_log *l, struct can_bus *bus, const char *channel, const char *path, int64_t epoch_ns)
+int can_log_open(struct can_log *l, struct can_bus *bus, const char *channel, const char *path, int64_t epoch_ns,
+                 long *owner)
 {
     memset(l, 0, offsetof(struct can_log, text));
     l->channel = channel && *channel ? channel : "can0";
     l->path = path;
     l->epoch_ns = epoch_ns;
-    l->fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (l->fd < 0) return -errno;
+    l->fd = own_file_open(path, owner);
+    if (l->fd < 0) return l->fd;
     l->node = (struct can_node){.name = "log", .fd = true, .rx = on_frame, .error = on_frame, .ctx = l};
     can_attach(bus, &l->node);
     return 0;

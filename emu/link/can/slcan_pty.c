@@ -201,7 +201,7 @@ static const struct text_link_ops ops = {.line = on_line, .ready = on_ready, .op
 int slcan_pty_open(struct slcan_pty *s, struct can_hub *hub, const char *name)
 {
     static const struct text_link_cfg cfg = {
-        .end = '\r', .line_max = SLCAN_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
+        .who = "slcan", .end = '\r', .line_max = SLCAN_LINE_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
     *s = (struct slcan_pty){.hub = hub};
     const int err = text_link_open_pty(&s->io, &s->pty, &cfg, &ops, hub->links, name);
     if (err) return err;

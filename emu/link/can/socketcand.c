@@ -40,6 +40,8 @@ static enum socketcand_err decode_open(struct words *w, struct socketcand_msg *m
     const char *word;
     size_t len;
     if (!next_word(w, &word, &len) || len >= SOCKETCAND_CHANNEL_MAX) return SOCKETCAND_ARGS;
+    for (size_t i = 0; i < len; i++)
+        if (word[i] <= ' ' || word[i] > '~') return SOCKETCAND_ARGS; /* names of interfaces; it goes into messages */
     memcpy(m->channel, word, len);
     m->channel[len] = '\0';
     return no_more(w);

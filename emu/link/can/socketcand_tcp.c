@@ -246,8 +246,10 @@ static const struct text_link_ops client_ops = {
 
 static struct client *client_new(struct socketcand_server *s, int fd)
 {
+    char who[LINK_WHO_MAX];
+    snprintf(who, sizeof who, "socketcand client 127.0.0.1:%u", tcp_peer_port(fd));
     const struct text_link_cfg cfg = {
-        .fd = fd, .end = '>', .line_max = SOCKETCAND_MSG_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
+        .who = who, .fd = fd, .end = '>', .line_max = SOCKETCAND_MSG_MAX, .out_max = OUT_MAX, .out_high = OUT_HIGH};
     struct client *c = text_link_new(sizeof *c, &cfg, &client_ops);
     if (!c) return NULL;
     c->server = s;
@@ -261,17 +263,18 @@ static struct client *client_new(struct socketcand_server *s, int fd)
     return c;
 }
 
-static void on_connection(struct link *l, int64_t t_ns)
+static void on_connection(struct listener *l, int fd, int64_t t_ns)
 {
     struct socketcand_server *s = (struct socketcand_server *)l;
     const int size = SNDBUF;
-    const int fd = tcp_accept(l->fd);
-    if (fd < 0) return;
+    tcp_no_delay(fd);
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     struct client *c = s->clients < SOCKETCAND_CLIENTS_MAX ? client_new(s, fd) : NULL;
     if (!c) {
         static const char full[] = "< error 20000008 0.000000 too many clients >";
+        l->link.notice = "too many clients: connection closed";
         (void)!write(fd, full, sizeof full - 1);
+        shutdown(fd, SHUT_WR);
         close(fd);
         return;
     }
@@ -286,12 +289,14 @@ int socketcand_listen(struct socketcand_server *s, struct can_hub *hub, unsigned
     const int fd = tcp_listen(&port);
     if (fd < 0) return fd;
     *s = (struct socketcand_server){.hub = hub, .hubs = hubs, .port = port};
-    s->listen = (struct link){.fd = fd, .want_read = true, .readable = on_connection};
-    links_add_first(hub->links, &s->listen);
+    char who[LINK_WHO_MAX];
+    snprintf(who, sizeof who, "socketcand, port %u", port);
+    listener_open(&s->listen, fd, who, on_connection);
+    links_add_first(hub->links, &s->listen.link);
     return 0;
 }
 
 void socketcand_close(struct socketcand_server *s)
 {
-    link_close(&s->listen);
+    listener_close(&s->listen);
 }

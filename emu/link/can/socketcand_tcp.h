@@ -7,7 +7,7 @@
 #define PSABENCH_LINK_CAN_SOCKETCAND_TCP_H
 
 #include "link/can/can_hub.h"
-#include "link/link.h"
+#include "link/listener.h"
 
 #include <stdint.h>
 
@@ -18,7 +18,7 @@
 #define SOCKETCAND_PAD         64u  /* of messages in step and free pace, where they come in bursts: see socketcand.h */
 
 struct socketcand_server {
-    struct link listen;
+    struct listener listen;
     struct can_hub *hub; /* the buses, `hubs` in a row */
     unsigned hubs;       /* one: `open` takes any name; several: the name of a bus */
     uint16_t port;       /* bound */

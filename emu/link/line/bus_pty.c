@@ -85,7 +85,7 @@ static const struct text_link_ops text_ops = {.line = on_line, .ready = on_ready
 int bus_pty_open(struct bus_pty *p, struct links *links, const struct bus_pty_ops *ops, const char *name)
 {
     static const struct text_link_cfg cfg = {
-        .end = '\n', .line_max = BUS_TEXT_LINE_MAX + 1, .out_max = OUT_MAX, .out_high = OUT_MAX};
+        .who = "bus port", .end = '\n', .line_max = BUS_TEXT_LINE_MAX + 1, .out_max = OUT_MAX, .out_high = OUT_MAX};
     *p = (struct bus_pty){.ops = *ops};
     return text_link_open_pty(&p->io, &p->pty, &cfg, &text_ops, links, name);
 }

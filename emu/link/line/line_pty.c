@@ -1,5 +1,6 @@
 #include "link/line/line_pty.h"
 
+#include <stdio.h>
 #include <unistd.h>
 
 static void refresh_link(struct line_pty *p)
@@ -53,6 +54,7 @@ int line_pty_open(struct line_pty *p, struct links *links, const struct line_sou
     p->sampling = false;
     p->pos = p->len = 0;
     p->link = (struct link){.fd = p->pty.master, .want_read = true, .readable = on_readable, .flush = on_flush};
+    snprintf(p->link.who, sizeof p->link.who, "line port %s", p->pty.path);
     p->pty.opened = on_opened;
     p->pty.ctx = p;
     links_add_first(links, &p->link);

@@ -91,8 +91,8 @@ static struct bench *up(void)
         .sin_family = AF_INET, .sin_port = htons(r->server.port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     r->fd = socket(AF_INET, SOCK_STREAM, 0);
     assert_int_equal(connect(r->fd, (struct sockaddr *)&a, sizeof a), 0);
-    assert_true(readable(r->server.listen.fd));
-    r->server.listen.readable(&r->server.listen, 0);
+    assert_true(readable(r->server.listen.link.fd));
+    r->server.listen.link.readable(&r->server.listen.link, 0);
     read_text(r->fd, text, sizeof text);
     say_to(r, "< open can0 >");
     read_text(r->fd, text, sizeof text);
@@ -107,7 +107,7 @@ static struct bench *up(void)
 static void down(struct bench *r)
 {
     close(r->fd);
-    while (r->links.first != &r->server.listen) {
+    while (r->links.first != &r->server.listen.link) {
         struct link *l = r->links.first;
         assert_true(readable(l->fd));
         l->readable(l, r->s.now_ns);

@@ -177,8 +177,9 @@ static size_t contents(char *text, size_t cap)
 static void every_frame_becomes_a_line_with_its_instant(void **state)
 {
     char text[512];
+    long owner = 0;
     (void)state;
-    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", r.path, 1000000000), 0);
+    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", r.path, 1000000000, &owner), 0);
     sched_run_until(&r.s, 2000000);
     (void)say("{'cmd':'can.put','args':{'frame':'609#2F00210104'}}");
     (void)say("{'cmd':'can.put','args':{'frame':'12345678#R4'}}");
@@ -201,8 +202,9 @@ static void more_than_the_buffer_is_all_there(void **state)
 {
     enum { N = 3000 };
     static char text[N * 64];
+    long owner = 0;
     (void)state;
-    assert_int_equal(can_log_open(&r.log, &r.bus[0], NULL, r.path, 0), 0);
+    assert_int_equal(can_log_open(&r.log, &r.bus[0], NULL, r.path, 0, &owner), 0);
     for (unsigned i = 0; i < N; i++) {
         (void)say("{'cmd':'can.put','args':{'frame':'185#0011223344556677'}}");
         sched_run_until(&r.s, r.s.now_ns + 1000000);
@@ -214,9 +216,10 @@ static void more_than_the_buffer_is_all_there(void **state)
 
 static void a_file_that_takes_nothing_is_told_and_ends_the_writing(void **state)
 {
+    long owner = 0;
     (void)state;
-    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/nowhere/x.log", 0), -ENOENT);
-    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/dev/full", 0), 0);
+    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/nowhere/x.log", 0, &owner), -ENOENT);
+    assert_int_equal(can_log_open(&r.log, &r.bus[0], "can0", "/dev/full", 0, &owner), 0);
     (void)say("{'cmd':'can.put','args':{'frame':'609#00'}}");
     sched_run_until(&r.s, 1000000);
     assert_int_equal(can_log_flush(&r.log), -ENOSPC);

@@ -1,0 +1,26 @@
+/* A listening socket: hands out its connections, and turns away those that this process has no descriptor for.
+ *
+ * One descriptor is kept in reserve: with it such a connection is taken and closed, so that its peer knows at once and the
+ * loop does not turn for a connection that it cannot take. */
+#ifndef PSABENCH_LINK_LISTENER_H
+#define PSABENCH_LINK_LISTENER_H
+
+#include "link/link.h"
+
+struct listener {
+    struct link link; /* first */
+    /* A connection, non-blocking; the owner's from here on. */
+    void (*came)(struct listener *l, int fd, int64_t t_ns);
+    int spare;
+    bool exhausted; /* and this was said */
+};
+
+#define LISTENER_BACKLOG 128 /* connections that wait for a turn of the loop */
+
+/* fd listens already; who: for messages, "control socket". The caller adds the link to the loop's. */
+void listener_open(struct listener *l, int fd, const char *who, void (*came)(struct listener *l, int fd, int64_t t_ns));
+
+/* Harmless for one that is not open: link.fd -1. */
+void listener_close(struct listener *l);
+
+#endif
