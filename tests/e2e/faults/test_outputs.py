@@ -271,21 +271,34 @@ def test_a_recording_ends_at_its_limit_and_its_size_is_told_meanwhile(tmp_path: 
 
 
 def test_the_kernel_s_limit_of_a_file_is_not_called_the_recording_s(tmp_path: Path) -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, resource.RLIM_INFINITY))
-    try:
-        with Emulator("stream", cans=["none"], pace="step") as emulator:
-            assert emulator.control_path is not None
-            with Control(emulator.control_path) as control:
-                control.call("vcd.start", path=str(tmp_path / "x.vcd"))
-                control.call("run", for_s=5.0)
-                with pytest.raises(ControlError, match=r"x.vcd: File too large; stored \d+ bytes"):
-                    control.call("vcd.stop")
-            assert emulator.stop() == 3
-        done = psa_emu("stream", "--can", "none", "--for", SHORT, "--vcd", tmp_path / "y.vcd", "--quiet")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    with Emulator("stream", cans=["none"], pace="step") as emulator:
+        resource.prlimit(emulator.pid, resource.RLIMIT_FSIZE, (400_000, 400_000))
+        assert emulator.control_path is not None
+        with Control(emulator.control_path) as control:
+            control.call("vcd.start", path=str(tmp_path / "x.vcd"))
+            control.call("run", for_s=5.0)
+            with pytest.raises(ControlError, match=r"x.vcd: File too large; stored \d+ bytes"):
+                control.call("vcd.stop")
+        assert emulator.stop() == 3
+
+
+def test_a_limit_of_no_bytes_is_no_death_by_signal(tmp_path: Path) -> None:
+    argv = [
+        "sh",
+        "-c",
+        'ulimit -f 0; exec "$@"',
+        "sh",
+        str(find_emulator()),
+        "stream",
+        "--can",
+        "none",
+        "--for",
+        "10ms",
+    ]
+    argv += ["--resolved", str(tmp_path / "resolved.json")]
+    done = subprocess.run(argv, capture_output=True, text=True, check=False, timeout=TIMEOUT_S, cwd=ROOT)
     assert done.returncode == 3
-    assert "y.vcd: File too large" in one_line(done.stderr, "psa-emu")
+    assert "resolved.json: File too large" in one_line(done.stderr, "psa-emu")
 
 
 def test_a_pipe_does_not_stop_the_emulator(tmp_path: Path) -> None:
