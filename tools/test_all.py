@@ -61,9 +61,9 @@ STEPS: list[Step] = [
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: both lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"], tiers=REST),
-    Step("Python tests and golden traces", [*MAKE, "pytest", TIER], 1800, beside=True, builds=["bench-bin"]),
+    Step("Python tests and golden traces", [*MAKE, "pytest", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
-    Step("end to end on the host", [*MAKE, "e2e", TIER], 1800, beside=True, builds=["all"]),
+    Step("end to end on the host", [*MAKE, "e2e", TIER], 3600, beside=True, builds=["all"]),
     Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 1200, beside=True, builds=["all"]),
     Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
     Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"], tiers=REST),
