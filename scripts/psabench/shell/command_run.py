@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 
@@ -11,6 +12,8 @@ from psabench.options import of_fields
 from psabench.shell.connect import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
+
+LEAVE_S = 5  # real time after a signal
 
 
 def _opening(args: argparse.Namespace, pace: str | None) -> Opening:
@@ -36,6 +39,9 @@ def run_shell(args: argparse.Namespace) -> int:
 
 
 def _leave(number: int, _: object) -> None:
+    """Ends the program, also where an event loop has swallowed the exit: the emulator ends with its standard input."""
+    signal.signal(signal.SIGALRM, lambda *_: os._exit(128 + number))
+    signal.alarm(LEAVE_S)
     sys.exit(128 + number)
 
 
