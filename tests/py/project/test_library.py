@@ -12,8 +12,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from psabench import places
 from psabench.chips import Bench, parts
+from psabench.errors import BadInput
 from psabench.link.vcd import read_vcd
+from psabench.native import clib
 from psabench.native.navlib import PROTOTYPES as NAV_PROTOTYPES
 from psabench.native.navlib import library as nav_library
 from psabench.report.waveform import rdata_picture
@@ -93,6 +96,102 @@ def test_the_navigation_library_exports_its_headers_and_needs_no_runtime_of_anot
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert re.fullmatch(re.escape(version) + r" eigen-\d+\.\d+\.\d+", nav_library().version().decode())
     assert f"\nVersion: {version}\n" in (ROOT / "build/psabench-nav.pc").read_text()
+
+
+# ---- what Python declares of it ----
+
+
+C_TYPES: dict[str, object] = {
+    "void": None,
+    "int": ctypes.c_int,
+    "unsigned": ctypes.c_uint,
+    "uint8_t": ctypes.c_uint8,
+    "uint32_t": ctypes.c_uint32,
+    "uint64_t": ctypes.c_uint64,
+    "int64_t": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "double": ctypes.c_double,
+    "char *": ctypes.c_char_p,
+    "uint8_t *": ctypes.c_void_p,
+    "uint64_t *": ctypes.POINTER(ctypes.c_uint64),
+    "psabench *": ctypes.c_void_p,
+    "psabench_part *": ctypes.c_void_p,
+    "void *": ctypes.c_void_p,
+    "psabench_watch_fn *": clib.WATCH,
+    "psabench_input_fn *": clib.INPUT,
+    "psabench_frame_fn *": clib.FRAME,
+}
+TX = {"spi": (1, ctypes.c_char_p)}  # bytes go in as they are; ctypes has no other type for that
+
+
+def c_type(words: str) -> object:
+    words = re.sub(r"\bconst\b|\bstruct\b", "", words).strip()
+    named = re.fullmatch(r"(.*?[\s*])\w+", words)  # without the argument's name
+    return C_TYPES[re.sub(r"\s*\*", " *", (named[1] if named and words not in C_TYPES else words).strip())]
+
+
+def test_every_function_of_the_header_is_declared_as_it_is_there() -> None:
+    text = re.sub(r"/\*.*?\*/", "", HEADER, flags=re.DOTALL)
+    found: dict[str, tuple[object, ...]] = {}
+    for result, name, arguments in re.findall(r"^PSABENCH_API (.*?)psabench_(\w+)\((.*?)\);", text, re.M | re.S):
+        listed = [] if arguments == "void" else [c_type(a) for a in arguments.split(",")]
+        if name in TX:
+            at, kind = TX[name]
+            listed[at] = kind
+        found[name] = (c_type(f"{result}x"), *listed)
+    assert len(found) > 25
+    assert found == clib.PROTOTYPES
+
+
+def test_the_frame_has_the_layout_of_the_header(tmp_path: Path) -> None:
+    names = [name for name, *_ in clib.FrameStruct._fields_]
+    rows = "".join(
+        f'printf("%zu %zu\\n", offsetof(struct psabench_frame, {n}), sizeof((struct psabench_frame *)0)->{n});'
+        for n in names
+    )
+    program = tmp_path / "layout"
+    source = f'#include <psabench.h>\n#include <stdio.h>\nint main(void){{{rows}printf("%d\\n", PSABENCH_ABI);}}'
+    subprocess.run(
+        ["cc", "-x", "c", "-", "-I", ROOT / "emu/api", "-o", program], input=source, text=True, check=True, timeout=60
+    )
+    *layout, abi = subprocess.run([program], capture_output=True, text=True, check=True, timeout=10).stdout.splitlines()
+    fields = [getattr(clib.FrameStruct, n) for n in names]
+    assert layout == [f"{f.offset} {f.size}" for f in fields]
+    assert int(abi) == clib.ABI
+
+
+# ---- which library Python loads ----
+
+
+def fake_library(path: Path, source: str) -> str:
+    subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", path], input=source, text=True, check=True)
+    return str(path)
+
+
+def test_a_library_of_another_abi_is_refused(tmp_path: Path) -> None:
+    path = fake_library(tmp_path / "other.so", "int psabench_abi(void) { return 99; }")
+    with pytest.raises(BadInput, match=rf"^{path}: expected ABI 0 \(PSABENCH_LIB names another library\), got 99$"):
+        clib.Library(path)
+
+
+def test_a_library_that_lacks_a_function_is_refused(tmp_path: Path) -> None:
+    path = fake_library(tmp_path / "old.so", "int psabench_abi(void) { return 0; } int psabench_version(void);")
+    with pytest.raises(BadInput, match=r"expected a library of this version .*psabench_version"):
+        clib.Library(path)
+
+
+def test_the_environment_names_one_library_and_no_other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PSABENCH_LIB", "/nowhere/libpsabench.so.0")
+    monkeypatch.setattr(places, "CHECKOUT", tmp_path)  # nor is one there
+    with pytest.raises(
+        BadInput, match=r"expected a file at PSABENCH_LIB=/nowhere/libpsabench.so.0 \(make builds it\), got none"
+    ):
+        clib.library.__wrapped__()
+    text = tmp_path / "text"
+    text.write_text("not a library")
+    monkeypatch.setenv("PSABENCH_LIB", str(text))
+    with pytest.raises(BadInput, match=r"text: expected a shared library"):
+        clib.library.__wrapped__()
 
 
 # ---- an installation ----
