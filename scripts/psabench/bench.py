@@ -49,6 +49,15 @@ Board = TypeVar("Board", bound=Unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GrowingFile:
+    """A file that the emulator is writing."""
+
+    kind: str  # vcd, can log, truth log
+    size_bytes: int
+    error: str  # why it has ended early; "": it has not
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
     """How the bench is; None: the bench has no such instrument, or no control socket."""
 
@@ -60,7 +69,7 @@ class Status:
     frames: int  # CAN frames that this program has received
     late: int | None  # events that the emulator ran late
     lost: int  # samples missing between the frames received
-    files: tuple[tuple[str, float, str], ...]  # that grow: kind, bytes, why it has ended early or ""
+    files: tuple[GrowingFile, ...]
 
 
 class Bench(AbstractContextManager["Bench"]):
@@ -403,7 +412,10 @@ class Bench(AbstractContextManager["Bench"]):
             frames=sum(h.received for h in self.hosts.values()),
             late=counters.get("pace", {}).get("late"),
             lost=sum(u.frames.counters.lost for u in self.units.values()),
-            files=tuple((f["kind"], float(f["bytes"]), f.get("error", "")) for f in counters.get("files", ())),
+            files=tuple(
+                GrowingFile(kind=f["kind"], size_bytes=int(f["bytes"]), error=f.get("error", ""))
+                for f in counters.get("files", ())
+            ),
         )
 
     def _maybe(self, command: str, **args: object) -> dict[str, Any]:

@@ -33,16 +33,17 @@ class BadInput(BenchError):
 
 
 class OutputError(BenchError):
-    """The machine could not store what was to be written: full disk, quota, read error, file removed."""
+    """The machine could not store an output: full disk, quota, device error, file moved or removed."""
 
 
 def output_error(where: object, e: OSError, stored: str = "") -> BenchError:
     """The error of a file that could not be written: OutputError, or BadInput where another path would do.
 
-    stored: what of it is on the disk.
+    stored: what of it is on the disk. ESTALE: the file was moved, removed or replaced.
     """
     kind = OutputError if e.errno in MACHINE else BadInput
-    return kind("; ".join(filter(None, (f"{where}: {e.strerror or e}", stored))))
+    reason = "moved, removed or replaced while it was written" if e.errno == errno.ESTALE else e.strerror or e
+    return kind("; ".join(filter(None, (f"{where}: {reason}", stored))))
 
 
 class TimeOut(BenchError):

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.errors import BadInput, expected, output_error
-from psabench.link.sqlite_errors import as_os_error
+from psabench.link.own import sqlite_error
 
 FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
 APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
@@ -230,7 +230,7 @@ class Store(AbstractContextManager["Store"]):
         try:
             yield
         except BaseException:
-            if self._db.in_transaction:  # a full disk has ended it already: its error is the one to tell
+            if self._db.in_transaction:  # a full disk ends it by itself; report that error
                 self._do("ROLLBACK")
             raise
         self._do("COMMIT")
@@ -242,6 +242,6 @@ class Store(AbstractContextManager["Store"]):
         try:
             return self._db.execute(sql, values)
         except sqlite3.OperationalError as e:  # locked, read-only, disk full
-            raise output_error(self.path, as_os_error(e)) from e
+            raise output_error(self.path, sqlite_error(e)) from e
         except sqlite3.DatabaseError as e:
             raise BadInput(expected("a store of results", f"a damaged or other file ({e})", self.path)) from e

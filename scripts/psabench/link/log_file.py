@@ -1,4 +1,4 @@
-"""A log of python-can's formats of which one knows how much is on the disk.
+"""Logs in python-can's formats, with the number of messages that are on the disk.
 
 python-can's writers buffer, and one of them (SQLite) writes on a thread of its own, whose failure it does not report.
 Here a message counts when it is stored: after an error the file is cut behind its last whole record and read back.
@@ -7,7 +7,6 @@ Here a message counts when it is stored: after an error the file is cut behind i
 from __future__ import annotations
 
 import errno
-import io
 import os
 import shutil
 import sqlite3
@@ -19,11 +18,9 @@ import can
 from can.io.generic import MessageWriter, TextIOMessageWriter
 from can.io.logger import MESSAGE_WRITERS
 from can.io.mf4 import MF4Writer
-from typing_extensions import Buffer
 
-from psabench.errors import BadInput, BenchError, OutputError, expected, output_error
-from psabench.link.own import Owned
-from psabench.link.sqlite_errors import as_os_error
+from psabench.errors import BadInput, BenchError, expected, output_error
+from psabench.link.own import OutputFile, Owned, sqlite_error
 
 FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
 MF4_MESSAGE, MF4_LEAST = 128, 65_536  # bytes of a message before compression, at most, and of the file's own blocks
@@ -66,7 +63,7 @@ class LogFile:
                 elif isinstance(self._writer, Checked):
                     self._writer.check()
                 if self._owned.gone():
-                    raise FileNotFoundError
+                    raise OSError(errno.ESTALE, "moved")
         return self.error is None
 
     @contextmanager
@@ -75,9 +72,8 @@ class LogFile:
         try:
             yield
         except OSError as e:
-            if self._owned.gone():
-                self.error = self.error or OutputError(f"{self.path}: moved, removed or replaced while it was written")
-            self.error = self.error or output_error(self.path, e)
+            error = OSError(errno.ESTALE, "moved") if self._owned.gone() else e
+            self.error = self.error or output_error(self.path, error)
 
     def close(self) -> int:
         """Close the file and return how many messages it holds."""
@@ -110,22 +106,12 @@ class Checked(MessageWriter):
         raise NotImplementedError
 
 
-class Whole(io.FileIO):
-    """An unbuffered file that takes all of the data or raises OSError."""
-
-    def write(self, data: Buffer, /) -> int:
-        view, done = memoryview(data), 0
-        while done < len(view):
-            done += super().write(view[done:]) or 0
-        return done
-
-
 class Blf(can.BLFWriter, Checked):
     """A container that does not fit is taken back: the file ends with a whole one, and its header counts it."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._cut = path, False
-        super().__init__(Whole(path, "wb"))
+        super().__init__(OutputFile(path, "wb"))
 
     def _flush(self) -> None:
         begin, size = self.file.tell(), self.uncompressed_size
@@ -190,7 +176,7 @@ def _sqlite_errors() -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as e:
-        raise as_os_error(e) from e
+        raise sqlite_error(e) from e
 
 
 class Mf4(MF4Writer, Checked):

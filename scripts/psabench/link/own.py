@@ -1,4 +1,4 @@
-"""One process writes a file, and an error of writing names it: what was stored is said, nothing is lost in silence.
+"""Output files: one writing process, and errors that name the file and what it holds.
 
 The lock is flock's (advisory): the kernel drops it when the process ends, however it ends. fcntl's would end with the
 first descriptor of the file that this process closes, and SQLite unlocks it by itself. The emulator takes the same lock
@@ -11,6 +11,7 @@ import errno
 import fcntl
 import io
 import os
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import IO
 
 from typing_extensions import Buffer
 
-from psabench.errors import BadInput, OutputError, expected, output_error
+from psabench.errors import BadInput, expected, output_error
 
 LOCKS = Path("/proc/locks")  # proc(5): `1: FLOCK ADVISORY WRITE 708 00:13:26 0 EOF`, the last number the inode
 
@@ -73,32 +74,36 @@ def owner(fd: int) -> int | None:
     return found.get(True, found.get(False))
 
 
-class _Unstored(OSError):
-    """The file did not take what was written."""
+class Unstored(OSError):
+    """The file did not take what was written; not an error of whoever writes into it."""
 
 
-class _File(io.FileIO):
-    """A file whose errors differ from those of whoever writes into it."""
+class OutputFile(io.FileIO):
+    """An unbuffered file. A write takes all of the data or raises Unstored."""
 
     def write(self, data: Buffer, /) -> int:
+        view, done = memoryview(data), 0
         try:
-            return super().write(data) or 0
+            while done < len(view):
+                done += super().write(view[done:]) or 0
         except OSError as e:
-            raise _Unstored(e.errno, e.strerror) from e
+            raise Unstored(e.errno, e.strerror) from e
+        return done
 
     def sync(self) -> None:
+        """Wait until the disk has the data. Raises Unstored."""
         try:
             os.fsync(self.fileno())
         except OSError as e:
-            raise _Unstored(e.errno, e.strerror) from e
+            raise Unstored(e.errno, e.strerror) from e
 
 
 @contextmanager
 def output_text(path: Path, stored: Callable[[], str] = str) -> Iterator[IO[str]]:
-    """A text file to write, UTF-8, its ends of line as they are written; an earlier one is replaced.
+    """Open a UTF-8 text file for writing, without translation of line ends; an earlier file is replaced.
 
-    stored: what of it is in the file, for the message of an error. Raises BadInput and OutputError as Owned does, and
-    when the file cannot take all or has been removed. A file that is complete is with the disk.
+    stored: what the file holds, for the error message. Raises BadInput and OutputError as Owned does, when the file
+    cannot take all of the text, and when it was moved or removed. On return the disk has the data.
     """
     owned = Owned(path)
     try:
@@ -107,31 +112,25 @@ def output_text(path: Path, stored: Callable[[], str] = str) -> Iterator[IO[str]
             file.flush()
             if path.is_file():
                 raw.sync()
-            check_there(owned, stored)
-    except _Unstored as e:
+            if owned.gone():
+                raise Unstored(errno.ESTALE, "moved")
+    except Unstored as e:
         raise output_error(path, e, stored()) from e
     finally:
         owned.release()
 
 
-def _opened(path: Path) -> _File:
+def _opened(path: Path) -> OutputFile:
     try:
-        return _File(path, "w")
+        return OutputFile(path, "w")
     except OSError as e:
         raise output_error(path, e) from e
 
 
-def check_there(owned: Owned, stored: Callable[[], str] = str) -> None:
-    """Raises OutputError when the file has gone; stored: what had been written into it."""
-    if owned.gone():
-        text = f"{owned.path}: moved, removed or replaced while it was written"
-        raise OutputError("; ".join(filter(None, (text, stored()))))
-
-
 def replace_file(path: Path, text: str) -> None:
-    """Write a file in one stroke for whoever reads: it is there whole, or as it was before.
+    """Replace a file atomically: readers see the old text or the new text.
 
-    A device or a pipe is written as it is. Raises BadInput for a path that cannot be written, OutputError for a full
+    Devices and pipes are written directly. Raises BadInput for a path that cannot be written, OutputError for a full
     disk.
     """
     path = Path(os.path.realpath(path))  # a link stays one
@@ -149,3 +148,21 @@ def replace_file(path: Path, text: str) -> None:
     finally:
         with suppress(OSError):
             draft.unlink()
+
+
+SQLITE_ERRNO = {
+    sqlite3.SQLITE_FULL: errno.ENOSPC,
+    sqlite3.SQLITE_NOTADB: errno.EINVAL,
+    sqlite3.SQLITE_ERROR: errno.EINVAL,  # a table of another form
+    sqlite3.SQLITE_READONLY: errno.EACCES,
+    sqlite3.SQLITE_CANTOPEN: errno.EACCES,
+    sqlite3.SQLITE_BUSY: errno.EACCES,
+    sqlite3.SQLITE_LOCKED: errno.EACCES,
+}
+
+
+def sqlite_error(e: sqlite3.Error) -> OSError:
+    """SQLite's error as one of a file: ESTALE for a file that has moved, EIO for what is not in SQLITE_ERRNO."""
+    if e.sqlite_errorcode == sqlite3.SQLITE_READONLY_DBMOVED:
+        return OSError(errno.ESTALE, str(e))
+    return OSError(SQLITE_ERRNO.get(e.sqlite_errorcode & 0xFF, errno.EIO), str(e))

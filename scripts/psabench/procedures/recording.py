@@ -29,7 +29,7 @@ class CsvRecorder(AbstractContextManager["CsvRecorder"]):
         self._csv.writerow(COLUMNS)
 
     def __call__(self, r: Reading) -> None:
-        """Store a reading. Raises OSError, which leaving the context names the file of."""
+        """Store a reading. Raises Unstored; at the end of the context that becomes OutputError."""
         # repr of a float is the shortest text that reads back to the same bits
         row = (r.face.value if name == "face" else getattr(r, name) for name in COLUMNS)
         self._csv.writerow([repr(x) if isinstance(x, float) else x for x in row])

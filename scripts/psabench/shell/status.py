@@ -24,7 +24,7 @@ def line(s: Status, t_ns: int | None) -> str:
     if s.late is not None:
         parts.append(f"late {s.late}")
     parts.append(f"lost {s.lost}")
-    parts.extend(f"{kind}: {error}" if error else f"{kind} {size / 1e6:.1f} MB" for kind, size, error in s.files)
+    parts.extend(f"{f.kind}: {f.error}" if f.error else f"{f.kind} {f.size_bytes / 1e6:.1f} MB" for f in s.files)
     return " | ".join(parts)
 
 
