@@ -90,19 +90,13 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
         all->port[all->count++] = i;
         return true;
     }
-    const long owner = i->port.pty.owner;
+    char where[1024];
+    snprintf(where, sizeof where, "--scpi %s%s%s", o->arg, many && name ? ": " : "", many && name ? name : "");
+    const struct pty pty = i->port.pty;
     free(i);
-    if (err == -EBUSY)
-        return why_fail(why, cap, "--scpi %s: expected a link that no other process serves, got one of pid %ld", o->arg,
-                        owner);
-    if (err == -EADDRINUSE)
-        return why_fail(why, cap,
-                        "--scpi %s: expected a free port of 127.0.0.1 or 0 (any free port), got %u, which is in use",
-                        o->arg, port);
-    if (err == -EEXIST)
-        return why_fail(why, cap, "--scpi %s: expected a new name or a symbolic link to a pty, got another file at %s",
-                        o->arg, name);
-    return why_fail(why, cap, "--scpi %s: %s", o->arg, strerror(-err));
+    if (err != -EADDRINUSE) return pty_fail(&pty, where, err, why, cap);
+    return why_fail(why, cap, "%s: expected a free port of 127.0.0.1 or 0 (any free port), got %u, which is in use",
+                    where, port);
 }
 
 /* `all` are those that the scenario has, each at an offset of its own whatever else there is. */

@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <time.h>
 
-#define BUSY_TURNS 32u                 /* one after the other with input: then a look at the signals */
-#define SLOW_NS    INT64_C(2000000000) /* wall time; a reader that is merely busy is back by then */
+#define BUSY_TURNS 32u                 /* consecutive turns with input, then pending signals are taken */
+#define SLOW_NS    INT64_C(2000000000) /* wall time; a busy reader has read by then */
 
 /* ---- time */
 
@@ -78,15 +78,14 @@ static void advance_time(struct loop *l)
 
 /* ---- news of links */
 
-enum { NOTICES_MAX = 1000 }; /* a page that knocks without end must not fill a log */
+enum { NOTICES_MAX = 1000 }; /* a client that connects in a loop must not fill a log file */
 
 static void say_news(struct loop *l, const struct link *k, const char *what)
 {
     char text[256];
     if (l->notices > NOTICES_MAX) return;
     const bool last = l->notices++ == NOTICES_MAX;
-    snprintf(text, sizeof text, "%s: %s", last ? "links" : k->who,
-             last ? "further news of this kind is left out" : what);
+    snprintf(text, sizeof text, "%s: %s", last ? "links" : k->who, last ? "further messages are suppressed" : what);
     l->say(text);
 }
 
@@ -110,7 +109,7 @@ static bool waits_for_reader(const struct loop *l)
     return moving && l->pace->kind != PACE_WALL && (links_full(l->links) || waits_for_rest(l));
 }
 
-/* Each reader once, when time has waited SLOW_NS for it. */
+/* Reports each reader once, after time has waited SLOW_NS for it. */
 static void watch_readers(struct loop *l)
 {
     if (!waits_for_reader(l)) {
@@ -208,8 +207,8 @@ static bool may_skip_poll(struct loop *l)
     return !l->links->first && l->started && l->pace->kind == PACE_FREE && l->pace->turns % TURNS != 0;
 }
 
-/* ppoll() with a descriptor that is ready returns without the signal that is pending, each time as long as a peer floods
- * us: without descriptors it is taken. */
+/* ppoll() does not deliver a pending signal while a descriptor is ready, so a peer that floods us blocks signals. Without
+ * descriptors it delivers them. */
 static void take_signals(const sigset_t *unblocked)
 {
     const struct timespec none = {0};

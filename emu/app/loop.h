@@ -30,9 +30,9 @@ struct loop {
     enum { LOOP_IDLE, LOOP_ARMED, LOOP_RUNNING } run; /* step pace: ARMED waits for one look at all input */
     int64_t until_ns;                                 /* of the run */
     uint64_t after_taken;
-    int64_t full_since_ns; /* wall time since when time waits for a reader; 0: it does not */
+    int64_t full_since_ns; /* wall time at which simulated time began to wait for a reader; 0: it does not wait */
     unsigned notices;      /* said so far */
-    unsigned busy_turns;   /* one after the other, with a descriptor that was ready */
+    unsigned busy_turns;   /* consecutive turns with a ready descriptor */
 };
 
 /* Runs until quit, end_ns, or *stop becomes non-zero: set by a handler of SIGINT or SIGTERM, which the caller has blocked

@@ -11,13 +11,12 @@
 
 static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, int err, const struct pty *pty)
 {
-    static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
-    if (err != -EBUSY) return why_fail(why, cap, "%s%s: %s", option, arg, err == -EEXIST ? expected : strerror(-err));
-    return why_fail(why, cap, "%s%s: expected a link that no other process serves, got one of pid %ld", option, arg,
-                    pty->owner);
+    char where[1024];
+    snprintf(where, sizeof where, "%s%s", option, arg);
+    return pty_fail(pty, where, err, why, cap);
 }
 
-/* Every link that there can be has its place in the loop: a listener and its clients, a pty and its watch. */
+/* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
                                      2 * OPTIONS_BUS_MAX + 3,

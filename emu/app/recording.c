@@ -1,5 +1,5 @@
-/* Files that grow while the emulator runs: VCD of lines, logs of CAN buses, the log of the truth. Each is looked at after
- * time has moved, and ends with a whole line and a word on stderr whatever ends it: full disk, limit, removed file. */
+/* Files that grow while the emulator runs: VCD of lines, CAN logs, truth log. Each is checked after time has moved. A file
+ * that ends early (full disk, limit, removed file) ends with a whole line, and one line on stderr gives the reason. */
 #define _GNU_SOURCE /* fileno */
 #include "app/service.h"
 #include "link/own_file.h"
@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define LOOK_NS INT64_C(1000000000) /* wall time between looks whether the files are still there */
+#define LOOK_NS INT64_C(1000000000) /* wall time between two checks that the files are still there */
 
 enum { STORED_MAX = 96, TAIL = 4096 };
 
@@ -47,30 +47,35 @@ static void report(const char *what, const char *path, const char *reason, const
     fprintf(stderr, "psa-emu: %s %s: %s; %s; the run continues\n", what, path, reason, stored);
 }
 
-/* The limit of vcd.start is no fault: the exit status is that of the run. */
-static void end_vcd(struct service *s, int error)
+enum { REASON_MAX = 64 };
+
+static void describe_reason(const struct vcd *v, char reason[REASON_MAX])
 {
-    char stored[STORED_MAX], limit[64];
-    const struct vcd *v = &s->bench->vcd;
-    snprintf(limit, sizeof limit, "its limit of %g MB is reached", (double)v->max_bytes * 1e-6);
-    const char *reason = v->limited ? limit : own_file_strerror(error);
-    describe_stored(s, stored);
-    report("VCD file", s->vcd_path, reason, stored);
-    snprintf(s->vcd_why, sizeof s->vcd_why, "%.100s: %.64s; %.80s", s->vcd_path, reason, stored);
-    if (!v->limited) s->incomplete = true;
+    if (v->limited) snprintf(reason, REASON_MAX, "its limit of %g MB is reached", (double)v->max_bytes * 1e-6);
+    else snprintf(reason, REASON_MAX, "%s", own_file_strerror(v->error));
 }
 
-/* ---- looking */
+/* The limit of vcd.start is no fault: the exit status is that of the run. */
+static void end_vcd(struct service *s)
+{
+    char stored[STORED_MAX], reason[REASON_MAX];
+    describe_reason(&s->bench->vcd, reason);
+    describe_stored(s, stored);
+    report("VCD file", s->vcd_path, reason, stored);
+    snprintf(s->vcd_why, sizeof s->vcd_why, "%.100s: %s; %.80s", s->vcd_path, reason, stored);
+    if (!s->bench->vcd.limited) s->incomplete = true;
+}
+
+/* ---- checks */
 
 static void check_vcd(struct service *s, bool look)
 {
     struct vcd *v = &s->bench->vcd;
     if (look && !v->error && own_file_gone(fileno(s->ports.vcd), s->vcd_path)) {
-        vcd_flush(v); /* where it was moved to it is whole */
+        vcd_flush(v); /* a moved file is complete up to now */
         vcd_fail(v, ESTALE);
     }
-    const int error = vcd_error(v);
-    if (error) end_vcd(s, error);
+    if (vcd_error(v)) end_vcd(s);
 }
 
 static void check_log(struct service *s, struct can_log *l, bool look)
@@ -105,8 +110,16 @@ static void check_all(struct service *s, bool look)
     if (s->truth_log.out) check_truth(s, look);
 }
 
+static bool has_files(const struct service *s)
+{
+    bool log = false;
+    for (unsigned i = 0; i < s->ports.can_count; i++) log |= s->ports.can[i]->kind == OPTIONS_CAN_LOG;
+    return log || s->bench->recording || s->truth_log.out;
+}
+
 void service_check_files(struct service *s)
 {
+    if (!has_files(s)) return;
     const int64_t now_ns = pace_clock_ns();
     const bool look = now_ns >= s->look_ns;
     if (look) s->look_ns = now_ns + LOOK_NS;
@@ -117,7 +130,7 @@ void service_end_files(struct service *s)
 {
     const bool recorded = s->bench->recording;
     bench_finish(s->bench);
-    s->bench->recording = recorded; /* until its end was looked at */
+    s->bench->recording = recorded; /* for check_all() */
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) (void)can_log_flush(&s->ports.can[i]->log);
     check_all(s, true);
@@ -153,7 +166,7 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t ma
         return false;
     }
     struct stat st;
-    if (stat(path, &st) == 0 && S_ISFIFO(st.st_mode)) { /* all would stand still until it has a reader */
+    if (stat(path, &st) == 0 && S_ISFIFO(st.st_mode)) { /* opening it waits for a reader, and the emulator with it */
         snprintf(why, CONTROL_WHY_MAX, "%.100s: expected a file, got a pipe; --vcd takes one", path);
         return false;
     }
@@ -193,13 +206,13 @@ bool service_open_truth_log(struct service *s, char *why, size_t cap)
 
 /* ---- what there is, for counters */
 
-static cJSON *add_file(cJSON *files, const char *kind, const char *path, double bytes, int error)
+static cJSON *add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error)
 {
     cJSON *f = cJSON_CreateObject();
     cJSON_AddStringToObject(f, "kind", kind);
     cJSON_AddStringToObject(f, "path", path);
     cJSON_AddNumberToObject(f, "bytes", bytes);
-    if (error) cJSON_AddStringToObject(f, "error", own_file_strerror(error));
+    if (error) cJSON_AddStringToObject(f, "error", error);
     cJSON_AddItemToArray(files, f);
     return f;
 }
@@ -210,22 +223,33 @@ static double size_of(int fd)
     return fstat(fd, &st) < 0 ? 0.0 : (double)st.st_size;
 }
 
+static const char *error_text(int error)
+{
+    return error ? own_file_strerror(error) : NULL;
+}
+
+static void add_vcd(cJSON *files, const struct service *s)
+{
+    char reason[REASON_MAX];
+    const struct vcd *v = &s->bench->vcd;
+    describe_reason(v, reason);
+    cJSON *f = add_file(files, "vcd", s->vcd_path, (double)(v->bytes + v->len), v->error ? reason : NULL);
+    if (v->max_bytes) cJSON_AddNumberToObject(f, "max_bytes", (double)v->max_bytes);
+}
+
 void service_describe_files(void *ctx, cJSON *result)
 {
     const struct service *s = ctx;
+    const struct truth_log *truth = &s->truth_log;
     cJSON *files = cJSON_AddArrayToObject(result, "files");
-    const struct vcd *v = &s->bench->vcd;
-    if (s->bench->recording) {
-        cJSON *f = add_file(files, "vcd", s->vcd_path, (double)(v->bytes + v->len), v->error);
-        if (v->max_bytes) cJSON_AddNumberToObject(f, "max_bytes", (double)v->max_bytes);
-    }
+    if (s->bench->recording) add_vcd(files, s);
     for (unsigned i = 0; i < s->ports.can_count; i++) {
         const struct can_log *l = &s->ports.can[i]->log;
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG)
-            add_file(files, "can log", l->path, size_of(l->fd) + (double)l->len, l->error);
+            add_file(files, "can log", l->path, size_of(l->fd) + (double)l->len, error_text(l->error));
     }
-    if (s->truth_log.out)
-        add_file(files, "truth log", s->o->truth_log, size_of(fileno(s->truth_log.out)), s->truth_log.error);
+    if (truth->out)
+        add_file(files, "truth log", s->o->truth_log, size_of(fileno(truth->out)), error_text(truth->error));
     cJSON *journal = cJSON_AddObjectToObject(result, "journal");
     cJSON_AddNumberToObject(journal, "bytes", (double)s->journal.len);
     cJSON_AddNumberToObject(journal, "max_bytes", JOURNAL_MAX);

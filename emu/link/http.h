@@ -1,5 +1,5 @@
-/* Web pages must not reach the ports: a browser sends a page's POST to any port of this machine, and the lines in its body
- * would be obeyed. Every text port looks at how a connection begins and hangs up on HTTP and TLS. */
+/* Recognises HTTP and TLS on a text port. A web page can make a browser POST to any port of this machine; without this check
+ * the port would execute the lines of the body. */
 #ifndef PSABENCH_LINK_HTTP_H
 #define PSABENCH_LINK_HTTP_H
 

@@ -1,7 +1,5 @@
-/* A listening socket: hands out its connections, and turns away those that this process has no descriptor for.
- *
- * One descriptor is kept in reserve: with it such a connection is taken and closed, so that its peer knows at once and the
- * loop does not turn for a connection that it cannot take. */
+/* A listening socket. It keeps one descriptor in reserve. When the process has no other left, it accepts a connection with
+ * that one and closes it: the peer is notified at once, and the loop does not spin on a connection that it cannot accept. */
 #ifndef PSABENCH_LINK_LISTENER_H
 #define PSABENCH_LINK_LISTENER_H
 

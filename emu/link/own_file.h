@@ -1,7 +1,7 @@
-/* A file of output that one process writes, and what is left of it when the disk is full.
+/* Output files: one writing process, and cutting to whole lines after a write error.
  *
  * The lock is flock's (advisory): the kernel drops it when the process ends, however it ends, and the Python writers take
- * the same one (psabench/link/own.py). Only regular files are locked: devices and pipes have any number of writers. */
+ * the same lock (psabench/link/own.py). Only regular files are locked, not devices and pipes. */
 #ifndef PSABENCH_LINK_OWN_FILE_H
 #define PSABENCH_LINK_OWN_FILE_H
 
@@ -34,7 +34,7 @@ long own_port_owner(const char *path);
  * that the user gave. */
 bool own_file_machine(int error);
 
-/* As a stream without a buffer: what a full disk did not take is not tried again behind our back. NULL with one line in why,
+/* An unbuffered stream, so that fclose() does not write again what a full disk did not take. NULL with one line in why,
  * which begins with `where` ("--vcd "), and *user: the fault lies with the path that was given. */
 FILE *own_file_output(const char *where, const char *path, bool *user, char *why, size_t cap);
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* ptsname_r, inotify */
 #include "link/pty.h"
 
+#include "base/why.h"
 #include "link/own_file.h"
 
 #include <errno.h>
@@ -90,8 +91,8 @@ static void points_to(const char *name, char *path, size_t cap)
     path[n > 0 ? n : 0] = '\0';
 }
 
-/* A link to a pty that no process serves is a leftover of ours; anything else belongs to another program. The kernel gives the
- * number of a leftover's pty to others: only a lock shows that it is served. */
+/* A link to a pty that no process serves is stale; anything else belongs to another program. The kernel reuses the number of
+ * a closed pty, so only the lock shows whether the port is served. */
 static int make_name(struct pty *p, const char *name)
 {
     char old[64];
@@ -143,6 +144,13 @@ int pty_open(struct pty *p, const char *name)
     p->name = name;
     watch_opens(p);
     return 0;
+}
+
+bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t cap)
+{
+    static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
+    if (err != -EBUSY) return why_fail(why, cap, "%s: %s", where, err == -EEXIST ? expected : strerror(-err));
+    return why_fail(why, cap, "%s: expected a link that no other process serves, got one of pid %ld", where, p->owner);
 }
 
 void pty_discard(struct pty *p)

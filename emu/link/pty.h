@@ -29,6 +29,9 @@ struct pty {
  * NULL. 0, or -errno with nothing left behind. */
 int pty_open(struct pty *p, const char *name);
 
+/* One line for -errno of pty_open(), which begins with `where` ("--line port"). False. */
+bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t cap);
+
 void pty_discard(struct pty *p); /* what the slave has not read yet is thrown away */
 void pty_close(struct pty *p);   /* and removes the link */
 

@@ -91,22 +91,19 @@ def disk(tmp_path: Path) -> Path:
     return folder
 
 
-def kept(disk: Path, name: str, to: Path, command: Sequence[str | Path]) -> list[str | Path]:
-    """The command, and a copy of the file that it leaves on the disk; the status is the command's."""
-    return ["sh", "-c", '"$@"; rc=$?; cp "$0" "$OUT"; exit $rc', disk / name, *command] if to else list(command)
+def then_copied(command: Sequence[str], left: Path, to: Path) -> list[str]:
+    """The command, then a copy of the file that it leaves on its disk; the status is the command's."""
+    return ["sh", "-c", 'left=$0 to=$1; shift; "$@"; rc=$?; cp "$left" "$to"; exit $rc', str(left), str(to), *command]
 
 
 # ---- the emulator's files
 
 
 @KINDS
-def test_a_full_disk_ends_the_file_whole_and_not_the_run(
-    kind: str, disk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_ends_the_file_whole_and_not_the_run(kind: str, disk: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy.log"
-    monkeypatch.setenv("OUT", str(copy))
     run = emulate(kind, disk / "file.log", "--pace", "free", "--for", LONG)
-    done = on_disk("size=256k", disk, kept(disk, "file.log", copy, run))
+    done = on_disk("size=256k", disk, then_copied(run, disk / "file.log", copy))
     assert done.returncode == 3
     line = one_line(done.stderr, "psa-emu")
     assert f"{disk}/file.log: No space left on device; stored " in line
@@ -262,7 +259,7 @@ def test_a_recording_ends_at_its_limit_and_its_size_is_told_meanwhile(tmp_path: 
             assert 0 < file["bytes"] < 500_000
             assert "error" not in file
             control.call("run", for_s=5.0)
-            assert "error" in control.call("counters").result["files"][0]
+            assert control.call("counters").result["files"][0]["error"] == "its limit of 0.5 MB is reached"
             with pytest.raises(ControlError, match=r"its limit of 0.5 MB is reached; stored \d+ bytes, edges before"):
                 control.call("vcd.stop")
         assert emulator.stop() == 0, "the limit is no fault"
