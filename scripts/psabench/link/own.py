@@ -1,8 +1,8 @@
 """Output files: one writing process, and errors that name the file and what it holds.
 
-The lock is flock's (advisory): the kernel drops it when the process ends, however it ends. fcntl's would end with the
-first descriptor of the file that this process closes, and SQLite unlocks it by itself. The emulator takes the same lock
-on what it records: each refuses a file of the other. Devices and pipes are not locked: they have any number of writers.
+The lock is advisory (flock); the kernel releases it when the process ends. A lock of fcntl() would end when this process
+closes any descriptor of the file, and SQLite uses those locks itself. The emulator locks its recordings in the same way.
+Devices and pipes are not locked.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Owned:
             raise BadInput(expected("a file that no other process writes", got, path)) from e
 
     def gone(self) -> bool:
-        """True when the name leads to another file or to none: what is written from now on cannot be found."""
+        """True if the path no longer names this file."""
         if self._fd is None:
             return False
         try:
@@ -55,7 +55,7 @@ class Owned:
             return True
 
     def release(self) -> None:
-        """Another process may write the file now. Harmless once more."""
+        """Unlock the file. Does nothing the second time."""
         if self._fd is not None:
             os.close(self._fd)
         self._fd = None
