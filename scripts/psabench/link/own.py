@@ -1,8 +1,8 @@
 """Output files: one writing process, and errors that name the file and what it holds.
 
-The lock is advisory (flock); the kernel releases it when the process ends. A lock of fcntl() would end when this process
-closes any descriptor of the file, and SQLite uses those locks itself. The emulator locks its recordings in the same way.
-Devices and pipes are not locked.
+The lock is advisory (flock); the kernel releases it when the process ends. A lock of fcntl() would end when the
+process closes any descriptor of the file, and SQLite uses those locks itself. The emulator locks its recordings in the
+same way. Devices and pipes are not locked.
 """
 
 from __future__ import annotations
