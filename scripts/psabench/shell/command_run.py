@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 
@@ -13,7 +12,7 @@ from psabench.shell.connect import Opening, addresses
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
 
-LEAVE_S = 5  # real time after a signal
+ENDING = (signal.SIGTERM, signal.SIGHUP)  # end the shell and its emulator; Ctrl-C ends a command
 
 
 def _opening(args: argparse.Namespace, pace: str | None) -> Opening:
@@ -26,23 +25,19 @@ def run_shell(args: argparse.Namespace) -> int:
     if typed and args.json:
         raise BadInput(expected("--command or a pipe with --json", "a terminal", "--json"))
     opening = _opening(args, "wall" if typed else "step")
-    for number in (signal.SIGTERM, signal.SIGHUP):  # Ctrl-C ends a command; these end the shell, and its emulator
-        signal.signal(number, _leave)
+    for number in ENDING:
+        signal.signal(number, lambda number, _: sys.exit(128 + number))
     with opening.open() as bench:
         session = Session(bench, opening.start)
         if typed:
             from psabench.shell.terminal import Terminal
 
-            return Terminal(session).run()
+            terminal = Terminal(session)
+            for number in ENDING:
+                signal.signal(number, lambda number, _: terminal.leave(128 + number))
+            return terminal.run()
         voice = Voice(_say, json=args.json)
         return run_lines(session, args.command, voice) if args.command else run_stream(session, sys.stdin, voice)
-
-
-def _leave(number: int, _: object) -> None:
-    """Ends the program, also where an event loop has swallowed the exit: the emulator ends with its standard input."""
-    signal.signal(signal.SIGALRM, lambda *_: os._exit(128 + number))
-    signal.alarm(LEAVE_S)
-    sys.exit(128 + number)
 
 
 def run_script(args: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ runs has the bench to itself. Ctrl-C ends the command (or drops the line), Ctrl-
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,8 @@ class Terminal:
         self.mode = MAIN  # "psa", "can" or the name of an instrument
         self._watch = Watch(session.bench, session.now_ns)
         self._waiting = False  # a status line is below a command that runs
+        self._prompting = False  # prompt_toolkit's event loop runs
+        self._left: int | None = None  # exit status after leave()
         session.tick = self._tick
         self._prompt: PromptSession[str] = PromptSession(
             history=history or _file_history(),
@@ -88,21 +91,46 @@ class Terminal:
         )
 
     def run(self) -> int:
-        """Until Ctrl-D or exit; returns the exit status."""
+        """Until Ctrl-D, exit or leave(); returns the exit status."""
         self._print(GREETING.format(bench=self._about()))
-        while True:
+        while self._left is None:
             try:
-                line = self._prompt.prompt(self._prompt_text())
+                line = self._ask()
             except KeyboardInterrupt:
                 continue
             except EOFError:
                 if self.mode == MAIN:
-                    return 0
+                    break
                 self.mode = MAIN
                 continue
-            if line.strip() == "exit" and self.mode == MAIN:
-                return 0
+            if self._left is not None or (line.strip() == "exit" and self.mode == MAIN):
+                break
             self._one(line)
+        return self._left or 0
+
+    def leave(self, status: int) -> None:
+        """For handlers of signals: run() returns this status, a command under way ends with SystemExit.
+
+        Nothing is raised within prompt_toolkit's event loop: it may keep the exception and wait for ever.
+        """
+        self._left = status
+        if not self._prompting:
+            sys.exit(status)
+        if self._prompt.app.is_running and self._prompt.app.loop:
+            self._prompt.app.loop.call_soon_threadsafe(self._end_prompt)
+
+    def _ask(self) -> str:
+        self._prompting = True
+        try:
+            return self._prompt.prompt(self._prompt_text(), pre_run=self._end_prompt)
+        finally:
+            self._prompting = False
+
+    def _end_prompt(self) -> None:
+        """End the prompt after leave(); pre_run calls it when the signal came before the event loop."""
+        app = self._prompt.app
+        if self._left is not None and app.is_running and not app.is_done:
+            app.exit(exception=EOFError())
 
     @property
     def buffer(self) -> Buffer:
