@@ -111,7 +111,7 @@ class Terminal:
     def leave(self, status: int) -> None:
         """For handlers of signals: run() returns this status, a command under way ends with SystemExit.
 
-        Nothing is raised within prompt_toolkit's event loop: it may keep the exception and wait for ever.
+        Nothing is raised within prompt_toolkit's event loop: it may swallow the exception and hang.
         """
         self._left = status
         if not self._prompting:
