@@ -279,6 +279,19 @@ def test_the_kernel_s_limit_of_a_file_is_not_called_the_recording_s(tmp_path: Pa
         assert emulator.stop() == 3
 
 
+@pytest.mark.parametrize(
+    ("options", "status", "says"),
+    [("size=4k", 3, "No space left on device; the file is not complete"), ("ro", 2, "Read-only file system")],
+)
+def test_a_resolved_scenario_that_cannot_be_stored_ends_the_emulator(
+    options: str, status: int, says: str, disk: Path
+) -> None:
+    argv = [str(find_emulator()), "stream", "--can", "none", "--for", SHORT, "--resolved", str(disk / "r.json")]
+    done = on_disk(options, disk, argv)
+    assert done.returncode == status
+    assert one_line(done.stderr, "psa-emu") == f"psa-emu: --resolved {disk / 'r.json'}: {says}"
+
+
 def test_a_limit_of_no_bytes_is_no_death_by_signal(tmp_path: Path) -> None:
     argv = [
         "sh",
@@ -434,6 +447,8 @@ def test_a_text_file_has_one_owner_and_the_emulator_s_is_one(tmp_path: Path) -> 
     done = psa_emu("stream", "--can", "none", "--vcd", path, "--for", SHORT)
     assert done.returncode == 2
     assert done.stderr.endswith(f"got one of pid {os.getpid()}\n")
+    done = psa_emu("stream", "--can", "none", "--resolved", path, "--for", SHORT)
+    assert (done.returncode, done.stdout) == (2, "")
     owned.release()
     assert psa_emu("stream", "--can", "none", "--vcd", path, "--for", SHORT, "--quiet").returncode == 0
 
