@@ -59,13 +59,36 @@ static double poly_cos(double r)
     return sum;
 }
 
+/* Two doubles side by side: one division does for both. */
+typedef double both __attribute__((vector_size(16)));
+
+/* poly_sin() and poly_cos(), a step of each at a time. */
+static struct det_pair poly_pair(double r)
+{
+    static const both divisor[] = {{21 * 20, 20 * 19}, {19 * 18, 18 * 17}, {17 * 16, 16 * 15}, {15 * 14, 14 * 13},
+                                   {13 * 12, 12 * 11}, {11 * 10, 10 * 9},  {9 * 8, 8 * 7},     {7 * 6, 6 * 5},
+                                   {5 * 4, 4 * 3},     {3 * 2, 2 * 1}};
+    const double z = r * r;
+    both sum = {1.0, 1.0 - z / (double)(22 * 21)};
+    for (unsigned i = 0; i < sizeof divisor / sizeof *divisor; i++) sum = 1.0 - sum * z / divisor[i];
+    return (struct det_pair){r * sum[0], sum[1]};
+}
+
+/* x - k pi/2, at most pi/4 */
+static double reduced_rad(double x_rad, int64_t *k)
+{
+    assert(fabs(x_rad) <= 1e6);
+    const double n = floor(x_rad * 0.63661977236758134308 + 0.5);
+    *k = (int64_t)n;
+    return ((x_rad - n * PIO2_1) - n * PIO2_2) - n * PIO2_3;
+}
+
 /* sin(x + quarter pi/2) */
 static double sin_quarter(double x_rad, int64_t quarter)
 {
-    assert(fabs(x_rad) <= 1e6);
-    const double k = floor(x_rad * 0.63661977236758134308 + 0.5);
-    const double r = ((x_rad - k * PIO2_1) - k * PIO2_2) - k * PIO2_3;
-    const int64_t q = ((int64_t)k + quarter) & 3;
+    int64_t k;
+    const double r = reduced_rad(x_rad, &k);
+    const int64_t q = (k + quarter) & 3;
     const double v = (q & 1) ? poly_cos(r) : poly_sin(r);
     return (q & 2) ? -v : v;
 }
@@ -78,6 +101,16 @@ double det_sin(double x_rad)
 double det_cos(double x_rad)
 {
     return sin_quarter(x_rad, 1);
+}
+
+struct det_pair det_sin_cos(double x_rad)
+{
+    if (x_rad == 0.0) return (struct det_pair){x_rad, 1.0}; /* a level vehicle, a head at its mark */
+    int64_t k;
+    const struct det_pair p = poly_pair(reduced_rad(x_rad, &k));
+    const double s = (k & 1) ? p.cos : p.sin;
+    const double c = (k & 1) ? p.sin : p.cos;
+    return (struct det_pair){(k & 2) ? -s : s, ((k + 1) & 2) ? -c : c};
 }
 
 /* 0 <= t <= 1. atan t = atan c + atan((t - c)/(1 + t c)) with c the nearest quarter: |s| <= 1/8, s^19/19 is below 1e-18. */

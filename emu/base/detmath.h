@@ -10,11 +10,16 @@
 #define RAD_PER_ARCSEC (RAD_PER_DEG / 3600.0)
 #define TURN_RAD       6.283185307179586
 
+struct det_pair {
+    double sin, cos;
+};
+
 double det_log(double x);     /* natural logarithm, x > 0 finite and normal */
 double det_exp(double x);     /* -700 <= x <= 700 */
 double det_sin(double x_rad); /* |x_rad| <= 1e6: reduced by pi/2 in three parts */
 double det_cos(double x_rad);
-double det_atan2(double y, double x); /* in [-pi, pi], finite arguments; 0 if both are 0 */
+struct det_pair det_sin_cos(double x_rad); /* the same bits as the two calls, in the time of one */
+double det_atan2(double y, double x);      /* in [-pi, pi], finite arguments; 0 if both are 0 */
 
 double det_wrap_rad(double angle_rad);      /* in (-pi, pi] */
 double det_quantise(double x, double step); /* the nearest multiple of a step; x itself for a step of 0 or less */

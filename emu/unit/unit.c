@@ -190,8 +190,9 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
                     rng_stream(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
-        u->cos_alpha0[i] = det_cos(alpha0_rad);
-        u->sin_alpha0[i] = det_sin(alpha0_rad);
+        const struct det_pair alpha0 = det_sin_cos(alpha0_rad);
+        u->cos_alpha0[i] = alpha0.cos;
+        u->sin_alpha0[i] = alpha0.sin;
     }
     chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
     init_board(u, s);

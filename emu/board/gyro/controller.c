@@ -41,8 +41,9 @@ static struct gyro_settings default_settings(void)
 void gyro_settings_changed(struct gyro *b)
 {
     b->place = gyro_place_of(b->set.latitude_deg, b->set.speed_mps, b->set.track_deg);
-    b->sin_a = det_sin(b->set.azimuth_deg * RAD_PER_DEG);
-    b->cos_a = det_cos(b->set.azimuth_deg * RAD_PER_DEG);
+    const struct det_pair azimuth = det_sin_cos(b->set.azimuth_deg * RAD_PER_DEG);
+    b->sin_a = azimuth.sin;
+    b->cos_a = azimuth.cos;
 }
 
 double gyro_heading_deg(const struct gyro *b)

@@ -31,12 +31,12 @@ struct gyro_level gyro_level_of(double y_g, double x_g)
 struct gyro_place gyro_place_of(double latitude_deg, double speed_mps, double track_deg)
 {
     const double lat_rad = latitude_deg * RAD_PER_DEG;
-    const double east = speed_mps * det_sin(track_deg * RAD_PER_DEG) / EARTH_RADIUS_M;
-    const double north = speed_mps * det_cos(track_deg * RAD_PER_DEG) / EARTH_RADIUS_M;
-    const double s = det_sin(lat_rad), c = det_cos(lat_rad);
+    const struct det_pair track = det_sin_cos(track_deg * RAD_PER_DEG), lat = det_sin_cos(lat_rad);
+    const double east = speed_mps * track.sin / EARTH_RADIUS_M;
+    const double north = speed_mps * track.cos / EARTH_RADIUS_M;
     return (struct gyro_place){.east_radps = -north,
-                               .north_radps = EARTH_RATE_RADPS * c + east,
-                               .up_radps = EARTH_RATE_RADPS * s + east * s / c};
+                               .north_radps = EARTH_RATE_RADPS * lat.cos + east,
+                               .up_radps = EARTH_RATE_RADPS * lat.sin + east * lat.sin / lat.cos};
 }
 
 double gyro_law_level(double m1, const struct gyro_level *l, double up_radps, double turn_radps)

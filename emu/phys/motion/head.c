@@ -104,9 +104,9 @@ static bool holds_from(const struct head *h, int64_t t_ns)
 void head_gravity_mps2(struct head *h, int64_t t_ns, double a_m_mps2[3])
 {
     if (t_ns < h->cached_from_ns || t_ns > h->cached_to_ns) {
-        const double alpha_rad = head_angle_rad(h, t_ns);
-        h->cached_g_mps2[0] = -h->site.g_mps2 * det_sin(alpha_rad);
-        h->cached_g_mps2[1] = -h->site.g_mps2 * det_cos(alpha_rad);
+        const struct det_pair alpha = det_sin_cos(head_angle_rad(h, t_ns));
+        h->cached_g_mps2[0] = -h->site.g_mps2 * alpha.sin;
+        h->cached_g_mps2[1] = -h->site.g_mps2 * alpha.cos;
         h->cached_g_mps2[2] = 0.0;
         h->cached_from_ns = t_ns;
         h->cached_to_ns = holds_from(h, t_ns) ? INT64_MAX : t_ns;

@@ -27,11 +27,11 @@ static struct motion_state swing_at(const struct motion_plan *p, const struct mo
     const double cycles = p->sine_hz * t_s;
     const double phase_rad = TURN_RAD * (cycles - floor(cycles));
     const double w = TURN_RAD * p->sine_hz;
-    const double c = det_cos(phase_rad);
+    const struct det_pair phase = det_sin_cos(phase_rad);
     return (struct motion_state){
-        lowest->angle_rad + p->sine_rad * (1.0 - c),
-        p->sine_rad * w * det_sin(phase_rad),
-        p->sine_rad * w * w * c,
+        lowest->angle_rad + p->sine_rad * (1.0 - phase.cos),
+        p->sine_rad * w * phase.sin,
+        p->sine_rad * w * w * phase.cos,
     };
 }
 

@@ -130,10 +130,11 @@ static void gyro_rates(const struct platform *p, const struct platform_node *n, 
 
 static void invalidate_node(struct platform_node *n)
 {
-    n->sin_a = det_sin(n->alpha_rad);
-    n->cos_a = det_cos(n->alpha_rad);
-    n->sin_b = det_sin(n->beta_rad);
-    n->cos_b = det_cos(n->beta_rad);
+    const struct det_pair a = det_sin_cos(n->alpha_rad), b = det_sin_cos(n->beta_rad);
+    n->sin_a = a.sin;
+    n->cos_a = a.cos;
+    n->sin_b = b.sin;
+    n->cos_b = b.cos;
 }
 
 /* Exact for any step (sources instruments 1.4). */

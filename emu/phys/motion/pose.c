@@ -32,11 +32,10 @@ void pose_turn(struct pose *p, enum pose_axis axis, double angle_rad, double rat
     double *dw = p->dw_ib_b_radps2;
     if (fabs(angle_rad) > REDUCE_ABOVE) angle_rad = fmod(angle_rad, TURN_RAD); /* exact */
     if (angle_rad != 0.0) {
-        const double c = det_cos(angle_rad);
-        const double s = det_sin(angle_rad);
-        for (unsigned row = 0; row < 3; row++) turn_pair(&p->C_nb[row][i], &p->C_nb[row][j], c, s);
-        turn_pair(&w[i], &w[j], c, s);
-        turn_pair(&dw[i], &dw[j], c, s);
+        const struct det_pair a = det_sin_cos(angle_rad);
+        for (unsigned row = 0; row < 3; row++) turn_pair(&p->C_nb[row][i], &p->C_nb[row][j], a.cos, a.sin);
+        turn_pair(&w[i], &w[j], a.cos, a.sin);
+        turn_pair(&dw[i], &dw[j], a.cos, a.sin);
     }
     dw[i] += rate_radps * w[j];
     dw[j] -= rate_radps * w[i];

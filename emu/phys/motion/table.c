@@ -171,9 +171,9 @@ static void apply_wobble(struct pose *p, const struct table_axis_cfg *c, const s
     if (w_rad == 0.0) return;
     const double n = c->wobble_order ? (double)c->wobble_order : 1.0;
     const double sum_rad = n * s->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
-    const double phase_rad = fabs(sum_rad) > WHOLE_ABOVE ? fmod(sum_rad, TURN_RAD) : sum_rad;
-    const double cos_rad = w_rad * det_cos(phase_rad);
-    const double sin_rad = w_rad * det_sin(phase_rad);
+    const struct det_pair phase = det_sin_cos(fabs(sum_rad) > WHOLE_ABOVE ? fmod(sum_rad, TURN_RAD) : sum_rad);
+    const double cos_rad = w_rad * phase.cos;
+    const double sin_rad = w_rad * phase.sin;
     const double rate = n * s->rate_radps;
     const double accel = n * s->accel_radps2;
     pose_turn(p, (enum pose_axis)((c->along + 1u) % 3u), cos_rad, -sin_rad * rate,

@@ -37,7 +37,8 @@ static struct value sine_at(const struct vehicle_sine *s, int64_t t_ns)
 {
     if (s->amplitude == 0.0 || s->rate_radps == 0.0) return (struct value){0.0, 0.0};
     const double phase_rad = fmod(s->rate_radps * sched_since_s(s->from_ns, t_ns), TURN_RAD);
-    return (struct value){s->amplitude * det_sin(phase_rad), s->amplitude * s->rate_radps * det_cos(phase_rad)};
+    const struct det_pair phase = det_sin_cos(phase_rad);
+    return (struct value){s->amplitude * phase.sin, s->amplitude * s->rate_radps * phase.cos};
 }
 
 static struct vehicle_sine make_sine(double amplitude, double period_s, int64_t t_ns)
@@ -60,10 +61,9 @@ static void start_sway(struct vehicle_plan *p, const struct vehicle_sway *sway, 
 /* Integral of (v + a t) cos(h + w t) over d_s: the way to the north at a constant acceleration and a constant turn. */
 static double northwards_m(double v, double a, double h, double w, double d_s)
 {
-    const double ahead = det_cos(h);
-    if (w == 0.0) return (v + 0.5 * a * d_s) * d_s * ahead;
-    const double end = h + w * d_s;
-    return ((v + a * d_s) * det_sin(end) - v * det_sin(h) + a / w * (det_cos(end) - ahead)) / w;
+    if (w == 0.0) return (v + 0.5 * a * d_s) * d_s * det_cos(h);
+    const struct det_pair ahead = det_sin_cos(h), end = det_sin_cos(h + w * d_s);
+    return ((v + a * d_s) * end.sin - v * ahead.sin + a / w * (end.cos - ahead.cos)) / w;
 }
 
 static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
@@ -189,10 +189,9 @@ void vehicle_fly(struct vehicle *v, double speed_mps, double track_deg, int64_t 
 /* C_lc = Rz(-heading) Rx(pitch) Ry(roll), and the rate from the three angles' rates; ch, sh: cosine and sine of the heading. */
 static void set_attitude(struct vehicle_state *s, double ch, double sh, const double rate_radps[3])
 {
-    const double sp = det_sin(s->pitch_rad);
-    const double cp = det_cos(s->pitch_rad);
-    const double sr = det_sin(s->roll_rad);
-    const double cr = det_cos(s->roll_rad);
+    const struct det_pair pitch = det_sin_cos(s->pitch_rad), roll = det_sin_cos(s->roll_rad);
+    const double sp = pitch.sin, cp = pitch.cos;
+    const double sr = roll.sin, cr = roll.cos;
     const double C_lc[3][3] = {
         {ch * cr + sh * sp * sr, sh * cp, ch * sr - sh * sp * cr},
         {ch * sp * sr - sh * cr, ch * cp, -sh * sr - ch * sp * cr},
@@ -209,12 +208,11 @@ static void set_flight(struct vehicle_state *s, const struct site *site, double 
                        double turn_radps)
 {
     const double earth_radps = site->placed ? EARTH_RATE_RADPS : 0.0;
-    const double sin_lat = det_sin(s->latitude_rad);
-    const double cos_lat = det_cos(s->latitude_rad);
+    const struct det_pair lat = det_sin_cos(s->latitude_rad);
     const double v_l[3] = {s->speed_mps * sh, s->speed_mps * ch, 0.0};
     const double east_radps = v_l[0] / EARTH_RADIUS_M;
-    const double w_el[3] = {-v_l[1] / EARTH_RADIUS_M, east_radps, east_radps * sin_lat / cos_lat};
-    const double w_ie[3] = {0.0, earth_radps * cos_lat, earth_radps * sin_lat};
+    const double w_el[3] = {-v_l[1] / EARTH_RADIUS_M, east_radps, east_radps * lat.sin / lat.cos};
+    const double w_ie[3] = {0.0, earth_radps * lat.cos, earth_radps * lat.sin};
     double twice[3];
     for (unsigned k = 0; k < 3; k++) {
         s->w_il_l_radps[k] = w_ie[k] + w_el[k];
@@ -243,8 +241,8 @@ void vehicle_at(const struct vehicle *v, int64_t t_ns, struct vehicle_state *out
     const struct value roll_sway = sine_at(&p->roll_sway, t_ns);
     const struct value speed = ramp_at(&p->speed_mps, t_ns);
     const double rate_radps[3] = {heading.rate, pitch.rate + pitch_sway.rate, roll.rate + roll_sway.rate};
-    const double ch = det_cos(heading.at);
-    const double sh = det_sin(heading.at);
+    const struct det_pair direction = det_sin_cos(heading.at);
+    const double ch = direction.cos, sh = direction.sin;
     out->heading_rad = det_wrap_rad(heading.at);
     out->pitch_rad = pitch.at + pitch_sway.at;
     out->roll_rad = roll.at + roll_sway.at;

@@ -92,8 +92,8 @@ static void set_step(struct quartz *q, int64_t dt_ns)
     }
     const double keep = det_exp(-z * wt);
     const double turns = d * wt / TURN_RAD;
-    const double c = det_cos(TURN_RAD * (turns - floor(turns)));
-    const double s = det_sin(TURN_RAD * (turns - floor(turns)));
+    const struct det_pair a = det_sin_cos(TURN_RAD * (turns - floor(turns)));
+    const double c = a.cos, s = a.sin;
     q->step[0][0] = keep * (c + z / d * s);
     q->step[0][1] = keep * s / d;
     q->step[1][0] = -keep * s / d;

@@ -79,6 +79,8 @@ static void elementary_functions_agree_with_libm(void **state)
         const double a = (u - 0.5) * 2e3;
         assert_true(fabs(det_sin(a) - sin(a)) < 4e-16);
         assert_true(fabs(det_cos(a) - cos(a)) < 4e-16);
+        const struct det_pair p = det_sin_cos(a);
+        assert_true(p.sin == det_sin(a) && p.cos == det_cos(a));
         const double small = ldexp(u, (int)(i % 60) - 50);
         assert_true(ulps(det_atan2(u - 0.5, small), atan2(u - 0.5, small)) <= 4.0);
         assert_true(ulps(det_atan2(small, u - 0.5), atan2(small, u - 0.5)) <= 4.0);
@@ -89,6 +91,8 @@ static void elementary_functions_agree_with_libm(void **state)
     assert_true(det_atan2(-1.0, 0.0) == atan2(-1.0, 0.0));
     assert_true(det_sin(0.0) == 0.0);
     assert_true(det_cos(0.0) == 1.0);
+    assert_true(det_sin_cos(0.0).sin == 0.0 && det_sin_cos(0.0).cos == 1.0);
+    assert_true(signbit(det_sin_cos(-0.0).sin) && signbit(det_sin(-0.0)));
     assert_true(det_log(1.0) == 0.0);
     assert_true(det_exp(0.0) == 1.0);
 }
