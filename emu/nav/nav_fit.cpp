@@ -121,13 +121,7 @@ double fit_geometry(const fit_design &rows)
 bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *gain)
 {
     const fit_design white = whitener.lazyProduct(rows);
-    Eigen::ColPivHouseholderQR<fit_design> qr(white);
-    qr.setThreshold(1e-9);
-    if (qr.rank() < rows.cols()) return false;
-    gain->resize(rows.cols(), rows.rows());
-    for (Eigen::Index i = 0; i < rows.rows(); i++)
-        gain->col(i) = nav_qr_solve<fit_design, fit_unknowns, fit_vector>(qr, whitener.col(i));
-    return true;
+    return nav_qr_solve(white, 1e-9, whitener, gain);
 }
 
 fit_design fit_jacobian(const fit_design &rows, double alpha_rad)

@@ -1,10 +1,6 @@
 #include "nav/nav_model.hpp"
 #include "nav/nav_qr.hpp"
 
-using level_rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, NAV_MAX_POSITIONS, 3>;
-using level_vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, NAV_MAX_POSITIONS, 1>;
-using level_unknowns = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
-
 /* -cos b sin g = cos q u + sin q v: the upward parts u of x_c and v of y_c, which are -cos(pitch) sin(roll) and sin(pitch).
  * A constant error of gamma adds cos(g) of it to the left, 1 to the tilts that matter. */
 int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const double *gamma_rad, int count,
@@ -12,8 +8,8 @@ int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const d
 {
     const int unknowns = with_bias ? 3 : 2;
     if (count < unknowns || count > NAV_MAX_POSITIONS) return NAV_TOO_FEW;
-    level_rows rows(count, unknowns);
-    level_vector y(count);
+    fit_design rows(count, unknowns);
+    fit_square y(count, 1);
     for (int i = 0; i < count; i++) {
         const double beta = beta_rad ? beta_rad[i] : 0.0;
         if (!std::isfinite(q_rad[i] + beta + gamma_rad[i])) return NAV_NOT_FINITE;
@@ -22,17 +18,16 @@ int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const d
         rows(i, 0) = nav_cos(q_rad[i]);
         rows(i, 1) = nav_sin(q_rad[i]);
         if (with_bias) rows(i, 2) = -nav_cos(beta) * nav_cos(gamma_rad[i]);
-        y(i) = -nav_cos(beta) * nav_sin(gamma_rad[i]);
+        y(i, 0) = -nav_cos(beta) * nav_sin(gamma_rad[i]);
     }
-    Eigen::ColPivHouseholderQR<level_rows> qr(rows);
-    qr.setThreshold(1e-3); /* directions that differ by less than some tenths of a degree do not count */
-    if (qr.rank() < unknowns) return NAV_COINCIDENT;
-    const level_unknowns x = nav_qr_solve<level_rows, level_unknowns, level_vector>(qr, y);
+    fit_gain x; /* one column */
+    /* Directions that differ by less than some tenths of a degree do not count. */
+    if (!nav_qr_solve(rows, 1e-3, y, &x)) return NAV_COINCIDENT;
     if (!(x(0) * x(0) + x(1) * x(1) < 1.0)) return NAV_RANGE; /* no attitude: readings of no vehicle */
     out->pitch_rad = nav_asin(x(1));
     out->roll_rad = nav_asin(-x(0) / std::sqrt(1.0 - x(1) * x(1)));
     out->gamma_bias_rad = with_bias ? x(2) : 0.0;
-    out->residual_rms_rad = std::sqrt((y - rows * x).squaredNorm() / count);
+    out->residual_rms_rad = std::sqrt((y - rows.lazyProduct(x)).squaredNorm() / count);
     return NAV_OK;
 }
 

@@ -31,7 +31,7 @@ def library(build: str) -> Path:
     """The library of a build, up to date."""
     env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "CC", "CFLAGS", "SAN")}
     done = subprocess.run(
-        ["make", "-s", f"-j{os.cpu_count() or 1}", *BUILDS[build], "lib"],
+        ["make", "-s", f"-j{os.cpu_count() or 1}", *BUILDS[build], f"{build}/libpsabench.so"],
         cwd=ROOT,
         env=env,
         capture_output=True,
