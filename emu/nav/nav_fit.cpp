@@ -1,7 +1,5 @@
 #include "nav/nav_fit.hpp"
 
-#include "nav/nav_qr.hpp"
-
 double fit_mean_time(const struct nav_position *p, int count)
 {
     double sum = 0.0;
@@ -121,7 +119,7 @@ double fit_geometry(const fit_design &rows)
 bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *gain)
 {
     const fit_design white = whitener.lazyProduct(rows);
-    return nav_qr_solve(white, 1e-9, whitener, gain);
+    return fit_solve(white, 1e-9, whitener, gain);
 }
 
 fit_design fit_jacobian(const fit_design &rows, double alpha_rad)

@@ -42,6 +42,10 @@ double fit_geometry(const fit_design &rows);
 /* Derivative of S/We by (alpha, drift, ramp): [a cos - b sin, 1, (t)]. */
 fit_design fit_jacobian(const fit_design &rows, double alpha_rad);
 
+/* x of the least squares of rows x = b by Householder QR with pivoting, a column of x for each of b. False: the rank is short, pivots
+ * below `threshold` of the largest taken for zero. Compiled once for all (nav_qr.cpp): its templates take the compiler ten seconds. */
+bool fit_solve(const fit_design &rows, double threshold, const fit_square &b, fit_gain *x);
+
 /* x = gain y solves rows x = y in the least squares of whitened rows; false: rank is short. */
 bool fit_gain_of(const fit_design &rows, const fit_square &whitener, fit_gain *gain);
 

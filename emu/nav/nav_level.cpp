@@ -1,5 +1,4 @@
-#include "nav/nav_model.hpp"
-#include "nav/nav_qr.hpp"
+#include "nav/nav_fit.hpp"
 
 /* -cos b sin g = cos q u + sin q v: the upward parts u of x_c and v of y_c, which are -cos(pitch) sin(roll) and sin(pitch).
  * A constant error of gamma adds cos(g) of it to the left, 1 to the tilts that matter. */
@@ -22,7 +21,7 @@ int nav_attitude_from_level(const double *q_rad, const double *beta_rad, const d
     }
     fit_gain x; /* one column */
     /* Directions that differ by less than some tenths of a degree do not count. */
-    if (!nav_qr_solve(rows, 1e-3, y, &x)) return NAV_COINCIDENT;
+    if (!fit_solve(rows, 1e-3, y, &x)) return NAV_COINCIDENT;
     if (!(x(0) * x(0) + x(1) * x(1) < 1.0)) return NAV_RANGE; /* no attitude: readings of no vehicle */
     out->pitch_rad = nav_asin(x(1));
     out->roll_rad = nav_asin(-x(0) / std::sqrt(1.0 - x(1) * x(1)));

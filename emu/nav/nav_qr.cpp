@@ -1,9 +1,9 @@
-#include "nav/nav_qr.hpp"
+#include "nav/nav_fit.hpp"
 
 using qr_of_rows = Eigen::ColPivHouseholderQR<fit_design>;
 
 /* The last step is by hand: Eigen's triangular solver may allocate, and then asks for C++'s runtime. */
-static fit_unknowns solve(const qr_of_rows &qr, const fit_vector &b)
+static fit_unknowns solve_column(const qr_of_rows &qr, const fit_vector &b)
 {
     const Eigen::Index n = qr.cols();
     fit_vector c = b;
@@ -17,12 +17,12 @@ static fit_unknowns solve(const qr_of_rows &qr, const fit_vector &b)
     return x;
 }
 
-bool nav_qr_solve(const fit_design &rows, double threshold, const fit_square &b, fit_gain *x)
+bool fit_solve(const fit_design &rows, double threshold, const fit_square &b, fit_gain *x)
 {
     qr_of_rows qr(rows);
     qr.setThreshold(threshold);
     if (qr.rank() < rows.cols()) return false;
     x->resize(rows.cols(), b.cols());
-    for (Eigen::Index i = 0; i < b.cols(); i++) x->col(i) = solve(qr, b.col(i));
+    for (Eigen::Index i = 0; i < b.cols(); i++) x->col(i) = solve_column(qr, b.col(i));
     return true;
 }
