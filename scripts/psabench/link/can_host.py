@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
+from itertools import islice
+from operator import length_hint
 from typing import Any, Protocol
 
 import can
@@ -199,11 +201,38 @@ def open_bus(spec: str | None) -> can.BusABC:
         bus = can.Bus(**arguments)
         if isinstance(bus, SocketcanBus):
             _enlarge_buffer(bus.socket)
+        if (port := getattr(bus, "serialPortOrig", None)) is not None:
+            bus.serialPortOrig = ReadAhead(port)  # type: ignore[attr-defined]
         return bus
     except (can.CanInterfaceNotImplementedError, ValueError, TypeError) as e:
         raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
         raise LinkError(f"--can {spec}: {e}") from e
+
+
+class ReadAhead:
+    """A serial port that gives single bytes of what it took at once: python-can's slcan asks the kernel for each."""
+
+    def __init__(self, port: Any) -> None:
+        self._port = port
+        self._bytes: Iterator[int] = iter(b"")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._port, name)
+
+    @property
+    def in_waiting(self) -> int:
+        return length_hint(self._bytes) or int(self._port.in_waiting)
+
+    def read(self, _: int = 1) -> bytes:
+        """One byte; none when the port's timeout is over."""
+        if not length_hint(self._bytes):
+            self._bytes = iter(self._port.read(max(1, self._port.in_waiting)))
+        return bytes(islice(self._bytes, 1))
+
+    def reset_input_buffer(self) -> None:
+        self._bytes = iter(b"")
+        self._port.reset_input_buffer()
 
 
 def _greet(host: str, port: int) -> None:

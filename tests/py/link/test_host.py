@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 import struct
 import threading
@@ -315,6 +316,29 @@ def test_an_old_answer_between_the_segments_of_a_string_is_left_out() -> None:
 def test_a_bus_that_nobody_could_open_is_bad_input(spec: str) -> None:
     with pytest.raises(BadInput, match=r"--can"):
         open_bus(spec)
+
+
+def test_frames_of_an_slcan_adapter_are_read_at_once_cut_anywhere_and_forgotten_on_request() -> None:
+    adapter, theirs = os.openpty()
+    try:
+        with CanHost(open_bus(f"slcan:{os.ttyname(theirs)}"), WallClock()) as host:
+            got: list[bytes] = []
+            host.listeners.append(lambda m: got.append(bytes(m.data)))
+            os.write(adapter, b"t18520102\rt18530102")
+            assert host.receive(5.0)
+            assert not host.receive(0.0)  # half of the second one
+            os.write(adapter, b"03\rt185104\r")
+            assert host.receive(5.0)
+            assert host.receive(0.0)  # with what came before it
+            assert got == [b"\1\2", b"\1\2\3", b"\4"]
+            os.write(adapter, b"t185105\rt185106\r")
+            assert host.receive(5.0)
+            host.bus.flush()  # type: ignore[attr-defined]
+            assert not host.receive(0.0)
+            assert got[3:] == [b"\5"]
+    finally:
+        os.close(adapter)
+        os.close(theirs)
 
 
 @contextmanager
