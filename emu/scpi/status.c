@@ -67,12 +67,12 @@ static uint8_t class_bit(int code)
     return class >= 1 && class <= 4 ? bit[class] : 0;
 }
 
-/* The description is in double quotes in the answer. */
-static void unquote_text(char *text)
+/* The description is a string of an answer: 7-bit ASCII in double quotes, IEEE 488.2-1992, 8.7.8. It may cite a client's bytes. */
+static void clean_text(char *text)
 {
     for (; *text; text++) {
         if (*text == '"') *text = '\'';
-        if ((unsigned char)*text < ' ') *text = ' ';
+        if (*text < ' ' || *text > '~') *text = '?';
     }
 }
 
@@ -86,7 +86,7 @@ void scpi_error(struct scpi_status *s, int code, const char *what)
     e->code = code;
     if (what && !full) snprintf(e->text, sizeof e->text, "%s;%s", scpi_error_text(code), what);
     else snprintf(e->text, sizeof e->text, "%s", scpi_error_text(code));
-    unquote_text(e->text);
+    clean_text(e->text);
 }
 
 void scpi_error_next(struct scpi_status *s, char *out, size_t cap)

@@ -141,6 +141,14 @@ static void an_error_tells_what_is_the_matter_and_the_permitted_range(void **sta
     SAYS("SYST:ERR?", "-113,\"Undefined header;FLY:HIGH\"");
 }
 
+/* Most VISA libraries read replies as ASCII: one other byte, and the reply is lost with what came with it. */
+static void an_error_cites_a_line_in_printable_ascii(void **state)
+{
+    (void)state;
+    say("OUTP:\xd0\xa4\x7f");
+    SAYS("SYST:ERR?", "-101,\"Invalid character;???\"");
+}
+
 static void a_line_that_is_too_long_is_an_overrun(void **state)
 {
     (void)state;
@@ -296,6 +304,7 @@ int main(void)
         cmocka_unit_test(units_are_those_of_the_argument),
         cmocka_unit_test_setup(bad_input_gives_the_standard_number_and_changes_nothing, head),
         cmocka_unit_test_setup(an_error_tells_what_is_the_matter_and_the_permitted_range, head),
+        cmocka_unit_test_setup(an_error_cites_a_line_in_printable_ascii, head),
         cmocka_unit_test_setup(a_line_that_is_too_long_is_an_overrun, head),
         cmocka_unit_test_setup(a_full_queue_ends_in_overflow, head),
         cmocka_unit_test_setup(a_message_of_several_units_gives_one_answer, head),
