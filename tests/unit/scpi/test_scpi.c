@@ -145,8 +145,9 @@ static void an_error_tells_what_is_the_matter_and_the_permitted_range(void **sta
 static void an_error_cites_a_line_in_printable_ascii(void **state)
 {
     (void)state;
-    say("OUTP:\xd0\xa4\x7f");
-    SAYS("SYST:ERR?", "-101,\"Invalid character;???\"");
+    say("FACE \"\xd0\xa4\"");
+    SAYS("SYST:ERR?", "-224,\"Illegal parameter value;face: expected one of direct, reversed, side, side_reversed, "
+                      "got '?\?'\"");
 }
 
 static void a_line_that_is_too_long_is_an_overrun(void **state)
