@@ -89,6 +89,7 @@ class ReadingReader:
         shift = node_id - dbc_node(layout.board)
         self._place = {int(message(name).frame_id) + shift: k for k, name in enumerate(layout.messages)}
         self._at = _columns(layout.messages)
+        self._lengths = [int(message(name).length) for name in layout.messages]
         self._begun: list[bytes] = []  # messages of the reading under way
         self._seen = False
         self._kept: list[list[bytes]] = []
@@ -101,7 +102,7 @@ class ReadingReader:
         k = self._place.get(m.arbitration_id)
         if k is None or m.is_error_frame or m.is_remote_frame:
             return
-        whole = len(m.data) == message(self.layout.messages[k]).length
+        whole = len(m.data) == self._lengths[k]
         if k != len(self._begun) or not whole:
             # a reading that was under way when we came is no fault
             self.counters.torn += bool(self._begun) or not whole or (self._seen and k > 0)

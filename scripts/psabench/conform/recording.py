@@ -154,7 +154,7 @@ def _scaled(e: Capture, lines: Ratio | None, can: Ratio | None) -> Capture:
         found = found.with_lines(_slowed(e.lines, 1.0 + lines.ppm * clocks.PPM))
     if can is not None:
         factor = 1.0 + can.ppm * clocks.PPM
-        found = found.with_can(CanLog(frames=tuple(replace(f, t_s=f.t_s / factor) for f in e.can.frames)))
+        found = found.with_can(CanLog(frames=tuple(f._replace(t_s=f.t_s / factor) for f in e.can.frames)))
     wider = max((r.within_ppm for r in (lines, can) if r is not None), default=0.0)
     return replace(found, clock_ppm=e.clock_ppm + wider)
 

@@ -138,17 +138,25 @@ class CanHost(AbstractContextManager["CanHost"]):
 
     def receive(self, timeout_s: float) -> bool:
         """Take one frame if one comes within timeout_s. Raises LinkError when the link has gone."""
-        deadline_s = time.monotonic() + timeout_s
-        while (message := self._take(min(timeout_s, LOOK_S))) is None:
-            if _hung_up(self.bus):
-                raise LinkError("CAN: connection closed by the emulator or adapter")
-            timeout_s = deadline_s - time.monotonic()
-            if timeout_s <= 0.0:
-                return False
+        message = self._take(min(timeout_s, LOOK_S)) or self._wait(timeout_s - LOOK_S)
+        if message is None:
+            return False
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus
         for listener in self.listeners:
             listener(message)
         return True
+
+    def _wait(self, left_s: float) -> Message | None:
+        """A frame within left_s, after a look at the link and one each LOOK_S."""
+        message = None
+        while message is None:
+            if _hung_up(self.bus):
+                raise LinkError("CAN: connection closed by the emulator or adapter")
+            if left_s <= 0.0:
+                return None
+            message = self._take(min(left_s, LOOK_S))
+            left_s -= LOOK_S
+        return message
 
     def _take(self, timeout_s: float) -> Message | None:
         try:

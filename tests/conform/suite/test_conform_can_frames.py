@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 from psabench.conform.capture.canbits import frame_bits
@@ -96,7 +95,7 @@ def test_a_good_overload_passes(check: Callable[[Capture], str]) -> None:
 
 
 def swapped(frames: list[CanFrame], at: int, **change: object) -> list[CanFrame]:
-    return [replace(f, **change) if k == at else f for k, f in enumerate(frames)]  # type: ignore[arg-type]
+    return [f._replace(**change) if k == at else f for k, f in enumerate(frames)]  # type: ignore[arg-type]
 
 
 BAD: list[tuple[Callable[[Capture], str], list[CanFrame]]] = [
@@ -165,7 +164,7 @@ def destroyed(count: int, at_s: float = 1.0) -> list[CanFrame]:
 
 PASSIVE = [*destroyed(16), emergency(1.01, 0x8120, 0x11), emergency(1.1, 0, 0)]
 BACK_S = 1.0031 + (1408 + frame_bits(EMCY, emergency(1.0046, 0x8140, 0x11).data)) * 1e-6
-AWAY = [*destroyed(32), replace(emergency(1.0046, 0x8140, 0x11), t_s=BACK_S), emergency(1.0048, 0, 0)]
+AWAY = [*destroyed(32), emergency(1.0046, 0x8140, 0x11)._replace(t_s=BACK_S), emergency(1.0048, 0, 0)]
 
 
 def test_a_controller_s_troubles() -> None:
@@ -174,7 +173,7 @@ def test_a_controller_s_troubles() -> None:
     for frames in (PASSIVE[1:], PASSIVE[:-1], PASSIVE[:-2]):
         with pytest.raises(Failed):
             c.error_passive_is_told(capture(frames))
-    soon = [*AWAY[:-2], replace(AWAY[-2], t_s=BACK_S - 3e-6), AWAY[-1]]
+    soon = [*AWAY[:-2], AWAY[-2]._replace(t_s=BACK_S - 3e-6), AWAY[-1]]
     for frames in (AWAY[:-1], AWAY[32:], soon):
         with pytest.raises(Failed):
             c.coming_back_to_the_bus_is_told(capture(frames))

@@ -7,7 +7,6 @@ psa2_wrong_pins.py and psa2_wrong_can.py.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -106,7 +105,7 @@ def test_a_check_says_broken_or_too_little_of_a_dead_board(name: str, stage: Sta
 @pytest.mark.parametrize("name", CHECKS)
 def test_a_check_says_broken_or_too_little_of_wrong_lengths(name: str, stage: Stage) -> None:
     e = stage.capture(name)
-    e = e.with_can(CanLog(frames=tuple(replace(f, data=f.data[: k % 3]) for k, f in enumerate(e.can.frames))))
+    e = e.with_can(CanLog(frames=tuple(f._replace(data=f.data[: k % 3]) for k, f in enumerate(e.can.frames))))
     for fact in e.facts:
         if fact != "cut":
             e = told(fact, lambda _: REFUSED)(e) if isinstance(e.facts[fact], Answer) else e

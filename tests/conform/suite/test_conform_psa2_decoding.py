@@ -131,7 +131,7 @@ def test_halves_alone_are_left_out_and_short_ones_broken() -> None:
     e = log_of([(k, k) for k in range(30)])
     alone = e.with_can(CanLog(frames=e.can.frames[1:-1]))
     assert len(pairs(alone)) == 28
-    cut = e.with_can(CanLog(frames=(replace(e.can.frames[0], data=b"\0"), *e.can.frames[1:])))
+    cut = e.with_can(CanLog(frames=(e.can.frames[0]._replace(data=b"\0"), *e.can.frames[1:])))
     with pytest.raises(Failed, match="expected 8 bytes, got 1"):
         pairs(cut)
     with pytest.raises(Inconclusive, match="0 samples"):

@@ -116,8 +116,8 @@ def test_only_a_late_host_excuses_a_late_first_reading() -> None:
     for k in range(2, 30):
         rows += [("PMKA_CODES", {}), ("PMKA_STATE", {"SEQ": k})]
     frames = log("pmka", rows).frames
-    later = (replace(f, t_s=f.t_s + 0.0104 + 2 * 0.0048) for f in frames[1:])
-    can = CanLog(frames=(replace(frames[0], data=b"\0"), *later))
+    later = (f._replace(t_s=f.t_s + 0.0104 + 2 * 0.0048) for f in frames[1:])
+    can = CanLog(frames=(frames[0]._replace(data=b"\0"), *later))
     assert pmka_readings.readings_begin_with_0_after_res(capture("pmka", can))
     fails(pmka_readings.readings_begin_with_0_after_res, capture("pmka", can, facts={"prompt": True}))
 

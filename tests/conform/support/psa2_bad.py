@@ -161,12 +161,12 @@ def each(name: str, change: Callable[[CanFrame], CanFrame], nth: int | None = No
 
 def gone(name: str, nth: int | None = None) -> Bad:
     """Frames of a message never came."""
-    return each(name, lambda f: replace(f, can_id=0x7FF), nth)
+    return each(name, lambda f: f._replace(can_id=0x7FF), nth)
 
 
 def short(name: str, nth: int = 0) -> Bad:
     """A frame lacks its last byte."""
-    return each(name, lambda f: replace(f, data=f.data[:-1]), nth)
+    return each(name, lambda f: f._replace(data=f.data[:-1]), nth)
 
 
 def signal(name: str, s: str, change: Callable[[int], int], nth: int | None = None) -> Bad:
@@ -179,7 +179,7 @@ def signal(name: str, s: str, change: Callable[[int], int], nth: int | None = No
         raw = word >> at.start_bit & mask
         value = raw - (1 << at.bits) if at.signed and raw >> (at.bits - 1) else raw
         word = word & ~(mask << at.start_bit) | (change(value) & mask) << at.start_bit
-        return replace(f, data=word.to_bytes(len(f.data), "little"))
+        return f._replace(data=word.to_bytes(len(f.data), "little"))
 
     return each(name, edit, nth)
 
@@ -278,7 +278,7 @@ def late_half(e: Capture) -> Capture:
     found = list(e.frames_of("PSA2_ZT").frames)
     shifted = [found[0], *found[:-1]]
     it = iter(shifted)
-    return each("PSA2_ZT", lambda f: replace(f, data=next(it).data[:3] + f.data[3:]))(e)
+    return each("PSA2_ZT", lambda f: f._replace(data=next(it).data[:3] + f.data[3:]))(e)
 
 
 def boxcar(e: Capture) -> Capture:
@@ -289,7 +289,7 @@ def boxcar(e: Capture) -> Capture:
         mine = e.frames_of(name).frames
         for k, f in enumerate(found):
             if f.can_id == mine[0].can_id:
-                found[k] = replace(f, data=(mine[0] if k < begin else mine[-1]).data[:size] + f.data[size:])
+                found[k] = f._replace(data=(mine[0] if k < begin else mine[-1]).data[:size] + f.data[size:])
     return e.with_can(CanLog(frames=tuple(found)))
 
 
@@ -318,13 +318,13 @@ def mirrored(e: Capture) -> Capture:
 
 def swap_axes(e: Capture) -> Capture:
     """X and Y are exchanged on CAN."""
-    return each("PSA2_XY", lambda f: replace(f, data=f.data[3:6] + f.data[:3] + f.data[6:]))(e)
+    return each("PSA2_XY", lambda f: f._replace(data=f.data[3:6] + f.data[:3] + f.data[6:]))(e)
 
 
 def same_numbers(e: Capture) -> Capture:
     """Codes that no register corrects."""
     x = iter([f.data for f in e.frames_of("PSA2_XY").frames[:50]] * 20)
-    return each("PSA2_XY", lambda f: replace(f, data=next(x)[:6] + f.data[6:]))(e)
+    return each("PSA2_XY", lambda f: f._replace(data=next(x)[:6] + f.data[6:]))(e)
 
 
 def noisier(e: Capture) -> Capture:
@@ -336,5 +336,5 @@ def noisier(e: Capture) -> Capture:
 def steady(e: Capture) -> Capture:
     """The codes of all samples are those of the first."""
     x, z = e.frames_of("PSA2_XY").frames[0], e.frames_of("PSA2_ZT").frames[0]
-    made = each("PSA2_XY", lambda f: replace(f, data=x.data[:6] + f.data[6:]))(e)
-    return each("PSA2_ZT", lambda f: replace(f, data=z.data[:3] + f.data[3:]))(made)
+    made = each("PSA2_XY", lambda f: f._replace(data=x.data[:6] + f.data[6:]))(e)
+    return each("PSA2_ZT", lambda f: f._replace(data=z.data[:3] + f.data[3:]))(made)

@@ -41,11 +41,11 @@ from psabench.boards.psa2.conform.stimulus_can import Answer
 WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     # CAN
     "xy_and_zt_alternate": [gone("PSA2_ZT"), gone("PSA2_ZT", 20), gone("PSA2_XY", 20)],
-    "xy_comes_before_its_zt": [each("PSA2_ZT", lambda f: replace(f, t_s=f.t_s + 600e-6))],
+    "xy_comes_before_its_zt": [each("PSA2_ZT", lambda f: f._replace(t_s=f.t_s + 600e-6))],
     "messages_have_their_lengths": [short("PSA2_XY"), short("PSA2_ZT", 9), signal("PSA2_ZT", "CHANNEL", lambda v: 9)],
     "no_frame_before_its_transfer_has_ended": [
-        each("PSA2_XY", lambda f: replace(f, t_s=f.t_s - 300e-6)),
-        each("PSA2_XY", lambda f: replace(f, t_s=f.t_s + 600e-6)),
+        each("PSA2_XY", lambda f: f._replace(t_s=f.t_s - 300e-6)),
+        each("PSA2_XY", lambda f: f._replace(t_s=f.t_s + 600e-6)),
         still("Int", 0),
     ],
     "seq_rises_by_one": [signal("PSA2_XY", "SEQ", lambda v: v + 1, 77), dropped],
@@ -80,15 +80,15 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
     ],
     "tog_alternates": [signal("PSA2_FAST", "TOG", lambda v: 0), signal("PSA2_FAST", "TOG", lambda v: 1 - v, 9)],
     "form_2_is_one_fd_frame_a_sample": [
-        each("PSA2_FRAME", lambda f: replace(f, fd=False)),
-        each("PSA2_FRAME", lambda f: replace(f, brs=False), 3),
+        each("PSA2_FRAME", lambda f: f._replace(fd=False)),
+        each("PSA2_FRAME", lambda f: f._replace(brs=False), 3),
         gone("PSA2_FRAME"),
         signal("PSA2_FRAME", "TSTAMP", lambda v: v + 9, 7),
         short("PSA2_FRAME"),
     ],
     "form_3_is_one_fd_frame_every_five_samples": [
-        each("PSA2_BLOCK", lambda f: replace(f, fd=False)),
-        each("PSA2_BLOCK", lambda f: replace(f, brs=False)),
+        each("PSA2_BLOCK", lambda f: f._replace(fd=False)),
+        each("PSA2_BLOCK", lambda f: f._replace(brs=False)),
         signal("PSA2_BLOCK", "TSTAMP", lambda v: v + 9, 3),
     ],
     "a_block_begins_anew_after_a_stop": [
@@ -96,7 +96,7 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
         gone("PSA2_BLOCK"),
     ],
     "a_form_switches_its_tpdos": [told("off 2", lambda old: [Answer(a.value ^ 1 << 31) for a in old])],
-    "fd_frames_are_those_of_two_forms": [each("PSA2_XY", lambda f: replace(f, fd=True))],
+    "fd_frames_are_those_of_two_forms": [each("PSA2_XY", lambda f: f._replace(fd=True))],
     "each_sync_takes_one_sample": [gone("PSA2_XY", 3), signal("PSA2_XY", "SEQ", lambda v: 1)],
     "a_sample_of_a_sync_is_not_older_than_it": [signal("PSA2_ZT", "TSTAMP", lambda v: v - 1000)],
     "every_nth_frame_is_sent": [signal("PSA2_XY", "SEQ", lambda v: v + 1), signal("PSA2_XY", "SEQ", lambda v: 2 * v)],

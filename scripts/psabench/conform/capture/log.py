@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +28,7 @@ Bools = npt.NDArray[np.bool_]
 PPM = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CanFrame:
+class CanFrame(NamedTuple):
     """One frame as an adapter reports it; t_s: the adapter's own time stamp."""
 
     t_s: float
@@ -45,16 +44,8 @@ class CanFrame:
     @classmethod
     def of(cls, m: Message, t_s: float, brs: bool | None = None) -> CanFrame:
         """What python-can received or read."""
-        return cls(
-            t_s=t_s,
-            can_id=int(m.arbitration_id),
-            data=bytes(m.data),
-            fd=bool(m.is_fd),
-            error=bool(m.is_error_frame),
-            extended=bool(m.is_extended_id),
-            remote=bool(m.is_remote_frame),
-            brs=brs,
-        )
+        kind = {"fd": bool(m.is_fd), "error": bool(m.is_error_frame), "remote": bool(m.is_remote_frame)}
+        return cls(t_s, int(m.arbitration_id), bytes(m.data), extended=bool(m.is_extended_id), brs=brs, **kind)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

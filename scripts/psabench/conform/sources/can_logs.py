@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +61,7 @@ def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
     zero_s = frames[0].t_s if abs(frames[0].t_s) > EPOCH_S else 0.0
     if not zero_s:
         return tuple(frames)
-    return tuple(replace(f, t_s=f.t_s - zero_s) for f in frames)
+    return tuple(f._replace(t_s=f.t_s - zero_s) for f in frames)
 
 
 def _source(path: Path, bounds: Bounds) -> tuple[Any, str]:
