@@ -22,8 +22,9 @@ static bool run_slice(struct loop *l, int64_t until_ns)
 {
     const int64_t now_ns = l->sched->now_ns;
     const int64_t next_ns = sched_next_ns(l->sched);
+    const bool sliced = l->sliced && l->sliced(l->ctx);
     /* Over a stretch without events in one stride. */
-    const int64_t from_ns = next_ns > now_ns ? next_ns : now_ns;
+    const int64_t from_ns = next_ns > now_ns && !sliced ? next_ns : now_ns;
     const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + BENCH_SLICE_NS);
     sched_run_until(l->sched, to_ns);
     l->moved(l->ctx, l->sched->now_ns);
@@ -290,7 +291,7 @@ void loop_drain(struct loop *l, int timeout_ms)
 {
     int64_t progress_ns = pace_clock_ns();
     size_t last = links_pending(l->links);
-    while (last > 0 && pace_clock_ns() - progress_ns < (int64_t)timeout_ms * 1000000) {
+    while ((last > 0 || links_linger(l->links)) && pace_clock_ns() - progress_ns < (int64_t)timeout_ms * 1000000) {
         struct link *polled[LOOP_LINKS_MAX];
         struct pollfd p[LOOP_LINKS_MAX];
         arm_timers(l);

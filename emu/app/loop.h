@@ -24,6 +24,8 @@ struct loop {
     void (*run_done)(void *ctx);              /* a run of step pace is over and its output with the kernel */
     bool (*taken)(void *ctx, uint64_t count); /* so many frames of CAN clients, or no more before time moves */
     void (*say)(const char *text);            /* news of a link, for the user */
+    bool (*sliced)(
+        void *ctx); /* lines are sampled into buffers of a bounded size: no strides beyond a slice; NULL: never */
     void *ctx;
     /* read-only outside loop.c */
     bool quit, started;
@@ -39,7 +41,7 @@ struct loop {
  * and which are open only while the loop waits, so that none is missed. */
 void loop_run(struct loop *l, const volatile sig_atomic_t *stop);
 
-/* Hands out what waits, while peers keep reading: at the end of a run. Gives up after timeout_ms without progress. */
+/* Hands out what waits, while peers keep reading, and lets peers hang up that should do so first: at the end of a run. Gives up after timeout_ms without progress. */
 void loop_drain(struct loop *l, int timeout_ms);
 
 /* Step pace: time is to move by for_ns once `taken` says so of after_taken. False: a run is under way. */

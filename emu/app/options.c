@@ -4,6 +4,7 @@
 #include "base/why.h"
 #include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
+#include "link/logic/beagle_tcp.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -116,6 +117,26 @@ static bool set_scpi(const struct target *t, const char *arg)
         return expected(t, arg, "pty[:LINK] or a port from 0 (any free port) to 65535");
     }
     i->port = (uint16_t)port;
+    return true;
+}
+
+/* beaglelogic:5555:Int,Data,CLK; each part but the first may be missing. */
+static bool set_logic(const struct target *t, const char *arg)
+{
+    static const char word[] = "beaglelogic";
+    struct options *o = t->o;
+    if (o->logic_count == OPTIONS_LOGIC_MAX) return expected(t, arg, "up to %u logic analysers", OPTIONS_LOGIC_MAX);
+    struct options_logic *l = &o->logic[o->logic_count++];
+    const size_t len = strcspn(arg, ":");
+    const char *const port = arg[len] ? arg + len + 1 : "";
+    const size_t digits = strcspn(port, ":");
+    char number[8];
+    uint64_t v = BEAGLE_PORT;
+    *l = (struct options_logic){.lines = port[digits] && port[digits + 1] ? port + digits + 1 : NULL};
+    snprintf(number, sizeof number, "%.*s", (int)(digits < 7 ? digits : 7), port);
+    if (len != sizeof word - 1 || memcmp(arg, word, len) != 0) return expected(t, arg, "beaglelogic[:PORT[:LINE,...]]");
+    if (digits && !parse_u64(number, 65535, &v)) return expected(t, arg, "a port from 0 (any free port) to 65535");
+    l->port = (uint16_t)v;
     return true;
 }
 
@@ -245,7 +266,8 @@ static const struct row rows[] = {
      "                           socket, or as fast as possible"},
     {"--for", " TIME", set_for, 0, "simulated time to run: 300ms, 10s, 2min; without a unit, seconds"},
     {"--until-eof", NULL, set_flag, IN(until_eof), "exit on end-of-file on standard input"},
-    {"--wait-client", NULL, set_flag, IN(wait_client), "start the time when the first CAN client connects"},
+    {"--wait-client", NULL, set_flag, IN(wait_client), "start the time when the first CAN client connects or the first capture of\n"
+     "                           a logic analyser begins"},
     {"--seed", " N", set_seed, 0, "random seed; overrides the scenario"},
     {"--start", NULL, set_flag, IN(start), "start the units without an NMT command"},
     {"--bitrate", " HZ", set_rate, IN(bitrate), "bit rate of every bus; overrides the scenario; 0: frames take no time"},
@@ -259,12 +281,16 @@ static const struct row rows[] = {
     {"--restore", " FILE", set_path, IN(restore), "continue from a snapshot, instead of a SCENARIO"},
     {"--truth-log", " FILE", set_path, IN(truth_log), "record the true state of every unit as lines of JSON"},
     {"--truth-every", " TIME", set_truth_every, 0, "interval between records of --truth-log (default 10ms)"},
-    {"--unit", " NAME", set_path, IN(unit), "unit whose lines --vcd and --line show (default: the first)"},
+    {"--unit", " NAME", set_path, IN(unit), "unit whose lines --vcd, --line and --logic show (default: the first)"},
     {"--vcd", " FILE", set_path, IN(vcd), "record the lines as VCD"},
     {"--vcd-unit", " NS", set_vcd_unit, 0, "time unit of the VCD (default 10)"},
     {"--line", " LINK", set_path, IN(line), "line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
      "                           pseudo-terminal; LINK becomes a symbolic link to it; -: no link"},
     {"--line-hz", " HZ", set_line_hz, 0, "sample rate of the line port (default 8000000)"},
+    {"--logic", " beaglelogic[:PORT[:LINE,...]]", set_logic, 0, "\n"
+     "                           logic analyser of the BeagleLogic TCP protocol on 127.0.0.1, for PulseView and sigrok-cli\n"
+     "                           (default port: 5555; 0: any free one; default lines: 14 of the board; may be given several\n"
+     "                           times)"},
     {"--bus-port", " [UNIT:]LINK", set_bus_port, 0, "bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
      "                           (default: the first unit that has one); LINK as above; may be given several times"},
     {"--quiet", NULL, set_flag, IN(quiet), "no counters on stderr at exit"},

@@ -9,9 +9,10 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define OPTIONS_CAN_MAX  8u
-#define OPTIONS_SCPI_MAX 8u
-#define OPTIONS_BUS_MAX  8u
+#define OPTIONS_CAN_MAX   8u
+#define OPTIONS_SCPI_MAX  8u
+#define OPTIONS_BUS_MAX   8u
+#define OPTIONS_LOGIC_MAX 4u
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_CAN_LOG };
 
@@ -34,6 +35,11 @@ struct options_bus {
     const char *arg;  /* as given */
     char unit[32];    /* "": the first that has a bus */
     const char *link; /* symbolic link; NULL: none */
+};
+
+struct options_logic {
+    uint16_t port;     /* 0: a free one */
+    const char *lines; /* names with commas; NULL: the board's default */
 };
 
 /* Of the buses, instead of the scenario's. */
@@ -65,6 +71,8 @@ struct options {
     unsigned scpi_count;
     struct options_bus bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
+    struct options_logic logic[OPTIONS_LOGIC_MAX];
+    unsigned logic_count;
     enum pace_kind pace;
     int64_t for_ns; /* end of the run; INT64_MAX: none */
     bool seed_given;

@@ -19,7 +19,7 @@ static bool fail_pty(char *why, size_t cap, const char *option, const char *arg,
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
-                                     2 * OPTIONS_BUS_MAX + 3,
+                                     2 * OPTIONS_BUS_MAX + 3 + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1),
                "LOOP_LINKS_MAX");
 
 /* ---- CAN */
@@ -120,7 +120,8 @@ static bool line_start(void *ctx, int64_t t_ns)
     struct bench *b = ctx;
     (void)t_ns;
     const struct unit *u = &b->unit[b->watched];
-    return sampler_start(&b->sampler, unit_trace(u), u->type->port_lines, &b->sampler.clock);
+    const struct sampler_cfg cfg = sampler_line_port(&b->sampler.clock, u->type->port_lines, b->line_ring);
+    return sampler_start(&b->sampler, unit_trace(u), &cfg);
 }
 
 static void line_stop(void *ctx)
@@ -298,14 +299,14 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap);
+    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && logic_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
-           open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
-           open_socket(&p->control, "control", o->control, why, cap) &&
+           logic_open(&p->logic, &p->links, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
+           instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
@@ -363,6 +364,13 @@ static void add_line(const struct ports *p, const struct options *o, cJSON *all)
     add_pty(e, &p->line->pty);
 }
 
+static void add_logic(const struct logic_port *p, cJSON *all)
+{
+    cJSON *e = add_endpoint(all, "logic", "beaglelogic");
+    add_port(e, p->server.port);
+    add_key(e, "lines", p->names);
+}
+
 static void add_instrument(const struct instrument *i, cJSON *all)
 {
     cJSON *e = add_endpoint(all, "scpi", i->kind->name);
@@ -381,6 +389,7 @@ cJSON *ports_endpoints(const struct ports *p, const struct options *o)
         add_key(e, "unit", b->bench->scenario.units[b->unit].name);
         add_pty(e, &b->pty.pty);
     }
+    for (unsigned i = 0; i < p->logic.count; i++) add_logic(p->logic.port[i], all);
     for (unsigned k = 0; k < p->scpi.count; k++) add_instrument(p->scpi.port[k], all);
     if (o->vcd) add_endpoint(all, "vcd", o->vcd);
     if (o->control) add_endpoint(all, "control", o->control);
@@ -431,6 +440,7 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
     for (unsigned i = 0; i < p->bus_count; i++) close_bus_port(p->bus[i]);
+    logic_close(&p->logic);
     instruments_close(&p->scpi);
     ctl_close(&p->control);
     ctl_close(&p->truth);
@@ -439,6 +449,7 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
     for (unsigned i = 0; i < p->bus_count; i++) free(p->bus[i]);
     instruments_free(&p->scpi);
+    logic_free(&p->logic);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
     p->can_count = p->bus_count = 0;

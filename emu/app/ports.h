@@ -3,6 +3,7 @@
 #define PSABENCH_APP_PORTS_H
 
 #include "app/instruments.h"
+#include "app/logic.h"
 #include "app/options.h"
 #include "bench/bench.h"
 #include "link/can/can_hub.h"
@@ -45,6 +46,7 @@ struct ports {
     struct line_pty *line;
     struct bus_port *bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
+    struct logic_ports logic;
     struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;

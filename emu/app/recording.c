@@ -130,6 +130,7 @@ void service_end_files(struct service *s)
 {
     const bool recorded = s->bench->recording;
     bench_finish(s->bench);
+    service_end_capture(s);
     s->bench->recording = recorded; /* for check_all() */
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) (void)can_log_flush(&s->ports.can[i]->log);
@@ -250,6 +251,7 @@ void service_describe_files(void *ctx, cJSON *result)
     }
     if (truth->out)
         add_file(files, "truth log", s->o->truth_log, size_of(fileno(truth->out)), error_text(truth->error));
+    logic_describe(&s->ports.logic, result);
     cJSON *journal = cJSON_AddObjectToObject(result, "journal");
     cJSON_AddNumberToObject(journal, "bytes", (double)s->journal.len);
     cJSON_AddNumberToObject(journal, "max_bytes", JOURNAL_MAX);

@@ -70,6 +70,7 @@ static void print_counters(struct service *s)
             (double)p->frames.max_ns * 1e-3, p->late, p->slips);
     }
     service_print_clients(s);
+    logic_print_counters(&s->ports.logic);
 }
 
 void service_close(struct service *s)

@@ -2,6 +2,7 @@
 #ifndef PSABENCH_APP_SERVICE_H
 #define PSABENCH_APP_SERVICE_H
 
+#include "app/capture.h"
 #include "app/loop.h"
 #include "app/ports.h"
 #include "bench/bench.h"
@@ -35,6 +36,7 @@ struct service {
     bool refused;         /* bad input: a snapshot that cannot be done again, a bus or instrument that is not there */
     uint32_t connections; /* connections of CAN clients before time began: of the snapshot */
     struct truth_log truth_log;
+    struct capture_job capture;
     struct snapshot_observers observers;
     struct link input; /* --until-eof */
 };
@@ -75,6 +77,13 @@ void service_check_files(struct service *s); /* what has failed is said, and end
 void service_end_files(struct service *s);   /* all goes into the files, and is looked at */
 void service_describe_files(void *ctx, cJSON *result);
 bool service_open_truth_log(struct service *s, char *why, size_t cap);
+
+/* capture.c */
+extern const struct control_captures service_captures;
+void service_follow_capture(struct service *s);  /* after time has moved: triggers open files, edges go into them */
+void service_end_capture(struct service *s);     /* a file under way ends */
+void service_abandon_capture(struct service *s); /* without a file */
+bool service_is_sliced(void *ctx);               /* for loop.sliced */
 
 /* service_save.c */
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);

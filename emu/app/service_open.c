@@ -79,6 +79,7 @@ static void make_view(struct service *s)
     s->view = (struct control_bench){.ctx = s,
                                      .sim = {do_run, do_run_stop, do_pace, do_supply_changed},
                                      .recording = service_recording,
+                                     .capture = service_captures,
                                      .clients = service_clients,
                                      .process = {.quit = do_quit,
                                                  .push = do_push,
@@ -129,7 +130,7 @@ static void on_truth_line(void *ctx, struct ctl_client *c, const char *line, int
 static bool may_start(void *ctx)
 {
     const struct service *s = ctx;
-    return !s->o->wait_client || s->ports.connections > s->connections;
+    return !s->o->wait_client || s->ports.connections > s->connections || logic_has_begun(&s->ports.logic);
 }
 
 static void on_moved(void *ctx, int64_t now_ns)
@@ -140,6 +141,7 @@ static void on_moved(void *ctx, int64_t now_ns)
     journal_moved(&s->journal);
     service_sweep_detached(s, false);
     snapshot_release_lines(&s->observers, s->bench);
+    service_follow_capture(s);
     service_check_files(s);
     service_check_journal(s);
 }
@@ -200,6 +202,7 @@ static void init_service(struct service *s, struct bench *b, const struct option
                             .run_done = run_done,
                             .taken = service_taken,
                             .say = service_say,
+                            .sliced = service_is_sliced,
                             .ctx = s};
     ports_init(&s->ports, b, o);
     service_follow(s);

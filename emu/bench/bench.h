@@ -42,7 +42,8 @@ struct bench {
     unsigned watched; /* unit whose lines are recorded */
     bool recording;
     struct vcd vcd;
-    struct sampler sampler;
+    struct sampler sampler; /* of the line port */
+    uint8_t line_ring[SAMPLER_RING];
     /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
     struct unit unit[SCENARIO_UNITS_MAX];
     struct bench_cycle cycle[SCENARIO_UNITS_MAX];

@@ -58,6 +58,23 @@ struct control_recording { /* of the lines of a unit, as VCD; start NULL: there 
     bool (*flush)(void *ctx, char *why);
 };
 
+/* A capture around a trigger, probe.arm. */
+struct control_capture {
+    const char *path;
+    unsigned unit, line;
+    unsigned when; /* enum capture_when of the line */
+    int64_t pre_ns, post_ns;
+    uint32_t files;
+    uint64_t ring_bytes, max_bytes;
+};
+
+struct control_captures { /* arm NULL: there are none */
+    bool (*arm)(void *ctx, const struct control_capture *c, char *why);
+    bool (*disarm)(void *ctx, char *why);
+    void (*trigger)(void *ctx, int64_t t_ns); /* what it waits for is here; from within an event */
+    void (*describe)(void *ctx, struct cJSON *result);
+};
+
 struct control_clients {           /* programs on the CAN buses */
     uint64_t (*can_rx)(void *ctx); /* frames delivered to the client that has been on the bus longest */
     bool (*nth)(void *ctx, unsigned i, struct control_client *out); /* in order of coming; false past the last */
@@ -96,6 +113,7 @@ struct control_bench {
 
     struct control_sim sim;
     struct control_recording recording;
+    struct control_captures capture;
     struct control_clients clients;
     struct control_process process;
 };

@@ -5,7 +5,7 @@
 #include "control/internal.h"
 
 extern const struct control_table commands_bench, commands_head, commands_table, commands_chamber, commands_supply,
-    commands_platform, commands_watch, commands_fault, commands_snapshot, commands_bus, commands_truth;
+    commands_platform, commands_watch, commands_probe, commands_fault, commands_snapshot, commands_bus, commands_truth;
 
 /* "unit" of commands; optional where the bench has one unit. */
 #define CONTROL_UNIT_ARG(is_optional)                                                                                  \

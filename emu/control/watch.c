@@ -38,9 +38,26 @@ static bool has_subscriber(const struct control *c, enum control_topic topic)
     return false;
 }
 
+/* ---- triggers of a capture */
+
+static void count_trigger(struct control *c, int64_t t_ns)
+{
+    struct control_arm *a = &c->watch.arm;
+    if (++a->seen < a->count) return;
+    a->seen = 0;
+    c->bench->capture.trigger(c->bench->ctx, t_ns);
+}
+
+static void look_at_fault(struct control *c, const struct fault *f, int64_t t_ns)
+{
+    const struct control_arm *a = &c->watch.arm;
+    if (a->on_fault && f->state == FAULT_ACTIVE && (!a->fault || a->fault == f->kind)) count_trigger(c, t_ns);
+}
+
 void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
 {
     struct control *c = ctx;
+    look_at_fault(c, f, t_ns);
     if (!has_subscriber(c, CONTROL_FAULTS)) return;
     cJSON *event = cJSON_CreateObject();
     cJSON_AddStringToObject(event, "event", "fault");
@@ -59,6 +76,8 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
     const struct control_observer *observer = ctx;
     struct control *c = observer->control;
     struct control_until *u = &c->watch.until;
+    const struct control_arm *a = &c->watch.arm;
+    if (a->on_event && e == a->event && observer->unit == a->unit) count_trigger(c, t_ns);
     if (has_subscriber(c, CONTROL_EVENTS)) {
         cJSON *event = cJSON_CreateObject();
         cJSON_AddStringToObject(event, "event", c->bench->unit[observer->unit]->type->events[e]);
@@ -75,7 +94,7 @@ static void on_event(void *ctx, unsigned e, int64_t t_ns)
 static void refresh_observers(struct control *c)
 {
     struct control_watch *w = &c->watch;
-    const bool needed = w->until.active || has_subscriber(c, CONTROL_EVENTS);
+    const bool needed = w->until.active || w->arm.on_event || has_subscriber(c, CONTROL_EVENTS);
     if (needed == w->listening) return;
     w->listening = needed;
     for (unsigned i = 0; i < c->bench->units; i++) {
@@ -101,6 +120,18 @@ struct control_until control_watch_end(struct control *c)
     c->watch.until = (struct control_until){0};
     refresh_observers(c);
     return was;
+}
+
+void control_watch_arm(struct control *c, const struct control_arm *arm)
+{
+    c->watch.arm = *arm;
+    refresh_observers(c);
+}
+
+void control_watch_disarm(struct control *c)
+{
+    c->watch.arm = (struct control_arm){0};
+    refresh_observers(c);
 }
 
 /* ---- subscriptions */

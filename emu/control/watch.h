@@ -14,6 +14,7 @@
 #define CONTROL_SUBS_MAX 32u
 
 struct control;
+struct fault_kind;
 
 enum control_topic { CONTROL_STATUS, CONTROL_EVENTS, CONTROL_FAULTS, CONTROL_TOPICS };
 
@@ -39,11 +40,20 @@ struct control_until {
     uint64_t count, seen;
 };
 
+/* What a capture waits for, beside lines: the count-th such thing from now on, and again. */
+struct control_arm {
+    bool on_fault, on_event;
+    const struct fault_kind *fault; /* NULL: any */
+    unsigned event, unit;           /* event: number in the list of the unit's board */
+    uint64_t count, seen;
+};
+
 struct control_watch { /* read-only outside watch.c */
     struct control_sub sub[CONTROL_SUBS_MAX];
     struct control_observer observer[CONTROL_UNITS_MAX];
     bool listening;
     struct control_until until;
+    struct control_arm arm;
     struct trace_sink probe[CONTROL_UNITS_MAX]; /* keeps the lines of a unit alive once somebody has looked at them */
 };
 
@@ -52,6 +62,10 @@ void control_watch_until(struct control *c, unsigned event, unsigned unit, uint6
 
 /* The run is over: what came, and no client waits any more. */
 struct control_until control_watch_end(struct control *c);
+
+/* capture.trigger() of the bench is called at the very instant of each such fault or event, until disarmed. */
+void control_watch_arm(struct control *c, const struct control_arm *arm);
+void control_watch_disarm(struct control *c);
 
 /* False: there is no room, or the client has that topic already and its interval was changed instead (true). */
 bool control_subscribe(struct control *c, void *client, enum control_topic topic, int64_t every_ns, int64_t t_ns);

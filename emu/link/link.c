@@ -51,3 +51,10 @@ size_t links_pending(const struct links *ls)
     for (const struct link *l = ls->first; l; l = l->next) n += l->gone ? 0 : l->pending;
     return n;
 }
+
+bool links_linger(const struct links *ls)
+{
+    for (const struct link *l = ls->first; l; l = l->next)
+        if (l->linger && !l->gone) return true;
+    return false;
+}

@@ -17,6 +17,7 @@ struct link {
     bool want_read;    /* false: the loop leaves input in the kernel (back-pressure) */
     bool want_write;   /* true while output waits */
     bool full;         /* output is above its high-water mark: in step and free pace time stands still meanwhile */
+    bool linger;       /* at the end of a run the loop waits a while for the peer to hang up first */
     bool gone;         /* to be reaped: release() is the last call */
     bool slow;         /* the loop's: said that time waits for it */
     size_t pending;    /* bytes of output not yet handed to the kernel */
@@ -48,5 +49,6 @@ void links_reap(struct links *ls);
 
 bool links_full(const struct links *ls);
 size_t links_pending(const struct links *ls);
+bool links_linger(const struct links *ls);
 
 #endif

@@ -7,6 +7,10 @@
 /* Listens, non-blocking, at *port; 0: a free one, which is reported. The descriptor, or -errno. */
 int tcp_listen(uint16_t *port);
 
+/* Of a listening socket, before the first connection: segments to the peer have an even number of bytes, so that a peer that
+ * takes each read as whole 16-bit words, as libsigrok does, is not cut off inside one. */
+void tcp_even_segments(int fd);
+
 /* Small segments of a connection go out at once. */
 void tcp_no_delay(int fd);
 

@@ -7,30 +7,72 @@ static size_t min_size(size_t a, size_t b)
     return a < b ? a : b;
 }
 
-static void append_run(struct sampler *s, uint8_t byte, size_t n)
+static int64_t min_count(int64_t a, int64_t b)
 {
-    while (n > 0) {
-        const size_t at = (s->head + s->len) % SAMPLER_RING;
-        const size_t run = min_size(n, SAMPLER_RING - at);
-        memset(s->ring + at, byte, run);
-        s->len += run;
-        n -= run;
+    return a < b ? a : b;
+}
+
+static void fill_samples(uint8_t *to, uint16_t level, unsigned bytes, size_t n)
+{
+    if (bytes == 1) {
+        memset(to, level, n);
+        return;
     }
+    for (size_t i = 0; i < n; i += 2) {
+        to[i] = (uint8_t)level;
+        to[i + 1] = (uint8_t)(level >> 8);
+    }
+}
+
+/* n bytes of one level. */
+static void append_run(struct sampler *s, uint16_t level, size_t n)
+{
+    size_t at = s->head + s->len;
+    if (at >= s->cap) at -= s->cap;
+    s->len += n;
+    for (size_t run; n > 0; n -= run, at = 0) {
+        run = min_size(n, s->cap - at);
+        fill_samples(s->ring + at, level, s->bytes, run);
+    }
+}
+
+static void keep_samples(struct sampler *s, int64_t n)
+{
+    if (n == 0) return;
+    if (s->gap) {
+        append_run(s, s->level | s->gap, s->bytes);
+        append_run(s, s->level, (size_t)(n - 1) * s->bytes);
+    } else {
+        append_run(s, s->level, (size_t)n * s->bytes);
+    }
+    s->gap = 0;
+    s->hole = false;
+    s->kept += (uint64_t)n;
+}
+
+/* The rest of the block that the last of them is in is lost, too. */
+static void lose_samples(struct sampler *s, int64_t n)
+{
+    if (n == 0) return;
+    const uint32_t begun = (uint32_t)(n % s->block);
+    s->skip = begun ? s->block - begun : 0;
+    s->dropped += (uint64_t)n;
+    s->holes += !s->hole;
+    s->hole = true;
+    s->gap = s->mark;
 }
 
 /* Makes n samples of the present levels, as far as the ring has room. */
 static void emit_samples(struct sampler *s, int64_t n)
 {
-    const int64_t room = (int64_t)(SAMPLER_RING - s->len);
-    const int64_t kept = n < room ? n : room;
-    if (kept > 0) {
-        append_run(s, s->level | s->gap, 1);
-        append_run(s, s->level, (size_t)kept - 1);
-        s->gap = 0;
-    }
-    if (kept < n) s->gap = SAMPLER_GAP;
-    s->dropped += (uint64_t)(n - kept);
     s->next += n;
+    const int64_t skipped = min_count(n, s->skip);
+    s->skip -= (uint32_t)skipped;
+    s->dropped += (uint64_t)skipped;
+    n -= skipped;
+    const int64_t kept = min_count(n, (int64_t)((s->cap - s->len) / s->bytes));
+    keep_samples(s, kept);
+    lose_samples(s, n - kept);
 }
 
 static void sample_until(struct sampler *s, int64_t t_ns)
@@ -44,11 +86,14 @@ static void on_steps(void *ctx, const struct trace_step *step, unsigned n)
 {
     struct sampler *s = ctx;
     for (const struct trace_step *const end = step + n; step < end; step++) {
-        if (!(step->lines & s->sink.mask)) continue;
+        uint64_t lines = step->lines & s->sink.mask;
+        if (!lines) continue;
         sample_until(s, step->t_ns); /* a sample at t_ns itself sees the new level */
-        for (unsigned i = 0; i < s->lines; i++)
-            if (step->lines >> s->sig[i] & 1)
-                s->level = (uint8_t)((s->level & ~(1u << i)) | (step->level >> s->sig[i] & 1) << i);
+        for (; lines; lines &= lines - 1) {
+            const unsigned sig = (unsigned)__builtin_ctzll(lines);
+            const uint16_t bit = s->bit[sig];
+            s->level = (uint16_t)(step->level >> sig & 1 ? s->level | bit : s->level & ~bit);
+        }
     }
 }
 
@@ -57,38 +102,59 @@ static void on_advance(void *ctx, int64_t t_ns)
     sample_until(ctx, t_ns);
 }
 
-bool sampler_start(struct sampler *s, struct trace *t, const char *const *names, const struct clk *clock)
+unsigned sampler_lines_max(const struct sampler_cfg *cfg)
 {
-    const struct clk own = *clock; /* may be that of the run before, in s itself */
-    memset(s, 0, offsetof(struct sampler, ring));
-    s->trace = t;
-    s->clock = own;
+    return cfg->gap ? 7 : 8 * cfg->bytes;
+}
+
+bool sampler_start(struct sampler *s, struct trace *t, const struct sampler_cfg *cfg)
+{
+    struct sampler n = {.trace = t,
+                        .clock = cfg->clock,
+                        .bytes = cfg->bytes,
+                        .mark = cfg->gap,
+                        .block = cfg->block,
+                        .ring = cfg->ring,
+                        .cap = cfg->ring_bytes};
     uint64_t mask = 0;
-    for (unsigned i = 0; names[i]; i++) {
-        const int sig = trace_find(t, names[i]);
-        if (sig < 0 || i == SAMPLER_LINES) return false;
-        s->lines = i + 1;
-        s->sig[i] = (uint8_t)sig;
+    for (unsigned i = 0; cfg->names[i]; i++) {
+        const int sig = trace_find(t, cfg->names[i]);
+        if (sig < 0 || i == sampler_lines_max(cfg)) return false;
+        n.bit[sig] |= (uint16_t)(1u << i);
         mask |= TRACE_BIT(sig);
     }
-    s->next = clk_count_at(&own, t->done_ns);
+    n.next = clk_count_at(&n.clock, t->done_ns);
+    *s = n;
     s->sink = (struct trace_sink){.mask = mask, .steps = on_steps, .advance = on_advance, .ctx = s};
     trace_attach(t, &s->sink);
     return true;
 }
 
+struct sampler_cfg sampler_line_port(const struct clk *clock, const char *const *names, uint8_t *ring)
+{
+    return (struct sampler_cfg){.clock = *clock,
+                                .names = names,
+                                .bytes = 1,
+                                .gap = SAMPLER_GAP,
+                                .block = 1,
+                                .ring = ring,
+                                .ring_bytes = SAMPLER_RING};
+}
+
 void sampler_stop(struct sampler *s)
 {
-    trace_detach(s->trace, &s->sink);
+    if (s->trace) trace_detach(s->trace, &s->sink);
 }
 
 size_t sampler_take(struct sampler *s, uint8_t *buf, size_t cap)
 {
-    const size_t n = min_size(cap, s->len);
-    const size_t run = min_size(n, SAMPLER_RING - s->head);
+    if (s->len == 0) return 0;
+    const size_t n = min_size(cap - cap % s->bytes, s->len);
+    const size_t run = min_size(n, s->cap - s->head);
     memcpy(buf, s->ring + s->head, run);
     memcpy(buf + run, s->ring, n - run);
-    s->head = (s->head + n) % SAMPLER_RING;
+    s->head += n;
+    if (s->head >= s->cap) s->head -= s->cap;
     s->len -= n;
     return n;
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from psabench.link.control import HasControl
 
@@ -31,6 +32,26 @@ class Probe:
     def flush(self) -> None:
         """Write what has been recorded so far, with a closing time; the recording goes on."""
         self._bench.control.call("vcd.flush")
+
+    def arm(
+        self, on: str, path: str | Path, *, unit: str | None = None, pre_s: float = 0.01, post_s: float = 0.01,
+        files: int = 1, **more: float
+    ) -> None:
+        """Capture the lines of a unit (the first) around a trigger into VCD files.
+
+        on: fault[:KIND], event:NAME, line:NAME:rising|falling|edge|high|low. more: count, ring_mb, limit_mb of the
+        command probe.arm.
+        """
+        times: dict[str, object] = {"pre_s": pre_s, "post_s": post_s, "files": files}
+        self._bench.control.call("probe.arm", on=on, path=os.path.abspath(path), **_unit(unit), **times, **more)
+
+    def disarm(self) -> None:
+        """End the capture; a file that is being written ends."""
+        self._bench.control.call("probe.disarm")
+
+    def captures(self) -> dict[str, Any]:
+        """State of the capture, and its latest files with the instants of trigger, begin and end in simulated ns."""
+        return dict(self._bench.control.call("probe.captures").result)
 
 
 def _unit(name: str | None) -> dict[str, object]:

@@ -21,6 +21,7 @@ struct world {
     struct trace t;
     struct ear ear[2];
     struct sampler sampler;
+    uint8_t ring[SAMPLER_RING];
     bool sampling;
     int64_t now_ns;
 };
@@ -72,7 +73,8 @@ static void listeners(struct world *w, struct script *s)
         sampler_stop(&w->sampler);
         w->sampling = false;
     } else {
-        w->sampling = sampler_start(&w->sampler, &w->t, names, &clock);
+        const struct sampler_cfg cfg = sampler_line_port(&clock, names, w->ring);
+        w->sampling = sampler_start(&w->sampler, &w->t, &cfg);
         assert(w->sampling);
     }
 }

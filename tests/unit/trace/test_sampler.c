@@ -13,7 +13,7 @@ static const char *const names[] = {"Int", "Data", "CLK", NULL};
 
 static struct trace trace;
 static struct sampler sampler;
-static uint8_t buf[SAMPLER_RING + 16];
+static uint8_t ring[SAMPLER_RING], buf[SAMPLER_RING + 16];
 
 static const struct clk mhz8 = {.t0_ns = 0, .hz = 8000000, .div = 1}; /* 125 ns */
 
@@ -26,6 +26,12 @@ static int fresh(void **state)
     trace_add(&trace, "CLK", false);
     trace_add(&trace, "Int", true);
     return 0;
+}
+
+static bool start_port(const char *const *lines, const struct clk *clock)
+{
+    const struct sampler_cfg cfg = sampler_line_port(clock, lines, ring);
+    return sampler_start(&sampler, &trace, &cfg);
 }
 
 /* Instant of the n-th sample that is still to be made. */
@@ -43,7 +49,7 @@ static void assert_bytes(const uint8_t *want, size_t n)
 static void a_sample_is_the_level_valid_from_its_instant_on(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_true(start_port(names, &mhz8));
     trace_set(&trace, 3, false, 250); /* exactly sample 2 */
     trace_set(&trace, 1, true, 251);  /* just after it */
     trace_set(&trace, 2, true, 500);
@@ -59,7 +65,7 @@ static void a_sample_is_the_level_valid_from_its_instant_on(void **state)
 static void pulses_between_two_samples_are_not_seen(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_true(start_port(names, &mhz8));
     trace_set(&trace, 2, true, 130);
     trace_set(&trace, 2, false, 249);
     trace_advance(&trace, 375);
@@ -82,7 +88,7 @@ static void the_first_sample_has_a_known_instant(void **state)
     for (size_t i = 0; i < COUNT(row); i++) {
         fresh(NULL);
         trace_advance(&trace, row[i].start_ns);
-        assert_true(sampler_start(&sampler, &trace, names, &row[i].clock));
+        assert_true(start_port(names, &row[i].clock));
         assert_int_equal(next_ns(0), row[i].t0_ns);
         trace_set(&trace, 3, false, row[i].t0_ns + 1);
         trace_advance(&trace, row[i].t0_ns + 1);
@@ -94,7 +100,7 @@ static void the_first_sample_has_a_known_instant(void **state)
 static void a_slow_reader_loses_the_newest_samples_and_can_see_it(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_true(start_port(names, &mhz8));
     assert_int_equal(next_ns(SAMPLER_RING - sampler.len), (int64_t)SAMPLER_RING * 125);
     trace_advance(&trace, next_ns(SAMPLER_RING - sampler.len));
     assert_int_equal(sampler.dropped, 0);
@@ -119,7 +125,7 @@ static void a_trace_without_the_lines_is_refused(void **state)
     memset(&trace, 0, sizeof trace);
     trace_add(&trace, "Int", true);
     trace_add(&trace, "CLK", false);
-    assert_false(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_false(start_port(names, &mhz8));
     assert_null(trace.sinks);
     sampler_stop(&sampler);
 }
@@ -133,9 +139,9 @@ static void a_board_chooses_up_to_seven_lines(void **state)
     (void)state;
     memset(&trace, 0, sizeof trace);
     for (unsigned i = 0; i < 8; i++) trace_add(&trace, eight[i], i % 2);
-    assert_false(sampler_start(&sampler, &trace, eight, &mhz8));
+    assert_false(start_port(eight, &mhz8));
     assert_null(trace.sinks);
-    assert_true(sampler_start(&sampler, &trace, back, &mhz8));
+    assert_true(start_port(back, &mhz8));
     trace_set(&trace, 0, true, 125);  /* a: bit 6 */
     trace_set(&trace, 7, false, 125); /* not ours */
     trace_set(&trace, 5, false, 250); /* f: bit 1 */
@@ -147,7 +153,7 @@ static void a_board_chooses_up_to_seven_lines(void **state)
 static void nothing_is_watched_once_stopped_and_what_waits_stays(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_true(start_port(names, &mhz8));
     trace_advance(&trace, 250);
     sampler_stop(&sampler);
     assert_false(trace_watched(&trace, UINT64_MAX));
@@ -158,12 +164,12 @@ static void nothing_is_watched_once_stopped_and_what_waits_stays(void **state)
 static void a_new_reader_starts_afresh_on_the_same_clock(void **state)
 {
     (void)state;
-    assert_true(sampler_start(&sampler, &trace, names, &mhz8));
+    assert_true(start_port(names, &mhz8));
     trace_advance(&trace, next_ns(SAMPLER_RING - sampler.len) + 125);
     assert_int_equal(sampler.dropped, 1);
     sampler_stop(&sampler);
     trace_advance(&trace, 1000000000);
-    assert_true(sampler_start(&sampler, &trace, names, &sampler.clock));
+    assert_true(start_port(names, &sampler.clock));
     assert_int_equal(next_ns(0), 1000000000);
     assert_int_equal(sampler.dropped, 0);
     trace_advance(&trace, 1000000126);
@@ -179,7 +185,7 @@ static void random_edges_equal_the_definition(void **state)
     struct rng rng = rng_stream(rig_seed(5), 2, "test");
     const struct clk clock = {.t0_ns = 17, .hz = 7372800, .div = 1};
     trace_advance(&trace, 20);
-    assert_true(sampler_start(&sampler, &trace, names, &clock));
+    assert_true(start_port(names, &clock));
     static uint8_t got[400000], want[400000];
     static const uint8_t bit[4] = {0, D, C, I};
     uint8_t level = I;
@@ -201,6 +207,72 @@ static void random_edges_equal_the_definition(void **state)
     assert_int_equal(sampler.dropped, 0);
 }
 
+/* ---- the logic analyser's: two bytes a sample, holes of whole blocks */
+
+static bool start_words(const char *const *lines, uint32_t block, size_t ring_bytes)
+{
+    const struct sampler_cfg cfg = {
+        .clock = mhz8, .names = lines, .bytes = 2, .block = block, .ring = ring, .ring_bytes = ring_bytes};
+    return sampler_start(&sampler, &trace, &cfg);
+}
+
+static void sixteen_lines_are_words_low_byte_first(void **state)
+{
+    static const char *const all[] = {"a", "b", "c", "d", "e", "f", "g", "h", "i",
+                                      "j", "k", "l", "m", "n", "o", "p", "q", NULL};
+    static const uint8_t want[] = {0x01, 0x00, 0x01, 0x80, 0x00, 0x81};
+    (void)state;
+    memset(&trace, 0, sizeof trace);
+    for (unsigned i = 0; i < 17; i++) trace_add(&trace, all[i], i == 0);
+    assert_false(start_words(all, 1, 64));
+    assert_null(trace.sinks);
+    trace.name[16] = "z";
+    static const char *const sixteen[] = {"a", "b", "c", "d", "e", "f", "g", "h", "i",
+                                          "j", "k", "l", "m", "n", "o", "p", NULL};
+    assert_true(start_words(sixteen, 1, 64));
+    trace_set(&trace, 15, true, 125);
+    trace_put(&trace, TRACE_BIT(0) | TRACE_BIT(8), TRACE_BIT(8), 250);
+    trace_advance(&trace, 375);
+    assert_bytes(want, sizeof want);
+    sampler_stop(&sampler);
+}
+
+/* What is taken is whole samples, whatever the room of who takes them. */
+static void words_are_never_cut(void **state)
+{
+    (void)state;
+    assert_true(start_words(names, 1, 64));
+    trace_advance(&trace, 5 * 125);
+    assert_int_equal(sampler_take(&sampler, buf, 1), 0);
+    assert_int_equal(sampler_take(&sampler, buf, 5), 4);
+    assert_int_equal(sampler_take(&sampler, buf, 99), 6);
+    sampler_stop(&sampler);
+}
+
+static void a_hole_is_whole_blocks_and_the_time_axis_goes_on_behind_it(void **state)
+{
+    (void)state;
+    assert_true(start_words(names, 8, 32)); /* room for 16 samples */
+    trace_advance(&trace, 17 * 125);        /* the 17th begins a hole of 8 */
+    assert_int_equal(sampler.dropped, 1);
+    assert_int_equal(sampler.skip, 7);
+    assert_int_equal(sampler_take(&sampler, buf, 32), 32);
+    trace_set(&trace, 2, true, 20 * 125); /* within the hole: seen behind it */
+    trace_advance(&trace, 26 * 125);
+    assert_int_equal(sampler.dropped, 8);
+    assert_int_equal(sampler.holes, 1);
+    assert_int_equal(sampler.kept, 18);
+    static const uint8_t want[] = {I | C, 0, I | C, 0};
+    assert_bytes(want, sizeof want);
+    trace_advance(&trace, (26 + 16 + 20) * 125); /* a long one: 20 lost make 24 */
+    assert_int_equal(sampler_take(&sampler, buf, 32), 32);
+    trace_advance(&trace, (26 + 16 + 24 + 1) * 125);
+    assert_int_equal(sampler.dropped, 32);
+    assert_int_equal(sampler.holes, 2);
+    assert_int_equal(sampler.kept, 35);
+    sampler_stop(&sampler);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -213,6 +285,9 @@ int main(void)
         cmocka_unit_test_setup(nothing_is_watched_once_stopped_and_what_waits_stays, fresh),
         cmocka_unit_test_setup(a_new_reader_starts_afresh_on_the_same_clock, fresh),
         cmocka_unit_test_setup(random_edges_equal_the_definition, fresh),
+        cmocka_unit_test(sixteen_lines_are_words_low_byte_first),
+        cmocka_unit_test_setup(words_are_never_cut, fresh),
+        cmocka_unit_test_setup(a_hole_is_whole_blocks_and_the_time_axis_goes_on_behind_it, fresh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
