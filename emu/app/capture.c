@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -42,7 +43,12 @@ static void fail_file(struct service *s, const char *reason)
 
 static void disarm_job(struct service *s)
 {
-    capture_off(&s->capture.core);
+    struct capture *c = &s->capture.core;
+    capture_off(c);
+    free(c->cfg.ring);
+    free(c->cfg.copy);
+    c->cfg.ring = NULL;
+    c->cfg.copy = NULL;
     control_watch_disarm(&s->control);
 }
 
@@ -140,12 +146,33 @@ static bool check_path(const char *path, char *why)
     return why_fail(why, CONTROL_WHY_MAX, "%.100s: %s", path, strerror(errno));
 }
 
+/* False without memory. */
+static bool arm_job(struct service *s, const struct control_capture *a)
+{
+    struct unit *u = &s->bench->unit[a->unit];
+    const struct capture_cfg cfg = {.pre_ns = a->pre_ns,
+                                    .post_ns = a->post_ns,
+                                    .mask = TRACE_FIRST(u->type->line_count),
+                                    .sig = a->line,
+                                    .when = (enum capture_when)a->when,
+                                    .ring = malloc(a->ring_bytes),
+                                    .steps_max = (unsigned)(a->ring_bytes / sizeof(struct trace_step)),
+                                    .copy = malloc(sizeof(struct trace))};
+    if (!cfg.ring || !cfg.copy) {
+        free(cfg.ring);
+        free(cfg.copy);
+        return false;
+    }
+    capture_arm(&s->capture.core, unit_trace(u), &cfg);
+    return true;
+}
+
 static bool do_arm(void *ctx, const struct control_capture *a, char *why)
 {
     struct service *s = ctx;
     struct capture_job *j = &s->capture;
     if (j->core.state != CAPTURE_OFF)
-        return why_fail(why, CONTROL_WHY_MAX, "a capture is armed; end it with probe.disarm");
+        return why_fail(why, CONTROL_WHY_MAX, "expected no armed capture, got one; end it with probe.disarm");
     if (strlen(a->path) + 16 > sizeof j->path) return why_fail(why, CONTROL_WHY_MAX, "path: expected a shorter one");
     if (!check_path(a->path, why)) return false;
     snprintf(j->path, sizeof j->path, "%s", a->path);
@@ -153,20 +180,14 @@ static bool do_arm(void *ctx, const struct control_capture *a, char *why)
     j->files = a->files;
     j->done = 0;
     j->max_bytes = a->max_bytes;
-    struct unit *u = &s->bench->unit[a->unit];
-    const struct capture_cfg cfg = {.pre_ns = a->pre_ns,
-                                    .post_ns = a->post_ns,
-                                    .mask = TRACE_FIRST(u->type->line_count),
-                                    .sig = a->line,
-                                    .when = (enum capture_when)a->when,
-                                    .steps_max = (unsigned)(a->ring_bytes / sizeof(struct trace_step))};
-    return capture_arm(&j->core, unit_trace(u), &cfg) || why_fail(why, CONTROL_WHY_MAX, "out of memory");
+    return arm_job(s, a) || why_fail(why, CONTROL_WHY_MAX, "out of memory");
 }
 
 static bool do_disarm(void *ctx, char *why)
 {
     struct service *s = ctx;
-    if (s->capture.core.state == CAPTURE_OFF) return why_fail(why, CONTROL_WHY_MAX, "no capture is armed");
+    if (s->capture.core.state == CAPTURE_OFF)
+        return why_fail(why, CONTROL_WHY_MAX, "expected an armed capture (probe.arm), got none");
     service_end_capture(s);
     return true;
 }

@@ -310,7 +310,7 @@ static const struct row rows[] = {
 
 bool options_print_help(FILE *out)
 {
-    char option[32];
+    char option[40];
     fprintf(out, "psa-emu [options] [SCENARIO]: a bench of accelerometer converter boards on a CAN bus, in software\n\n"
                  "SCENARIO is a YAML file or the name of one in proto/scenarios (default: calibrate).\n\n");
     for (unsigned i = 0; i < ROWS && rows[i].text; i++) {

@@ -2,7 +2,7 @@
 #ifndef PSABENCH_APP_SERVICE_H
 #define PSABENCH_APP_SERVICE_H
 
-#include "app/capture.h"
+#include "app/capture_job.h"
 #include "app/loop.h"
 #include "app/ports.h"
 #include "bench/bench.h"

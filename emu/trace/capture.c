@@ -1,13 +1,12 @@
 #include "trace/capture.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { DRAIN_STEPS = 1024 }; /* handed to the copy at once: less than it holds pending */
 
 static const struct trace_step *oldest_step(const struct capture *c)
 {
-    return &c->ring[c->head];
+    return &c->cfg.ring[c->head];
 }
 
 static void drop_oldest(struct capture *c)
@@ -27,7 +26,7 @@ static void append_step(struct capture *c, const struct trace_step *s, uint64_t 
     }
     unsigned at = c->head + c->count++;
     if (at >= c->cfg.steps_max) at -= c->cfg.steps_max;
-    c->ring[at] = (struct trace_step){s->t_ns, lines, s->level};
+    c->cfg.ring[at] = (struct trace_step){s->t_ns, lines, s->level};
 }
 
 /* Whether the trigger's line, which changes with this step if at all, does what is waited for. */
@@ -84,18 +83,9 @@ static void look_at_level(struct capture *c)
         capture_trigger(c, c->trace->done_ns);
 }
 
-bool capture_arm(struct capture *c, struct trace *t, const struct capture_cfg *cfg)
+void capture_arm(struct capture *c, struct trace *t, const struct capture_cfg *cfg)
 {
     memset(c, 0, offsetof(struct capture, vcd));
-    c->ring = malloc(capture_bytes(cfg->steps_max));
-    c->copy = malloc(sizeof *c->copy);
-    if (!c->ring || !c->copy) {
-        free(c->ring);
-        free(c->copy);
-        c->ring = NULL;
-        c->copy = NULL;
-        return false;
-    }
     c->cfg = *cfg;
     c->trace = t;
     c->state = CAPTURE_ARMED;
@@ -104,15 +94,14 @@ bool capture_arm(struct capture *c, struct trace *t, const struct capture_cfg *c
     trace_attach(t, &c->sink);
     c->sink.steps = on_steps;
     look_at_level(c);
-    return true;
 }
 
 /* The copy has the same lines, with their levels at from_ns. */
 static void copy_lines(struct capture *c)
 {
-    memset(c->copy, 0, sizeof *c->copy);
-    for (unsigned i = 0; i < c->trace->count; i++) trace_add(c->copy, c->trace->name[i], c->base >> i & 1);
-    trace_advance(c->copy, c->from_ns);
+    memset(c->cfg.copy, 0, sizeof *c->cfg.copy);
+    for (unsigned i = 0; i < c->trace->count; i++) trace_add(c->cfg.copy, c->trace->name[i], c->base >> i & 1);
+    trace_advance(c->cfg.copy, c->from_ns);
 }
 
 void capture_begin(struct capture *c, const struct vcd_cfg *cfg)
@@ -124,7 +113,7 @@ void capture_begin(struct capture *c, const struct vcd_cfg *cfg)
     struct vcd_cfg own = *cfg;
     own.from_ns = c->from_ns;
     own.mask = c->cfg.mask;
-    (void)vcd_open(&c->vcd, &own, c->copy);
+    (void)vcd_open(&c->vcd, &own, c->cfg.copy);
     c->state = CAPTURE_WRITING;
     c->lost = 0;
     capture_drain(c);
@@ -137,10 +126,10 @@ static bool drain_some(struct capture *c)
     int64_t t_ns = 0;
     for (; n < DRAIN_STEPS && c->count && oldest_step(c)->t_ns <= c->end_ns; n++) {
         t_ns = oldest_step(c)->t_ns;
-        trace_steps(c->copy, oldest_step(c), 1);
+        trace_steps(c->cfg.copy, oldest_step(c), 1);
         drop_oldest(c);
     }
-    if (n) trace_advance(c->copy, t_ns);
+    if (n) trace_advance(c->cfg.copy, t_ns);
     return n == DRAIN_STEPS;
 }
 
@@ -149,14 +138,14 @@ void capture_drain(struct capture *c)
     if (c->state != CAPTURE_WRITING) return;
     while (drain_some(c)) continue;
     const int64_t done_ns = c->trace->done_ns;
-    trace_advance(c->copy, done_ns < c->end_ns ? done_ns : c->end_ns);
+    trace_advance(c->cfg.copy, done_ns < c->end_ns ? done_ns : c->end_ns);
     if (done_ns >= c->end_ns) c->state = CAPTURE_FULL;
 }
 
 void capture_end(struct capture *c)
 {
     if (c->state != CAPTURE_WRITING && c->state != CAPTURE_FULL) return;
-    const int64_t done_ns = c->copy->done_ns;
+    const int64_t done_ns = c->cfg.copy->done_ns;
     if (done_ns < c->end_ns) c->end_ns = done_ns;
     vcd_close(&c->vcd, c->end_ns);
     c->state = CAPTURE_ARMED;
@@ -167,9 +156,5 @@ void capture_off(struct capture *c)
 {
     if (c->state == CAPTURE_OFF) return;
     trace_detach(c->trace, &c->sink);
-    free(c->ring);
-    free(c->copy);
-    c->ring = NULL;
-    c->copy = NULL;
     c->state = CAPTURE_OFF;
 }

@@ -6,7 +6,7 @@
  * before the edges around it are in. Nothing is written from within a callback: the owner calls capture_drain() after time has
  * moved. After the trigger the ring is a queue to the file, so a long post-trigger needs no more memory. A ring that is too
  * small for the pre-trigger makes that shorter (from_ns); one that is too small between two calls of capture_drain() loses
- * edges, which are counted. The ring and the copy of the trace are allocated when armed. One thread. */
+ * edges, which are counted. No allocation: ring and copy are the owner's. One thread. */
 #ifndef PSABENCH_TRACE_CAPTURE_H
 #define PSABENCH_TRACE_CAPTURE_H
 
@@ -25,10 +25,12 @@ enum capture_state {
 
 struct capture_cfg {
     int64_t pre_ns, post_ns;
-    uint64_t mask;          /* lines recorded */
-    unsigned sig;           /* line of the trigger */
-    enum capture_when when; /* CAPTURE_OUTSIDE: no line, the owner triggers */
-    unsigned steps_max;     /* of the ring */
+    uint64_t mask;           /* lines recorded */
+    unsigned sig;            /* line of the trigger */
+    enum capture_when when;  /* CAPTURE_OUTSIDE: no line, the owner triggers */
+    struct trace_step *ring; /* the owner's while it is armed, as the copy */
+    unsigned steps_max;
+    struct trace *copy; /* room for the lines of the file */
 };
 
 struct capture { /* read-only outside capture.c */
@@ -36,28 +38,20 @@ struct capture { /* read-only outside capture.c */
     struct trace *trace;
     struct capture_cfg cfg;
     enum capture_state state;
-    struct trace_step *ring;
-    unsigned head, count;
-    uint64_t level;     /* of all lines behind the newest step */
-    uint64_t base;      /* before the oldest */
-    int64_t base_ns;    /* the ring knows every change after this */
-    int64_t trigger_ns; /* instant of the trigger */
-    int64_t from_ns;    /* where the file begins: trigger_ns - pre_ns, or later when the ring was too small */
+    unsigned head, count; /* oldest step of cfg.ring, steps */
+    uint64_t level;       /* of all lines behind the newest step */
+    uint64_t base;        /* before the oldest */
+    int64_t base_ns;      /* the ring knows every change after this */
+    int64_t trigger_ns;   /* instant of the trigger */
+    int64_t from_ns;      /* where the file begins: trigger_ns - pre_ns, or later when the ring was too small */
     int64_t end_ns;
-    uint64_t lost;      /* edges that found no room while a file was written */
-    uint64_t triggers;  /* since armed, those that came during another capture included */
-    struct trace *copy; /* the file's writer is a sink of this one */
+    uint64_t lost;     /* edges that found no room while a file was written */
+    uint64_t triggers; /* since armed, those that came during another capture included */
     struct vcd vcd;
 };
 
-/* Bytes of memory that a ring of so many steps takes. */
-static inline size_t capture_bytes(unsigned steps_max)
-{
-    return steps_max * sizeof(struct trace_step);
-}
-
-/* Attaches to the trace; a level that is there already is a trigger at once. False without memory. */
-bool capture_arm(struct capture *c, struct trace *t, const struct capture_cfg *cfg);
+/* Attaches to the trace; a level that is there already is a trigger at once. */
+void capture_arm(struct capture *c, struct trace *t, const struct capture_cfg *cfg);
 
 /* From outside; has no effect but on the count where a capture is under way. */
 void capture_trigger(struct capture *c, int64_t t_ns);
@@ -71,6 +65,6 @@ void capture_drain(struct capture *c);
 /* The file ends: at end_ns, or where it is. Armed again, for the next trigger. */
 void capture_end(struct capture *c);
 
-void capture_off(struct capture *c); /* detaches and frees; harmless when off */
+void capture_off(struct capture *c); /* detaches; harmless when off */
 
 #endif

@@ -34,8 +34,15 @@ class Probe:
         self._bench.control.call("vcd.flush")
 
     def arm(
-        self, on: str, path: str | Path, *, unit: str | None = None, pre_s: float = 0.01, post_s: float = 0.01,
-        files: int = 1, **more: float
+        self,
+        on: str,
+        path: str | Path,
+        *,
+        unit: str | None = None,
+        pre_s: float = 0.01,
+        post_s: float = 0.01,
+        files: int = 1,
+        **more: float,
     ) -> None:
         """Capture the lines of a unit (the first) around a trigger into VCD files.
 

@@ -1,4 +1,4 @@
-"""The virtual logic analyser: sigrok-cli on a running emulator, samples beside a recording, and clients that misbehave."""
+"""The virtual logic analyser: sigrok-cli on a running emulator, samples beside a recording, misbehaving clients."""
 
 from __future__ import annotations
 

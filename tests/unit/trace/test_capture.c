@@ -11,6 +11,8 @@
 
 static struct trace trace;
 static struct capture capture;
+static struct trace_step ring[5000];
+static struct trace copy;
 static char text[1 << 16];
 
 static int fresh(void **state)
@@ -25,9 +27,15 @@ static int fresh(void **state)
 
 static void arm(enum capture_when when, unsigned sig, int64_t pre_ns, int64_t post_ns, unsigned steps_max)
 {
-    const struct capture_cfg cfg = {
-        .pre_ns = pre_ns, .post_ns = post_ns, .mask = 3, .sig = sig, .when = when, .steps_max = steps_max};
-    assert_true(capture_arm(&capture, &trace, &cfg));
+    const struct capture_cfg cfg = {.pre_ns = pre_ns,
+                                    .post_ns = post_ns,
+                                    .mask = 3,
+                                    .sig = sig,
+                                    .when = when,
+                                    .ring = ring,
+                                    .steps_max = steps_max,
+                                    .copy = &copy};
+    capture_arm(&capture, &trace, &cfg);
 }
 
 /* An edge of CLK every 100 ns from from_ns on, n of them, delivered. */

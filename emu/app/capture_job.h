@@ -1,6 +1,6 @@
 /* The ring capture of a running emulator: probe.arm and its files. */
-#ifndef PSABENCH_APP_CAPTURE_H
-#define PSABENCH_APP_CAPTURE_H
+#ifndef PSABENCH_APP_CAPTURE_JOB_H
+#define PSABENCH_APP_CAPTURE_JOB_H
 
 #include "trace/capture.h"
 
