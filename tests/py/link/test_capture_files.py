@@ -1,4 +1,4 @@
-"""Ring capture through the control socket: pre-trigger and post-trigger beside a recording of the same run, files, memory."""
+"""Ring capture through the control socket: before and after the trigger beside a recording of the same run, memory."""
 
 from __future__ import annotations
 
