@@ -93,10 +93,11 @@ def test_events_and_lines_trigger_again_and_again(
     assert not path.exists()
 
 
-def test_a_fault_of_another_kind_is_no_trigger(tmp_path: Path) -> None:
+def test_a_fault_of_another_kind_or_one_that_ends_is_no_trigger(tmp_path: Path) -> None:
     path = tmp_path / "c.vcd"
     with bench() as (_, control):
-        control.call("probe.arm", on="fault:line.stuck", path=str(path))
+        control.call("fault.add", kind="line.stuck", point="a.line.Data", level="low", for_s=0.002)
+        control.call("probe.arm", on="fault:line.stuck", path=str(path))  # one that ends is no beginning
         control.call("fault.add", kind="sensor.bias", point="a.sensor.x", bias_v=0.1)
         control.call("run", for_s=0.02)
         assert (state(control), path.exists()) == ("armed", False)
