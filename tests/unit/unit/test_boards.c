@@ -227,7 +227,9 @@ static void the_lines_are_those_of_the_table(void **state)
         assert_int_equal(trace->count, (*t)->line_count);
         for (unsigned i = 0; i < trace->count; i++) assert_string_equal(trace->name[i], (*t)->lines[i].name);
         const struct clk clock = {.hz = SAMPLER_HZ, .div = 1};
-        assert_true(sampler_start(&w.sampler, unit_trace(&w.u), (*t)->port_lines, &clock));
+        static uint8_t ring[SAMPLER_RING];
+        const struct sampler_cfg cfg = sampler_line_port(&clock, (*t)->port_lines, ring);
+        assert_true(sampler_start(&w.sampler, unit_trace(&w.u), &cfg));
         sampler_stop(&w.sampler);
         assert_ptr_equal(w.u.board->line.trace, trace);
     }
