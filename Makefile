@@ -31,7 +31,7 @@ unexport PYTHONDONTWRITEBYTECODE
 STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
 WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
 SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer)
-INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
+INC   := -Iemu -Ibuild -isystem build/gen/mavlink $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
 LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
 CXXFLAGS ?= $(patsubst -O0,-O1,$(patsubst -O2,-O3,$(CFLAGS)))#   without optimisation Eigen asks for C++'s runtime
@@ -116,8 +116,8 @@ $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 	$(call say,LINK)
 	$(Q)$(LINK) -o $@ $(filter %.o,$^) $(filter-out %/emu.a,$(filter %.a,$^)) $(BUILD)/lib/emu.a $(LINK_LIBS)
-build/gen/gen.mk: $(wildcard proto/*.yaml) tools/gen_proto.py $(wildcard tools/protogen/*.py) | $(PY)
-	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D)
+build/gen/gen.mk: $(wildcard proto/*.yaml proto/mavlink/*.xml) tools/gen_proto.py tools/gen_mavlink.py $(wildcard tools/protogen/*.py) | $(PY)
+	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D) && $(PY) tools/gen_mavlink.py --out $(@D)
 	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c))' > $@
 $(PY):
 	tools/setup run
