@@ -48,7 +48,7 @@ static void send_value(struct mav_station *s, unsigned i, double value)
                                .param_count = (uint16_t)s->cfg.param_count,
                                .param_index = (uint16_t)i,
                                .param_type = (uint8_t)mav_param_type(p)};
-    memcpy(m.param_id, p->name, strnlen(p->name, sizeof m.param_id));
+    memcpy(m.param_id, p->name, strlen(p->name)); /* at most MAV_PARAM_NAME, as many as there is room for */
     mav_send(s, MAV_KIND(PARAM_VALUE), &m);
 }
 

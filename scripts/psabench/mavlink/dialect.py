@@ -8,6 +8,8 @@ import sys
 from functools import cache
 from types import ModuleType
 
+import pymavlink.dialects.v20 as dialects
+
 from psabench.errors import BadInput, expected
 from psabench.places import mavlink_module
 
@@ -29,4 +31,5 @@ def mavlink() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[PYMAVLINK] = module
     spec.loader.exec_module(module)
+    setattr(dialects, NAME, module)
     return module
