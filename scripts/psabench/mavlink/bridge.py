@@ -204,7 +204,6 @@ class LiveBridge(Bridge):
 
     def _of_object(self, name: str, d: Described) -> Parameter:
         size = d.data_bytes or 0
-        signed = isinstance(d.low, int) and d.low < 0
 
         def read() -> float:
             return float(self.unit.node.read(d.index, d.sub))
@@ -212,10 +211,11 @@ class LiveBridge(Bridge):
         def write(value: float) -> None:
             self.unit.node.write(d.index, d.sub, value if d.real else int(value))
 
-        least, most = (0.0, 2.0 ** (8 * size) - 1) if not d.real else (-3.4e38, 3.4e38)
+        half = 2.0 ** (8 * size - 1)
+        least, most = (-3.4e38, 3.4e38) if d.real else (-half, half - 1) if d.signed else (0.0, 2 * half - 1)
         return Parameter(
             name=name,
-            kind=R32 if d.real or size < 4 else I32 if signed else U32,
+            kind=R32 if d.real or size < 4 else I32 if d.signed else U32,
             integer=not d.real,
             low=float(d.low) if d.low is not None else least,
             high=float(d.high) if d.high is not None else most,

@@ -1,6 +1,6 @@
 """Where MAVLink peers are, on 127.0.0.1 alone: UDP to a port, UDP at a port, a TCP server.
 
-A port never blocks. A peer that reads too slowly loses whole messages, and is counted.
+A port never blocks. A peer that reads too slowly loses whole messages, and is counted. One thread polls, any may send.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import selectors
 import socket
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -60,6 +61,7 @@ class Port:
     def __init__(self, spec: PortSpec, new_parser: Callable[[], Parser]) -> None:
         self.lost = 0
         self.peers: list[Peer] = []
+        self._lock = threading.RLock()  # of the peers and what waits for them
         self._new_parser = new_parser
         self._kind = spec.kind
         self._heard = 0
@@ -97,14 +99,15 @@ class Port:
 
     def send(self, frame: bytes) -> None:
         """To every peer."""
-        for peer in list(self.peers):
-            if peer.address is not None:
-                self._send_datagram(peer.address, frame)
-            elif len(peer.out) + len(frame) > OUT_MAX:
-                self.lost += 1
-            else:
-                peer.out += frame
-                self._flush(peer)
+        with self._lock:
+            for peer in list(self.peers):
+                if peer.address is not None:
+                    self._send_datagram(peer.address, frame)
+                elif len(peer.out) + len(frame) > OUT_MAX:
+                    self.lost += 1
+                else:
+                    peer.out += frame
+                    self._flush(peer)
 
     def _send_datagram(self, address: tuple[str, int], frame: bytes) -> None:
         try:
@@ -118,7 +121,8 @@ class Port:
         assert peer.connection is not None
         try:
             while peer.out:
-                del peer.out[: peer.connection.send(peer.out)]
+                sent = peer.connection.send(peer.out)
+                del peer.out[:sent]
         except BlockingIOError:
             pass
         except OSError:
@@ -129,16 +133,18 @@ class Port:
     def poll(self, timeout_s: float) -> list[Any]:
         """Messages that have come within the time."""
         messages: list[Any] = []
-        for key, _ in self._selector.select(timeout_s):
-            if key.data is not None:
-                messages += self._read_stream(key.data)
-            elif self._kind == "tcp":
-                self._accept()
-            else:
-                messages += self._read_datagrams()
-        for peer in list(self.peers):
-            if peer.out:
-                self._flush(peer)
+        ready = self._selector.select(timeout_s)
+        with self._lock:
+            for key, _ in ready:
+                if key.data is not None:
+                    messages += self._read_stream(key.data)
+                elif self._kind == "tcp":
+                    self._accept()
+                else:
+                    messages += self._read_datagrams()
+            for peer in list(self.peers):
+                if peer.out:
+                    self._flush(peer)
         return messages
 
     def _accept(self) -> None:
