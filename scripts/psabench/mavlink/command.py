@@ -148,6 +148,8 @@ def _run(bridge: Any, what: str) -> int:
     print(f"mavlink {bridge.options.port.kind} 127.0.0.1:{port.port}, {what}", flush=True)
     try:
         bridge.run()
+    except KeyboardInterrupt:  # the usual end
+        pass
     finally:
         bridge.close()
         s = bridge.station

@@ -6,6 +6,7 @@ thread takes; while that is busy, parameters are answered from what is known. Ot
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
@@ -257,7 +258,8 @@ class Station:
             p = [m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z]
         else:
             p = [m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7]
-        if m.command == CALIBRATION:
+        if m.command == CALIBRATION:  # clients leave what they do not use at NaN
+            p = [0.0 if math.isnan(x) else x for x in p]
             self._take_calibration(to, p, getattr(m, "confirmation", 0))
             return
         commands: Mapping[int, Callable[[list[float]], int]] = {
