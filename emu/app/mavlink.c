@@ -54,8 +54,8 @@ static void on_world(void *ctx, struct mav_world *out, int64_t t_ns)
 enum { NODE, BUS_HZ, DATA_HZ, HEAD_DEG, TABLE_AXES, TABLE_1_DEG, TABLE_2_DEG, TABLE_3_DEG, BENCH_PARAMS };
 
 static const char *const bench_names[BENCH_PARAMS] = {
-    [NODE] = "UNIT_NODE",         [BUS_HZ] = "BUS_BITRATE_HZ",  [DATA_HZ] = "BUS_DATA_HZ",
-    [HEAD_DEG] = "HEAD_DEG",      [TABLE_AXES] = "TABLE_AXES",  [TABLE_1_DEG] = "TABLE_1_DEG",
+    [NODE] = "UNIT_NODE",          [BUS_HZ] = "BUS_BITRATE_HZ",  [DATA_HZ] = "BUS_DATA_HZ",
+    [HEAD_DEG] = "HEAD_DEG",       [TABLE_AXES] = "TABLE_AXES",  [TABLE_1_DEG] = "TABLE_1_DEG",
     [TABLE_2_DEG] = "TABLE_2_DEG", [TABLE_3_DEG] = "TABLE_3_DEG"};
 
 static double on_value(void *ctx, unsigned which, int64_t t_ns)
@@ -65,12 +65,18 @@ static double on_value(void *ctx, unsigned which, int64_t t_ns)
     struct mav_readouts r = {0};
     on_readouts(ctx, &r, t_ns);
     switch (which) {
-    case NODE: return m->unit->cfg.node;
-    case BUS_HZ: return bus->bitrate_hz;
-    case DATA_HZ: return bus->data_bitrate_hz;
-    case HEAD_DEG: return r.head_deg;
-    case TABLE_AXES: return r.axes;
-    default: return which < BENCH_PARAMS ? r.table_deg[which - TABLE_1_DEG] : 0;
+    case NODE:
+        return m->unit->cfg.node;
+    case BUS_HZ:
+        return bus->bitrate_hz;
+    case DATA_HZ:
+        return bus->data_bitrate_hz;
+    case HEAD_DEG:
+        return r.head_deg;
+    case TABLE_AXES:
+        return r.axes;
+    default:
+        return which < BENCH_PARAMS ? r.table_deg[which - TABLE_1_DEG] : 0;
     }
 }
 
@@ -86,12 +92,15 @@ static struct mav_param bench_param(unsigned which)
 static enum mav_param_code code_of(uint8_t type)
 {
     switch (type) {
-    case CO_REAL32: return MAV_CODE_REAL;
+    case CO_REAL32:
+        return MAV_CODE_REAL;
     case CO_INTEGER8:
     case CO_INTEGER16:
     case CO_INTEGER24:
-    case CO_INTEGER32: return MAV_CODE_SIGNED;
-    default: return MAV_CODE_UNSIGNED;
+    case CO_INTEGER32:
+        return MAV_CODE_SIGNED;
+    default:
+        return MAV_CODE_UNSIGNED;
     }
 }
 
@@ -255,6 +264,16 @@ struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct
     m->ear = (struct can_node){.name = "mavlink", .fd = true, .rx = on_frame, .ctx = m};
     can_attach(hub->bus, &m->ear);
     return m;
+}
+
+void mavlink_print_counters(const struct mavlink *m, FILE *out)
+{
+    const struct mav_station *s = &m->port.station;
+    fprintf(out,
+            "psa-emu: mavlink %s: readings %u, lost by the board %u; messages sent %u, lost %u, received %u, "
+            "malformed %u, of strangers %u; parameters rejected %u\n",
+            mavlink_kind_name(m->port.kind), s->counters.readings, s->counters.readings_lost, s->counters.sent, s->lost,
+            s->received, s->malformed, m->port.strangers, s->counters.params_refused);
 }
 
 void mavlink_close(struct mavlink *m)

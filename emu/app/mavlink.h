@@ -28,7 +28,7 @@ struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct
 void mavlink_close(struct mavlink *m); /* its links are gone; mavlink_free() after they were reaped */
 void mavlink_free(struct mavlink *m);
 
-/* Keys of its ready line: what, then pairs of key and value through put. */
+void mavlink_print_counters(const struct mavlink *m, FILE *out);
 const char *mavlink_kind_name(enum mav_port_kind kind);
 
 #endif

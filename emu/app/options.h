@@ -42,9 +42,9 @@ struct options_bus {
 struct options_mavlink {
     const char *arg; /* as given */
     enum mav_port_kind kind;
-    uint16_t port;  /* 0: a free one */
-    char link[256]; /* of the pty; "": none */
-    char unit[32];  /* "": the first */
+    uint16_t port;                    /* 0: a free one */
+    char link[256];                   /* of the pty; "": none */
+    char unit[32];                    /* "": the first */
     uint8_t sysid, compid, autopilot; /* autopilot: MAV_AUTOPILOT */
     double imu_hz, angles_hz, hil_hz; /* 0: not sent */
 };

@@ -148,12 +148,8 @@ static bool set_kind(struct options_mavlink *o, const char *part, size_t n, cons
 
 bool options_mavlink(const char *arg, struct options_mavlink *o, const char **form)
 {
-    *o = (struct options_mavlink){.arg = arg,
-                                  .sysid = 1,
-                                  .compid = 1,
-                                  .autopilot = MAV_AUTOPILOT_GENERIC,
-                                  .imu_hz = 50,
-                                  .angles_hz = 10};
+    *o = (struct options_mavlink){
+        .arg = arg, .sysid = 1, .compid = 1, .autopilot = MAV_AUTOPILOT_GENERIC, .imu_hz = 50, .angles_hz = 10};
     size_t n = strcspn(arg, ",");
     if (!set_kind(o, arg, n, form)) return false;
     for (const char *at = arg + n; *at; at += n) {

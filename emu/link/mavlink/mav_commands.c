@@ -74,10 +74,8 @@ static const struct {
     uint16_t number;
     command_fn *run;
 } rows[] = {
-    {MAV_CMD_REQUEST_MESSAGE, request_message},
-    {MAV_CMD_SET_MESSAGE_INTERVAL, set_interval},
-    {MAV_CMD_GET_MESSAGE_INTERVAL, get_interval},
-    {MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, send_capabilities},
+    {MAV_CMD_REQUEST_MESSAGE, request_message},          {MAV_CMD_SET_MESSAGE_INTERVAL, set_interval},
+    {MAV_CMD_GET_MESSAGE_INTERVAL, get_interval},        {MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, send_capabilities},
     {MAV_CMD_PREFLIGHT_CALIBRATION, refuse_calibration},
 };
 
@@ -99,10 +97,7 @@ static void take_long(struct mav_station *s, const mavlink_message_t *m, int64_t
     mavlink_msg_command_long_decode(m, &in);
     if (!mav_is_for_us(s, in.target_system, in.target_component)) return;
     const struct command c = {
-        in.command,
-        m->sysid,
-        m->compid,
-        {in.param1, in.param2, in.param3, in.param4, in.param5, in.param6, in.param7}};
+        in.command, m->sysid, m->compid, {in.param1, in.param2, in.param3, in.param4, in.param5, in.param6, in.param7}};
     run_command(s, &c, t_ns);
 }
 
@@ -111,10 +106,8 @@ static void take_int(struct mav_station *s, const mavlink_message_t *m, int64_t 
     mavlink_command_int_t in;
     mavlink_msg_command_int_decode(m, &in);
     if (!mav_is_for_us(s, in.target_system, in.target_component)) return;
-    const struct command c = {in.command,
-                              m->sysid,
-                              m->compid,
-                              {in.param1, in.param2, in.param3, in.param4, (float)in.x, (float)in.y, in.z}};
+    const struct command c = {
+        in.command, m->sysid, m->compid, {in.param1, in.param2, in.param3, in.param4, (float)in.x, (float)in.y, in.z}};
     run_command(s, &c, t_ns);
 }
 

@@ -22,7 +22,7 @@ enum mav_param_code { MAV_CODE_UNSIGNED, MAV_CODE_SIGNED, MAV_CODE_REAL };
 
 struct mav_param {
     char name[MAV_PARAM_NAME + 1];
-    bool object;    /* of the unit, by SDO; else a value of the link or the bench */
+    bool object; /* of the unit, by SDO; else a value of the link or the bench */
     bool writable;
     uint8_t sub;
     uint8_t bytes;  /* of the object: 1..4 */

@@ -129,8 +129,8 @@ static struct mav_peer *add_stream(struct mav_port *p, int fd)
         free_peer(e);
         return NULL;
     }
-    e->link = (struct link){
-        .fd = fd, .want_read = true, .readable = on_readable, .flush = on_flush, .release = on_release};
+    e->link =
+        (struct link){.fd = fd, .want_read = true, .readable = on_readable, .flush = on_flush, .release = on_release};
     return e;
 }
 
@@ -286,7 +286,7 @@ static void send_datagram(struct mav_peer *e, const uint8_t *frame, size_t n)
 {
     const struct sockaddr *to = (const struct sockaddr *)&e->where;
     if (sendto(e->port->udp.fd, frame, n, MSG_DONTWAIT, to, sizeof e->where) >= 0) return;
-    if (errno != ECONNREFUSED) count_loss(e); /* nobody listens there yet */
+    if (errno != ECONNREFUSED) count_loss(e); /* no program listens there yet */
 }
 
 /* ---- */

@@ -99,11 +99,15 @@ static void take_answer(struct mav_sdo *s, const uint8_t *d, int64_t t_ns)
 static bool goes_on(const struct mav_sdo *s, const uint8_t *d)
 {
     switch (d[0] & CS_MASK) {
-    case ANSWER_UPLOAD: return !(d[0] & EXPEDITED);
-    case ANSWER_UPLOAD_SEGMENT: return !(d[0] & LAST_SEGMENT);
+    case ANSWER_UPLOAD:
+        return !(d[0] & EXPEDITED);
+    case ANSWER_UPLOAD_SEGMENT:
+        return !(d[0] & LAST_SEGMENT);
     case ANSWER_DOWNLOAD:
-    case ANSWER_DOWNLOAD_SEGMENT: return !s->other_last;
-    default: return false;
+    case ANSWER_DOWNLOAD_SEGMENT:
+        return !s->other_last;
+    default:
+        return false;
     }
 }
 

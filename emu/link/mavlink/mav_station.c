@@ -28,8 +28,7 @@ void mav_text_out(struct mav_station *s, uint8_t severity, const char *text)
     const size_t len = strlen(text);
     if (len > CHUNK && ++s->text_id == 0) s->text_id = 1;
     for (size_t at = 0, k = 0; (at < len || k == 0) && k < CHUNKS_MAX; at += CHUNK, k++) {
-        mavlink_statustext_t m = {
-            .severity = severity, .id = len > CHUNK ? s->text_id : 0, .chunk_seq = (uint8_t)k};
+        mavlink_statustext_t m = {.severity = severity, .id = len > CHUNK ? s->text_id : 0, .chunk_seq = (uint8_t)k};
         const size_t left = len - at;
         memcpy(m.text, text + at, left < CHUNK ? left : CHUNK);
         mav_send(s, MAV_KIND(STATUSTEXT), &m);

@@ -40,17 +40,17 @@ struct mav_io {
     void *ctx;
     void (*send)(void *ctx, const uint8_t *frame, size_t n);
     void (*readouts)(void *ctx, struct mav_readouts *out, int64_t t_ns);
-    void (*world)(void *ctx, struct mav_world *out, int64_t t_ns);  /* NULL: no HIL messages */
-    double (*value)(void *ctx, unsigned which, int64_t t_ns);       /* of a parameter that is no object and not the link's */
+    void (*world)(void *ctx, struct mav_world *out, int64_t t_ns); /* NULL: no HIL messages */
+    double (*value)(void *ctx, unsigned which, int64_t t_ns); /* of a parameter that is no object and not the link's */
 };
 
 struct mav_cfg {
     uint8_t sysid, compid, autopilot, type;
     double imu_hz, angles_hz, hil_hz; /* 0: not sent */
     int64_t epoch_ns;
-    double zero_v[3], scale_v_per_g[3];   /* of objects 2210h and 2211h, their defaults */
-    uint16_t zero_index, scale_index;     /* 2210h, 2211h; 0: the unit has none, and there is no acceleration */
-    const struct mav_param *params;       /* those of the link first, MAV_OWN_PARAMS of them */
+    double zero_v[3], scale_v_per_g[3]; /* of objects 2210h and 2211h, their defaults */
+    uint16_t zero_index, scale_index;   /* 2210h, 2211h; 0: the unit has none, and there is no acceleration */
+    const struct mav_param *params;     /* those of the link first, MAV_OWN_PARAMS of them */
     unsigned param_count;
 };
 
@@ -89,9 +89,9 @@ struct mav_station {
     /* parameter protocol */
     struct mav_job job[MAV_PARAM_JOBS];
     unsigned job_first, job_count;
-    bool busy;         /* job[job_first] is under way */
-    unsigned list_at;  /* next parameter of a list; param_count: no list */
-    uint16_t text_id;  /* of the latest long STATUSTEXT */
+    bool busy;                 /* job[job_first] is under way */
+    unsigned list_at;          /* next parameter of a list; param_count: no list */
+    uint16_t text_id;          /* of the latest long STATUSTEXT */
     struct can_msg write_seen; /* latest SDO request to the unit, of any host */
     struct mav_counters counters;
     uint32_t lost, malformed, received, peers; /* the port's, for PSABENCH_LINK */
@@ -109,8 +109,9 @@ void mav_station_turn(struct mav_station *s, int64_t t_ns); /* of the loop */
 /* ---- for the files of the station */
 
 void mav_send(struct mav_station *s, struct mav_kind kind, const void *payload);
-void mav_text_out(struct mav_station *s, uint8_t severity, const char *text); /* STATUSTEXT, in chunks where it is long */
-uint64_t mav_time_us(const struct mav_station *s, int64_t t_ns);              /* epoch included */
+void mav_text_out(struct mav_station *s, uint8_t severity,
+                  const char *text);                             /* STATUSTEXT, in chunks where it is long */
+uint64_t mav_time_us(const struct mav_station *s, int64_t t_ns); /* epoch included */
 bool mav_is_for_us(const struct mav_station *s, uint8_t sysid, uint8_t compid);
 
 /* mav_streams.c. Position of a message among the streams; MAV_STREAMS: it is none. */

@@ -151,7 +151,8 @@ static void send_hil_gps(struct mav_station *s, int64_t t_ns)
                                  .vel = (uint16_t)cm_per_s(speed_mps),
                                  .vn = cm_per_s(w.north_mps),
                                  .ve = cm_per_s(w.east_mps),
-                                 .cog = speed_mps > 0.1 ? (uint16_t)(fmod(track_deg + 360.0, 360.0) * 100.0) : UINT16_MAX,
+                                 .cog =
+                                     speed_mps > 0.1 ? (uint16_t)(fmod(track_deg + 360.0, 360.0) * 100.0) : UINT16_MAX,
                                  .fix_type = FIX_3D,
                                  .satellites_visible = SATELLITES};
     mav_send(s, MAV_KIND(HIL_GPS), &m);
@@ -160,10 +161,10 @@ static void send_hil_gps(struct mav_station *s, int64_t t_ns)
 static void send_version(struct mav_station *s, int64_t t_ns)
 {
     (void)t_ns;
-    const mavlink_autopilot_version_t m = {
-        .capabilities = MAV_PROTOCOL_CAPABILITY_MAVLINK2 | MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE |
-                        MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
-        .uid = s->sdo.node};
+    const mavlink_autopilot_version_t m = {.capabilities = MAV_PROTOCOL_CAPABILITY_MAVLINK2 |
+                                                           MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE |
+                                                           MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
+                                           .uid = s->sdo.node};
     mav_send(s, MAV_KIND(AUTOPILOT_VERSION), &m);
 }
 
@@ -196,14 +197,21 @@ int64_t mav_stream_default_ns(const struct mav_station *s, unsigned stream)
     const struct mav_cfg *c = &s->cfg;
     switch (stream) {
     case HEARTBEAT:
-    case LINK: return NS_PER_S;
-    case HIGHRES_IMU: return interval_ns(c->imu_hz);
-    case ACCEL: return 0;
+    case LINK:
+        return NS_PER_S;
+    case HIGHRES_IMU:
+        return interval_ns(c->imu_hz);
+    case ACCEL:
+        return 0;
     case ATTITUDE:
-    case ANGLES: return interval_ns(c->angles_hz);
-    case HIL_SENSOR: return interval_ns(c->hil_hz);
-    case HIL_GPS: return c->hil_hz > 0 ? interval_ns(hil_gps_hz) : -1;
-    default: return -1;
+    case ANGLES:
+        return interval_ns(c->angles_hz);
+    case HIL_SENSOR:
+        return interval_ns(c->hil_hz);
+    case HIL_GPS:
+        return c->hil_hz > 0 ? interval_ns(hil_gps_hz) : -1;
+    default:
+        return -1;
     }
 }
 

@@ -22,7 +22,7 @@ from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.parameters import PARAMETERS
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader
-from psabench.errors import BadInput, BenchError, DeviceError, expected
+from psabench.errors import BadInput, BenchError, DeviceError, expected, output_error
 from psabench.link.canopen_host import Described
 from psabench.mavlink import calibration
 from psabench.mavlink.calibration import CalibrationPlan, CalibrationResult, Cancelled
@@ -368,10 +368,11 @@ class LogBridge(Bridge):
                         slice_s = m.timestamp + LOG_SLICE_S
                         yield m.timestamp
         except OSError as e:
-            raise BadInput(f"{self._path}: {e.strerror}") from e
+            raise output_error(self._path, e) from e
         except Exception as e:  # python-can's readers raise whatever their parsing comes to
             self.samples.take(self._reader.take())
-            raise BadInput(f"{self._path}: message {read + 1} is damaged ({e}); the {read} before it were sent") from e
+            got = f"a damaged one ({e}); the {read} before it were sent"
+            raise BadInput(expected("a whole message", got, f"{self._path}: message {read + 1}")) from e
 
     def _settle(self, for_s: float) -> None:
         """Do the station's jobs for this real time."""

@@ -40,7 +40,7 @@ class Parameter:
     def check(self, kind: int, wire: float) -> float:
         """The value of a PARAM_SET. Raises ValueError with what would be right."""
         if self.write is None:
-            raise ValueError("read-only")
+            raise ValueError(expected("a parameter that may be written", "a read-only one"))
         if kind == R32:
             value = wire
         elif kind in _LAYOUT:
@@ -50,7 +50,7 @@ class Parameter:
         what = "an integer" if self.integer else "a number"
         whole = not self.integer or (math.isfinite(value) and value == int(value))
         if not (math.isfinite(value) and whole and self.low <= value <= self.high):
-            raise ValueError(f"expected {what} from {self.low:.9g} to {self.high:.9g}")
+            raise ValueError(expected(f"{what} from {self.low:.9g} to {self.high:.9g}", f"{value:.9g}"))
         return value
 
 

@@ -243,7 +243,7 @@ class Station:
         try:
             value = p.check(m.param_type, m.param_value)
             if self._busy():
-                raise ValueError("a calibration is under way")
+                raise ValueError(expected("no calibration under way", "one"))
         except ValueError as e:
             self.text(WARNING, f"{p.name}: {e}")
             self._ask(index)  # the value that it keeps
