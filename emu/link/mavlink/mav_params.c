@@ -7,6 +7,7 @@
 #include <string.h>
 
 enum { RATE_MAX_HZ = 10000 };
+static const double rate_min_hz = 0.01; /* and 0: off */
 
 const struct mav_param mav_own_params[MAV_OWN_PARAMS] = {
     [MAV_OWN_IMU_HZ] = {"MAV_IMU_HZ", .writable = true, .bytes = 4, .code = MAV_CODE_REAL, .high = RATE_MAX_HZ},
@@ -190,7 +191,8 @@ static void take_set(struct mav_station *s, const mavlink_message_t *m)
         return;
     }
     const struct mav_param *p = &s->cfg.params[i];
-    const bool fits = mav_param_value(p, in.param_type, in.param_value, &value) && value >= p->low && value <= p->high;
+    const bool fits = mav_param_value(p, in.param_type, in.param_value, &value) && value >= p->low &&
+                      value <= p->high && (i >= MAV_OWN_PARAMS || value == 0 || value >= rate_min_hz);
     if (!p->writable) tell_refusal(s, name, "read-only");
     else if (!fits) tell_range(s, p);
     add_job(s, p->writable && fits ? MAV_JOB_WRITE : MAV_JOB_READ, i, value); /* rejected: the value that it keeps */
