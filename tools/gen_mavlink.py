@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """MAVLink headers and Python module of proto/mavlink/psabench.xml, made by pymavlink's generator.
 
-Usage: gen_mavlink.py --out DIR. Writes into DIR/mavlink: `psabench/mavlink.h` and what it includes, `psabench_mavlink.py`,
-and `xml/` with the dialect and the standard messages that it includes (for tools that read XML). A file that does not
-change is left alone, so that nothing is compiled again for nothing.
+Usage: gen_mavlink.py --out DIR. Writes into DIR/mavlink: `psabench/mavlink.h` and what it includes,
+`psabench_mavlink.py`, and `xml/` with the dialect and the standard messages that it includes, for tools that read XML.
+A file that does not change is left alone, so that nothing is compiled again for nothing.
 """
 
 import argparse

@@ -2,10 +2,11 @@
 """Everything that follows from proto/psabench.yaml and proto/<board>.yaml, the source of CAN messages and objects.
 
 Usage:
-    gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py and parameters.py, an EDS and a
-                            page a device
+    gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py and parameters.py, an EDS
+                            and a page a device
     gen_proto.py --check    exit 1 and name the ones that are out of date
-    gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools), an <device>_od.[ch] each, parameter_names.[ch]
+    gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools), an <device>_od.[ch] each,
+                            parameter_names.[ch]
 
 psabench.yaml is PSA-2 and what all devices have in common: network management, services, communication objects.
 unit.yaml has the objects that the others share, and its head the grammar of their files.

@@ -54,7 +54,7 @@ def proto_file(name: str) -> Path:
 
 
 def mavlink_module() -> Path:
-    """Path of the generated Python module of our MAVLink dialect: the bundle, this checkout, or after `make install`."""
+    """Path of our MAVLink dialect's generated Python module: the bundle, this checkout, or after `make install`."""
     bundled, installed = (root / "share" / "psabench" / "mavlink" for root in (BUNDLE, Path(sys.prefix)))
     places = [folder / "psabench_mavlink.py" for folder in (bundled, CHECKOUT / "build/gen/mavlink", installed)]
     return _find("psabench_mavlink.py", "PSABENCH_MAVLINK", places, [], Path.is_file)

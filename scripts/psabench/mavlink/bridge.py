@@ -1,6 +1,6 @@
 """`psabench mavlink`: a navigation computer on CAN that is a MAVLink system to everybody else, and its replay of a log.
 
-The main thread has the bench: it receives frames, reads and writes the unit's objects, and calibrates. The station has a
+The main thread has the bench: it receives frames, reads and writes objects of the unit, calibrates. The station has a
 thread of its own (`station`), so that it answers while a procedure runs.
 """
 
@@ -46,6 +46,7 @@ from psabench.procedures.head_bench import Reading
 
 SLICE_S = 0.02  # bench time between looks at jobs
 JOBS_A_SLICE = 8
+RATE_MAX_HZ = 10000.0
 LOG_SLICE_S = 0.02
 PEER_S = 0.05  # real time between looks whether a peer has come
 ANGLES, ATTITUDE, RESULT = 54101, 30, 54103
@@ -99,11 +100,13 @@ class Bridge:
         def angles(rate_hz: float) -> None:
             self.angles_s = hz(rate_hz)
 
-        most = {"low": 0.0, "high": 10000.0}
-        codes_hz = 10000.0 if self.options.codes_hz is None else self.options.codes_hz
-        self.parameters.add(Parameter(name="MAV_IMU_HZ", value=self.options.imu_hz, write=rate(IMU), **most))
-        self.parameters.add(Parameter(name="MAV_ANGLES_HZ", value=self.options.angles_hz, write=angles, **most))
-        self.parameters.add(Parameter(name="MAV_CODES_HZ", value=codes_hz, write=rate(ACCEL), **most))
+        def add(name: str, value: float, write: Callable[[float], None]) -> None:
+            self.parameters.add(Parameter(name=name, value=value, low=0.0, high=RATE_MAX_HZ, write=write))
+
+        codes_hz = RATE_MAX_HZ if self.options.codes_hz is None else self.options.codes_hz
+        add("MAV_IMU_HZ", self.options.imu_hz, rate(IMU))
+        add("MAV_ANGLES_HZ", self.options.angles_hz, angles)
+        add("MAV_CODES_HZ", codes_hz, rate(ACCEL))
         self.parameters.add(Parameter(name="GRAVITY_MPS2", value=self.scale.g_mps2))
         self.parameters.add(Parameter(name="CAL_VALID", value=0.0))
 
@@ -320,7 +323,7 @@ class LiveBridge(Bridge):
 
 
 class LogBridge(Bridge):
-    """A recorded log as if the board were there: at its own pace, or `speed` times as fast (0: as fast as it can be)."""
+    """A recorded log as if the board were there: at its own pace, `speed` times as fast, or (0) at once."""
 
     def __init__(self, options: BridgeOptions, path: Path, node: int, speed: float) -> None:
         """Raises BadInput for a file that is not there."""
@@ -341,7 +344,7 @@ class LogBridge(Bridge):
         self.parameters.add(Parameter(name=name, value=float(values[k]), low=low, high=high, write=write))
 
     def run(self) -> None:
-        """To the end of the log; it begins with the first peer. Raises BadInput for a damaged log, after what came before."""
+        """To the end of the log; begins with the first peer. Raises BadInput for a damaged log, its good part sent."""
         self.station.start()
         while not self.station.port.peers and not self.over():
             self._settle(PEER_S)

@@ -91,7 +91,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     group.add_argument("--speed", type=float, default=1.0, metavar="X", help="1: as recorded; 0: as fast as possible")
     group = p.add_argument_group("calibration")
     group.add_argument("--procedure", choices=list(ON_THE_HEAD), default="turns", help="procedure (%(default)s)")
-    group.add_argument("--axis", choices=("x", "y", "z"), default="x", help="channel of the accelerometer (%(default)s)")
+    group.add_argument(
+        "--axis", choices=("x", "y", "z"), default="x", help="channel of the accelerometer (%(default)s)"
+    )
     group.add_argument("--realisations", type=natural, metavar="N", help="repetitions (the procedure's default)")
     group.add_argument("--average", type=natural, default=16, metavar="N", help="samples per reading (%(default)s)")
     group.add_argument("--gravity", type=positive, default=G_MPS2, metavar="M/S2", help="local g (%(default)s)")
@@ -127,9 +129,7 @@ def _options(args: argparse.Namespace) -> Any:
         angles_hz=args.angles,
         codes_hz=args.codes,
         for_s=args.for_s,
-        plan=CalibrationPlan(
-            procedure=args.procedure, params=params, average=args.average, g_mps2=args.gravity
-        ),
+        plan=CalibrationPlan(procedure=args.procedure, params=params, average=args.average, g_mps2=args.gravity),
     )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from psabench.errors import expected
 from psabench.mavlink.dialect import mavlink
 from psabench.mavlink.parameters import Parameters
 from psabench.mavlink.ports import Parser, Port, PortSpec
@@ -119,9 +120,7 @@ class Station:
 
     def send_parameter(self, index: int) -> None:
         p = self.parameters[index]
-        self.send(
-            mavlink().MAVLink_param_value_message(p.name.encode(), p.wire(), p.kind, len(self.parameters), index)
-        )
+        self.send(mavlink().MAVLink_param_value_message(p.name.encode(), p.wire(), p.kind, len(self.parameters), index))
 
     def acknowledge(self, to: Requester, result: int, command: int = CALIBRATION, progress: int = 0) -> None:
         self.send(mavlink().MAVLink_command_ack_message(command, result, progress, 0, to.sysid, to.compid))
@@ -200,9 +199,7 @@ class Station:
 
     def _is_for_us(self, m: Any) -> bool:
         system, component = getattr(m, "target_system", 0), getattr(m, "target_component", 0)
-        return m.get_type() == "PING" or (
-            system in (0, self.identity.sysid) and component in (0, self.identity.compid)
-        )
+        return m.get_type() == "PING" or (system in (0, self.identity.sysid) and component in (0, self.identity.compid))
 
     # ---- parameters
 
@@ -291,7 +288,9 @@ class Station:
             self._cancel(to)
         elif self._calibrating is not None:
             again = confirmation > 0 and to == self._calibrating  # it did not get our first answer
-            self.acknowledge(to, IN_PROGRESS if again else TEMPORARILY_REJECTED, progress=self._progress if again else 0)
+            self.acknowledge(
+                to, IN_PROGRESS if again else TEMPORARILY_REJECTED, progress=self._progress if again else 0
+            )
         elif p[4] != 1 or any(p[:4]) or any(p[5:]):
             self.text(WARNING, "calibration: only the accelerometer (param5 = 1)")
             self.acknowledge(to, UNSUPPORTED)

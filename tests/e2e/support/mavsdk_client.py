@@ -1,6 +1,6 @@
 """MAVSDK as a ground station: what it reads from a MAVLink system at udpin://127.0.0.1:PORT, as one line of JSON.
 
-Usage: mavsdk_client.py PORT telemetry|params|calibrate [NAME VALUE]. A process of its own: MAVSDK brings native threads.
+Usage: mavsdk_client.py PORT telemetry|params|calibrate [NAME VALUE]. A process of its own: MAVSDK has native threads.
 """
 
 from __future__ import annotations
