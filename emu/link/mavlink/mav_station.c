@@ -4,37 +4,6 @@
 
 enum { FTP_NAK = 129, FTP_NOT_FOUND = 10 }; /* opcode and error of the file transfer protocol */
 
-void mav_send(struct mav_station *s, struct mav_kind kind, const void *payload)
-{
-    uint8_t frame[MAV_FRAME_MAX];
-    const size_t n = mav_frame(&s->sender, kind, payload, frame);
-    s->counters.sent++;
-    s->io.send(s->io.ctx, frame, n);
-}
-
-uint64_t mav_time_us(const struct mav_station *s, int64_t t_ns)
-{
-    return (uint64_t)(t_ns + s->cfg.epoch_ns) / 1000u;
-}
-
-bool mav_is_for_us(const struct mav_station *s, uint8_t sysid, uint8_t compid)
-{
-    return (sysid == 0 || sysid == s->cfg.sysid) && (compid == 0 || compid == s->cfg.compid);
-}
-
-void mav_text_out(struct mav_station *s, uint8_t severity, const char *text)
-{
-    enum { CHUNK = MAVLINK_MSG_STATUSTEXT_FIELD_TEXT_LEN, CHUNKS_MAX = 8 };
-    const size_t len = strlen(text);
-    if (len > CHUNK && ++s->text_id == 0) s->text_id = 1;
-    for (size_t at = 0, k = 0; (at < len || k == 0) && k < CHUNKS_MAX; at += CHUNK, k++) {
-        mavlink_statustext_t m = {.severity = severity, .id = len > CHUNK ? s->text_id : 0, .chunk_seq = (uint8_t)k};
-        const size_t left = len - at;
-        memcpy(m.text, text + at, left < CHUNK ? left : CHUNK);
-        mav_send(s, MAV_KIND(STATUSTEXT), &m);
-    }
-}
-
 /* ---- what is answered at once */
 
 /* There are no files. A client that asks for its parameters by file goes on to the parameter protocol. */
@@ -97,6 +66,20 @@ void mav_station_message(struct mav_station *s, const mavlink_message_t *m, int6
     for (unsigned i = 0; i < sizeof rows / sizeof *rows; i++) {
         if (rows[i].id == m->msgid) rows[i].take(s, m, t_ns);
     }
+}
+
+void mav_station_open(struct mav_station *s, const struct mav_cfg *cfg, const struct mav_io *io, struct sched *sched)
+{
+    struct can_hub *hub = s->sdo.hub;
+    const uint8_t node = s->sdo.node;
+    *s = (struct mav_station){.cfg = *cfg,
+                              .io = *io,
+                              .sched = sched,
+                              .sender = {.sysid = cfg->sysid, .compid = cfg->compid},
+                              .sdo = {.hub = hub, .sched = sched, .node = node, .done = mav_params_answer, .ctx = s},
+                              .list_at = cfg->param_count};
+    mav_sdo_init(&s->sdo);
+    mav_streams_open(s);
 }
 
 void mav_station_turn(struct mav_station *s, int64_t t_ns)

@@ -108,13 +108,17 @@ void mav_station_turn(struct mav_station *s, int64_t t_ns); /* of the loop */
 
 /* ---- for the files of the station */
 
+/* mav_send.c */
 void mav_send(struct mav_station *s, struct mav_kind kind, const void *payload);
 void mav_text_out(struct mav_station *s, uint8_t severity,
                   const char *text);                             /* STATUSTEXT, in chunks where it is long */
 uint64_t mav_time_us(const struct mav_station *s, int64_t t_ns); /* epoch included */
 bool mav_is_for_us(const struct mav_station *s, uint8_t sysid, uint8_t compid);
 
-/* mav_streams.c. Position of a message among the streams; MAV_STREAMS: it is none. */
+/* mav_streams.c */
+void mav_streams_open(struct mav_station *s);
+
+/* Position of a message among the streams; MAV_STREAMS: it is none. */
 unsigned mav_stream_find(uint32_t msgid);
 bool mav_stream_emit(struct mav_station *s, unsigned stream, int64_t t_ns); /* false: there is nothing to send yet */
 bool mav_stream_set(struct mav_station *s, unsigned stream, int64_t interval_ns, int64_t t_ns); /* false: not allowed */

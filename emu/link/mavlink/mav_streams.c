@@ -288,20 +288,11 @@ void mav_station_reading(struct mav_station *s, const struct mav_reading *r)
     }
 }
 
-void mav_station_open(struct mav_station *s, const struct mav_cfg *cfg, const struct mav_io *io, struct sched *sched)
+void mav_streams_open(struct mav_station *s)
 {
-    struct can_hub *hub = s->sdo.hub;
-    const uint8_t node = s->sdo.node;
-    *s = (struct mav_station){.cfg = *cfg,
-                              .io = *io,
-                              .sched = sched,
-                              .sender = {.sysid = cfg->sysid, .compid = cfg->compid},
-                              .sdo = {.hub = hub, .sched = sched, .node = node, .done = mav_params_answer, .ctx = s},
-                              .list_at = cfg->param_count};
-    mav_sdo_init(&s->sdo);
     sched_ev(&s->tick, on_tick, s);
     for (unsigned i = 0; i < MAV_STREAMS; i++) {
-        s->stream[i] = (struct mav_stream){.interval_ns = mav_stream_default_ns(s, i), .next_ns = sched->now_ns};
+        s->stream[i] = (struct mav_stream){.interval_ns = mav_stream_default_ns(s, i), .next_ns = s->sched->now_ns};
     }
     arm_tick(s);
 }
