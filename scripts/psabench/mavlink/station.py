@@ -188,7 +188,6 @@ class Station:
             "PARAM_SET": self._take_set,
             "COMMAND_LONG": self._take_command,
             "COMMAND_INT": self._take_command,
-            "COMMAND_CANCEL": self._take_cancel,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
             "PING": self._answer_ping,
             "TIMESYNC": self._answer_timesync,
@@ -309,10 +308,6 @@ class Station:
         if self._calibrating is None:
             self.acknowledge(to, ACCEPTED)  # there is nothing to end
         self._cancelled.set()  # the procedure's end is acknowledged when it comes
-
-    def _take_cancel(self, m: Any) -> None:
-        if m.command == CALIBRATION:
-            self._cancel(Requester(sysid=m.get_srcSystem(), compid=m.get_srcComponent()))
 
     # ---- what is answered at once
 
