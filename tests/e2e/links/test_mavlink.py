@@ -236,3 +236,34 @@ def test_a_port_in_use_is_told() -> None:
         )
     assert done.returncode == 3
     assert "expected a free port of 127.0.0.1" in one_line(done.stderr, "psa-emu")
+
+
+def test_a_parameter_that_was_set_is_part_of_a_snapshot(tmp_path: Path) -> None:
+    """What the link writes goes over the bus, in frames that a snapshot repeats."""
+    with emulator("tcp:0", pace="step") as emu, Control(emu.control_path) as control:  # type: ignore[arg-type]
+        gcs = mavutil_connection(emu)
+        control.call("run", for_s=0.2)
+        gcs.mav.param_set_send(1, 1, b"SAMPLE_NTH", 7.0, 9)
+        gcs.mav.param_set_send(1, 1, b"ZERO_V_X", 2.25, 9)
+        for _ in range(200):  # each an access of some frames; the requests come at their own pace
+            control.call("run", for_s=0.005)
+            values = _values(gcs)
+            if values.get("ZERO_V_X") == 2.25:
+                break
+        assert values == {"SAMPLE_NTH": 7.0, "ZERO_V_X": 2.25}
+        gcs.close()
+        control.call("snapshot", path=str(tmp_path / "s"))
+    restored = Emulator(pace="step", extra=["--restore", tmp_path / "s", "--mavlink", "tcp:0,imu=1000"])
+    with restored as emu, Control(emu.control_path) as control:  # type: ignore[arg-type]
+        gcs = mavutil_connection(emu)
+        control.call("run", for_s=0.1)
+        m = receive(gcs, "PSABENCH_ACCEL")
+        gcs.close()
+    assert m.accel_mps2[0] == pytest.approx((m.volts[0] - 2.25) * 9.80665)
+
+
+def _values(gcs: Any) -> dict[str, float]:
+    """Parameters that have come by now."""
+    while gcs.recv_match(blocking=False) is not None:
+        pass
+    return {k: float(v) for k, v in gcs.params.items()}
