@@ -110,9 +110,9 @@ def _mavlink(args: argparse.Namespace) -> int:
     options = _options(args)
     if args.log:
         log = LogBridge(options, args.log, args.node, args.speed)
-        return _run(log, f"log {args.log}")
+        return _run(log)
     with _bench(args) as bench:
-        return _run(LiveBridge(options, bench), "bench")
+        return _run(LiveBridge(options, bench))
 
 
 def _options(args: argparse.Namespace) -> Any:
@@ -143,9 +143,9 @@ def _bench(args: argparse.Namespace) -> Any:
     return Bench.start(args.scenario, pace=pace, seed=args.seed, node=args.node)
 
 
-def _run(bridge: Any, what: str) -> int:
+def _run(bridge: Any) -> int:
     port = bridge.station.port
-    print(f"mavlink {bridge.options.port.kind} 127.0.0.1:{port.port}, {what}", flush=True)
+    print(f"ready mavlink={bridge.options.port.kind} host={port.host} port={port.port}\nready all", flush=True)
     try:
         bridge.run()
     except KeyboardInterrupt:  # the usual end

@@ -59,7 +59,7 @@ class Port:
     """One port and its peers. Raises BadInput where the port is in use."""
 
     def __init__(self, spec: PortSpec, new_parser: Callable[[], Parser]) -> None:
-        self.lost = 0
+        self.host, self.lost = HOST, 0
         self.peers: list[Peer] = []
         self._lock = threading.RLock()  # of the peers and what waits for them
         self._new_parser = new_parser

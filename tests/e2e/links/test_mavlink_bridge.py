@@ -29,8 +29,10 @@ def bridge(*words: str | Path, port: str = "tcp:0") -> Iterator[tuple[subprocess
     try:
         assert process.stdout is not None
         head = process.stdout.readline()
-        assert head.startswith("mavlink "), head + process.communicate()[1]
-        yield process, head.split()[2].rstrip(",")
+        assert head.startswith("ready mavlink="), head + process.communicate()[1]
+        assert process.stdout.readline() == "ready all\n"
+        host, number = (word.partition("=")[2] for word in head.split()[2:])
+        yield process, f"{host}:{number}"
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 0, said
