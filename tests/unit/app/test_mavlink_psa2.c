@@ -100,8 +100,11 @@ static void a_half_alone_and_frames_of_others_give_no_reading(void **state)
     struct mavlink_psa2 d = {.node = NODE};
     struct mav_reading out[MAVLINK_PSA2_READINGS];
     for (unsigned i = 0; i < COUNT(rows); i++) assert_int_equal(mavlink_psa2_take(&d, &rows[i], 1000, out), 0);
-    const struct can_msg zt = {.id = 0x280 + NODE, .len = 8};
+    const struct can_msg xy = {.id = 0x180 + NODE, .len = 8}, zt = {.id = 0x280 + NODE, .len = 8};
     assert_int_equal(mavlink_psa2_take(&d, &zt, 1000, out), 0);
+    assert_int_equal(mavlink_psa2_take(&d, &xy, 2000, out), 0);
+    assert_int_equal(mavlink_psa2_take(&d, &zt, 2200, out), 1);
+    assert_int_equal(mavlink_psa2_take(&d, &zt, 3200, out), 0); /* its first half was lost */
 }
 
 int main(void)

@@ -572,6 +572,22 @@ static void an_access_waits_for_another_host_and_then_goes_on(void **state)
     assert_non_null(last(MAVLINK_MSG_ID_PARAM_VALUE, 0));
 }
 
+static void an_answer_about_another_object_is_not_ours(void **state)
+{
+    (void)state;
+    struct can_msg a = {.id = 0x580 + NODE, .len = 8, .data = {0x43, 0x10, 0x22, 2}};
+    r.unit_is_off = true; /* the test answers */
+    ask_param("ZERO_V_X", -1);
+    run_ms(2);
+    can_send(&r.bus, &r.host, &a, r.s.now_ns);
+    run_ms(2);
+    assert_null(last(MAVLINK_MSG_ID_PARAM_VALUE, 0));
+    a.data[3] = 1;
+    can_send(&r.bus, &r.host, &a, r.s.now_ns);
+    run_ms(2);
+    assert_non_null(last(MAVLINK_MSG_ID_PARAM_VALUE, 0));
+}
+
 static void a_unit_that_is_off_ends_the_list(void **state)
 {
     (void)state;
@@ -621,6 +637,7 @@ int main(void)
         TEST(rates_are_parameters_too),
         TEST(a_scale_that_another_host_writes_is_followed),
         TEST(an_access_waits_for_another_host_and_then_goes_on),
+        TEST(an_answer_about_another_object_is_not_ours),
         TEST(a_unit_that_is_off_ends_the_list),
         TEST(more_requests_than_there_is_room_for_are_counted),
     };
