@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import random
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,7 +17,7 @@ import pytest
 from mavlink_client import TIMEOUT_S, command, free_port, parameters, receive, set_parameter, station
 from psabench.emulator import Emulator
 from psabench.link.control import Control
-from rig import HERE, HOST, addresses, one_line, psabench
+from rig import HERE, HOST, SEED, addresses, one_line, psabench
 
 pytestmark = HOST
 CALIBRATE = (241, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -178,3 +180,14 @@ def test_a_damaged_log_is_sent_up_to_the_damage(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert "message 3: expected a whole message" in said
     assert "readings 1," in said
+
+
+def test_hostile_bytes_do_not_end_the_bridge() -> None:
+    noise = random.Random(SEED)
+    with bridge(*QUICK) as (_, address), station(f"tcp:{address}") as gcs:
+        for _ in range(3):
+            with socket.create_connection(("127.0.0.1", int(address.split(":")[1]))) as s:
+                s.sendall(b"\xfd\xff" + noise.randbytes(20000) + b"\xfe\xff" * 50)
+        assert command(gcs, 400, 1) == 3
+        receive(gcs, "PSABENCH_ACCEL")
+        assert gcs.packet_loss() == 0.0
