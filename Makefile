@@ -31,7 +31,7 @@ unexport PYTHONDONTWRITEBYTECODE
 STD   := -std=c11 -ffp-contract=off -fPIC -fvisibility=hidden -DPSABENCH_VERSION=$(VERSION)
 WARN  := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wundef -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
 SANFL := $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer)
-INC   := -Iemu -Ibuild $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
+INC   := -Iemu -Ibuild -isystem build/gen/mavlink $(shell $(PKGCONFIG) --cflags libcjson libfyaml 2>/dev/null)
 LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
 CXXFLAGS ?= $(patsubst -O0,-O1,$(patsubst -O2,-O3,$(CFLAGS)))#   without optimisation Eigen asks for C++'s runtime
@@ -67,7 +67,7 @@ BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall wheel clean help lock
+.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall foreign wheel clean help lock
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emulator build/psa-emu and the libraries (CC=clang: in build-clang, SAN=address,undefined: in build-san)
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
 $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
@@ -116,8 +116,8 @@ $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 	$(call say,LINK)
 	$(Q)$(LINK) -o $@ $(filter %.o,$^) $(filter-out %/emu.a,$(filter %.a,$^)) $(BUILD)/lib/emu.a $(LINK_LIBS)
-build/gen/gen.mk: $(wildcard proto/*.yaml) tools/gen_proto.py $(wildcard tools/protogen/*.py) | $(PY)
-	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D)
+build/gen/gen.mk: $(wildcard proto/*.yaml proto/mavlink/*.xml) tools/gen_proto.py tools/gen_mavlink.py $(wildcard tools/protogen/*.py) | $(PY)
+	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D) && $(PY) tools/gen_mavlink.py --out $(@D)
 	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c))' > $@
 $(PY):
 	tools/setup run
@@ -187,6 +187,8 @@ install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions
 	@$(INSTALL) install
 uninstall: ## remove what install put there
 	@$(INSTALL) uninstall
+foreign: all ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/mavlink.md)
+	@tools/foreign
 wheel: all ## build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
 compile_commands.json: Makefile $(SRC) $(GEN_SRC) ## how each file is compiled, for editors and clang-tidy

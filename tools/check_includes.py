@@ -52,6 +52,7 @@ LIBRARIES = {
     "cjson/cJSON.h": _JSON,
     "cJSON.h": _JSON,
     "libfyaml.h": {"scenario"},
+    "psabench/mavlink.h": {"link"},  # generated from proto/mavlink
 }
 
 KINDS = ("*.c", "*.h", "*.cpp", "*.hpp")

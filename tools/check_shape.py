@@ -28,9 +28,9 @@ ROOMS = ("emu", "scripts", "tests", "docs")
 NOT_ROOMS = ("tests/fuzz/corpus", "docs/img")  # recorded data and pictures
 # Numbers of objects of CANopen: the communication area, the boards' own, the profile area of PSA-2.
 OBJECT = re.compile(r"\b0x(?:1[0-9A-Fa-f]{3}|2[0-3][0-9A-Fa-f]{2}|6[01][0-9A-Fa-f]{2}|91[0-9A-Fa-f]{2})\b")
-GENERATED = f"{PACKAGE}/boards/objects.py"  # by tools/gen_proto.py
+GENERATED = (f"{PACKAGE}/boards/objects.py", f"{PACKAGE}/boards/parameters.py")  # by tools/gen_proto.py
 BOARD = "pmka"  # the board by which it is measured how far a board's name spreads
-BOARD_PLACES = (f"{PACKAGE}/boards/{BOARD}/", f"{PACKAGE}/boards/registry.py", GENERATED)
+BOARD_PLACES = (f"{PACKAGE}/boards/{BOARD}/", f"{PACKAGE}/boards/registry.py", *GENERATED)
 SOURCES = (".c", ".h", ".cpp", ".hpp")
 
 
@@ -108,7 +108,7 @@ def large_folders(root: Path) -> list[str]:
 def object_numbers(root: Path) -> list[str]:
     """Numbers of CANopen objects written by hand, by the tokens of the code: comments and texts are free."""
     found = []
-    for path in sorted(set((root / PACKAGE).rglob("*.py")) - {root / GENERATED}):
+    for path in sorted(set((root / PACKAGE).rglob("*.py")) - {root / g for g in GENERATED}):
         text = path.read_text(encoding="utf-8")
         lines = text.splitlines()
         for node in ast.walk(ast.parse(text)):
@@ -140,7 +140,7 @@ def loose_modules(root: Path) -> list[str]:
 
 
 def lines_of(root: Path, room: str, endings: tuple[str, ...]) -> int:
-    chosen = [f for f in tracked(root) if f.startswith(f"{room}/") and f.endswith(endings) and f != GENERATED]
+    chosen = [f for f in tracked(root) if f.startswith(f"{room}/") and f.endswith(endings) and f not in GENERATED]
     return sum(len((root / f).read_text(encoding="utf-8").splitlines()) for f in chosen)
 
 

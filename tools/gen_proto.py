@@ -2,9 +2,11 @@
 """Everything that follows from proto/psabench.yaml and proto/<board>.yaml, the source of CAN messages and objects.
 
 Usage:
-    gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py, an EDS and a page a device
+    gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py and parameters.py, an EDS
+                            and a page a device
     gen_proto.py --check    exit 1 and name the ones that are out of date
-    gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools) and an <device>_od.[ch] each
+    gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools), an <device>_od.[ch] each,
+                            parameter_names.[ch]
 
 psabench.yaml is PSA-2 and what all devices have in common: network management, services, communication objects.
 unit.yaml has the objects that the others share, and its head the grammar of their files.
@@ -20,6 +22,7 @@ from protogen.eds import eds
 from protogen.model import ROOT, Protocol
 from protogen.objects import objects_module
 from protogen.page import page
+from protogen.parameters import parameter_files, parameters_module
 from protogen.source import load_all
 
 
@@ -28,6 +31,7 @@ def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
     files = {
         ROOT / "proto/psabench.dbc": dbc(protocols),
         ROOT / "scripts/psabench/boards/objects.py": objects_module(protocols),
+        ROOT / "scripts/psabench/boards/parameters.py": parameters_module(protocols),
     }
     for p in protocols:
         files[ROOT / f"proto/{p.key}.eds"] = eds(p)
@@ -56,7 +60,8 @@ def main(argv: list[str] | None = None) -> int:
         if old:
             print(f"out of date: {', '.join(old)}; run tools/gen_proto.py", file=sys.stderr)
         return 1 if old else 0
-    files = {args.out / name: text for name, text in c_files(protocols).items()} if args.out else kept_files(protocols)
+    compiled = c_files(protocols) | parameter_files(protocols)
+    files = {args.out / name: text for name, text in compiled.items()} if args.out else kept_files(protocols)
     for path, text in files.items():
         write(path, text)
     return 0

@@ -1,6 +1,8 @@
 /* Programs on the CAN buses, as commands and counters see them. */
 #include "app/service.h"
 
+#include "app/mavlink.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -118,4 +120,5 @@ void service_print_clients(struct service *s)
             "psa-emu: clients gone: delivered %" PRIu64 ", taken %" PRIu64 ", dropped %" PRIu64 ", refused %" PRIu64
             "\n",
             gone.delivered, gone.taken, gone.dropped, gone.refused);
+    for (unsigned i = 0; i < s->ports.mavlink_count; i++) mavlink_print_counters(s->ports.mavlink[i], stderr);
 }

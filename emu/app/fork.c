@@ -102,6 +102,7 @@ static bool make_options(struct child_options *w, const struct options *parent, 
     o->control = f->control;
     o->truth = f->truth;
     o->wait_client = false;
+    o->mavlink_count = 0;
     for (unsigned i = 0; i < o->scpi_count; i++) { /* the parent's ports and links are taken */
         o->scpi[i].port = 0;
         o->scpi[i].link = NULL;

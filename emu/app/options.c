@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* getopt_long */
 #include "app/options.h"
 
+#include "app/options_mavlink.h"
 #include "base/why.h"
 #include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
@@ -224,6 +225,14 @@ static bool set_bus_port(const struct target *t, const char *arg)
     return true;
 }
 
+static bool set_mavlink(const struct target *t, const char *arg)
+{
+    struct options *o = t->o;
+    const char *form;
+    if (o->mavlink_count == OPTIONS_MAVLINK_MAX) return expected(t, arg, "up to %u MAVLink links", OPTIONS_MAVLINK_MAX);
+    return options_mavlink(arg, &o->mavlink[o->mavlink_count++], &form) || expected(t, arg, "%s", form);
+}
+
 static bool set_path(const struct target *t, const char *arg)
 {
     if (!*arg) return expected(t, arg, "a path");
@@ -293,6 +302,10 @@ static const struct row rows[] = {
      "                           times)"},
     {"--bus-port", " [UNIT:]LINK", set_bus_port, 0, "bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
      "                           (default: the first unit that has one); LINK as above; may be given several times"},
+    {"--mavlink", " KIND[,...]", set_mavlink, 0, "a unit as a MAVLink system (docs/mavlink.md). KIND: udp[:PORT] (sends to 127.0.0.1),\n"
+     "                           udpin[:PORT], tcp[:PORT] (wait for clients there), pty[:LINK]. Then, after commas:\n"
+     "                           unit=NAME, sysid=N, compid=N, autopilot=generic|px4|ardupilot|invalid, imu=HZ,\n"
+     "                           angles=HZ, hil=HZ (HIL messages, from the truth; off)"},
     {"--quiet", NULL, set_flag, IN(quiet), "no counters on stderr at exit"},
     {"--dump", NULL, set_action, OPTIONS_DUMP, "print the scenario with every key as JSON (itself a scenario) and exit"},
     {"--resolved", " FILE", set_path, IN(resolved), "write the scenario with every key to FILE and run"},

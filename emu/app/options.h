@@ -3,6 +3,7 @@
 #define PSABENCH_APP_OPTIONS_H
 
 #include "app/pace.h"
+#include "link/mavlink/mav_kind.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -13,6 +14,8 @@
 #define OPTIONS_SCPI_MAX  8u
 #define OPTIONS_BUS_MAX   8u
 #define OPTIONS_LOGIC_MAX 4u
+
+#define OPTIONS_MAVLINK_MAX 4u
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_CAN_LOG };
 
@@ -40,6 +43,16 @@ struct options_bus {
 struct options_logic {
     uint16_t port;     /* 0: a free one */
     const char *lines; /* names with commas; NULL: the board's default */
+};
+
+struct options_mavlink {
+    const char *arg; /* as given */
+    enum mav_port_kind kind;
+    uint16_t port;                    /* 0: a free one */
+    char link[256];                   /* of the pty; "": none */
+    char unit[32];                    /* "": the first */
+    uint8_t sysid, compid, autopilot; /* autopilot: MAV_AUTOPILOT */
+    double imu_hz, angles_hz, hil_hz; /* 0: not sent */
 };
 
 /* Of the buses, instead of the scenario's. */
@@ -73,6 +86,8 @@ struct options {
     unsigned bus_count;
     struct options_logic logic[OPTIONS_LOGIC_MAX];
     unsigned logic_count;
+    struct options_mavlink mavlink[OPTIONS_MAVLINK_MAX];
+    unsigned mavlink_count;
     enum pace_kind pace;
     int64_t for_ns; /* end of the run; INT64_MAX: none */
     bool seed_given;

@@ -1,6 +1,7 @@
 #include "app/ports.h"
 
 #include "app/loop.h"
+#include "app/mavlink.h"
 #include "base/why.h"
 #include "link/own_file.h"
 
@@ -19,7 +20,8 @@ static bool fail_pty(char *why, size_t cap, const char *option, const char *arg,
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
-                                     2 * OPTIONS_BUS_MAX + 3 + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1),
+                                     2 * OPTIONS_BUS_MAX + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
+                                     OPTIONS_MAVLINK_MAX * (MAV_PEERS_MAX + 1) + 3,
                "LOOP_LINKS_MAX");
 
 /* ---- CAN */
@@ -266,6 +268,16 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
     return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
 }
 
+static bool open_mavlinks(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->mavlink_count; i++) {
+        struct mavlink *m = mavlink_open(b, p->hub, o, &o->mavlink[i], why, cap);
+        if (!m) return false;
+        p->mavlink[p->mavlink_count++] = m;
+    }
+    return true;
+}
+
 static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     if (!o->vcd) return true;
@@ -299,14 +311,16 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && logic_check(b, o, why, cap);
+    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && logic_check(b, o, why, cap) &&
+           mavlink_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
-           logic_open(&p->logic, &p->links, b, o, why, cap) && open_vcd(p, b, o, why, cap) &&
-           instruments_open(&p->scpi, o, why, cap) && open_socket(&p->control, "control", o->control, why, cap) &&
+           logic_open(&p->logic, &p->links, b, o, why, cap) && open_mavlinks(p, b, o, why, cap) &&
+           open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
+           open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
 
@@ -371,6 +385,14 @@ static void add_logic(const struct logic_port *p, cJSON *all)
     add_key(e, "lines", p->names);
 }
 
+static void add_mavlink(const struct mavlink *m, cJSON *all)
+{
+    cJSON *e = add_endpoint(all, "mavlink", mavlink_kind_name(m->port.kind));
+    if (m->port.kind == MAV_PTY) add_pty(e, &m->port.pty);
+    else add_port(e, m->port.port);
+    add_key(e, "unit", m->unit->cfg.name);
+}
+
 static void add_instrument(const struct instrument *i, cJSON *all)
 {
     cJSON *e = add_endpoint(all, "scpi", i->kind->name);
@@ -390,6 +412,7 @@ cJSON *ports_endpoints(const struct ports *p, const struct options *o)
         add_pty(e, &b->pty.pty);
     }
     for (unsigned i = 0; i < p->logic.count; i++) add_logic(p->logic.port[i], all);
+    for (unsigned i = 0; i < p->mavlink_count; i++) add_mavlink(p->mavlink[i], all);
     for (unsigned k = 0; k < p->scpi.count; k++) add_instrument(p->scpi.port[k], all);
     if (o->vcd) add_endpoint(all, "vcd", o->vcd);
     if (o->control) add_endpoint(all, "control", o->control);
@@ -441,6 +464,7 @@ static void close_all(struct ports *p)
     if (p->line) line_pty_close(p->line);
     for (unsigned i = 0; i < p->bus_count; i++) close_bus_port(p->bus[i]);
     logic_close(&p->logic);
+    for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_close(p->mavlink[i]);
     instruments_close(&p->scpi);
     ctl_close(&p->control);
     ctl_close(&p->truth);
@@ -448,11 +472,12 @@ static void close_all(struct ports *p)
     links_reap(&p->links);
     for (unsigned i = 0; i < p->can_count; i++) free(p->can[i]);
     for (unsigned i = 0; i < p->bus_count; i++) free(p->bus[i]);
+    for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_free(p->mavlink[i]);
     instruments_free(&p->scpi);
     logic_free(&p->logic);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
-    p->can_count = p->bus_count = 0;
+    p->can_count = p->bus_count = p->mavlink_count = 0;
     p->line = NULL;
     p->vcd = NULL;
 }
@@ -471,6 +496,7 @@ void ports_abandon(struct ports *p)
     for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
     if (p->line) p->line->pty.name = NULL;
     for (unsigned i = 0; i < p->bus_count; i++) p->bus[i]->pty.pty.name = NULL;
+    for (unsigned i = 0; i < p->mavlink_count; i++) p->mavlink[i]->port.pty.name = NULL;
     p->control.path = p->truth.path = "";
     close_all(p);
 }

@@ -17,6 +17,8 @@
 
 #include <cjson/cJSON.h>
 
+struct mavlink;
+
 struct ports_can {
     enum options_can_kind kind;
     const char *bus; /* its bus where there are several; NULL: all of them, or the only one */
@@ -47,6 +49,8 @@ struct ports {
     struct bus_port *bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
     struct logic_ports logic;
+    struct mavlink *mavlink[OPTIONS_MAVLINK_MAX];
+    unsigned mavlink_count;
     struct instruments scpi;          /* control and sched are filled in by the caller */
     struct ctl_server control, truth; /* callbacks are filled in by the caller */
     FILE *vcd;

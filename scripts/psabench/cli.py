@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "decode": ("boards.decode_command", "convert a log or a line capture to CSV in SI units"),
     "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
+    "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
 }
 

@@ -53,6 +53,13 @@ def proto_file(name: str) -> Path:
     raise BadInput(expected(f"a file in {' or '.join(str(p) for p in folders)} (or PSABENCH_PROTO)", "none", name))
 
 
+def mavlink_module() -> Path:
+    """Path of our MAVLink dialect's generated Python module: the bundle, this checkout, or after `make install`."""
+    bundled, installed = (root / "share" / "psabench" / "mavlink" for root in (BUNDLE, Path(sys.prefix)))
+    places = [folder / "psabench_mavlink.py" for folder in (bundled, CHECKOUT / "build/gen/mavlink", installed)]
+    return _find("psabench_mavlink.py", "PSABENCH_MAVLINK", places, [], Path.is_file)
+
+
 def _find(what: str, variable: str, ours: Sequence[Path], more: Sequence[Path], fits: Callable[[Path], bool]) -> Path:
     named = os.environ.get(variable)
     for place in [Path(named)] if named else [*ours, *more]:

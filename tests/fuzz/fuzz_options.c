@@ -14,6 +14,12 @@ static void check(const struct options *o)
     assert(o->pace == PACE_WALL || o->pace == PACE_STEP || o->pace == PACE_FREE);
     assert(o->for_ns >= 0 && o->vcd_unit_ns > 0 && o->line_hz > 0);
     assert(o->pace != PACE_STEP || o->control);
+    assert(o->mavlink_count <= OPTIONS_MAVLINK_MAX);
+    for (unsigned i = 0; i < o->mavlink_count; i++) {
+        const struct options_mavlink *m = &o->mavlink[i];
+        assert(m->kind <= MAV_PTY && m->sysid && m->compid && (m->kind != MAV_UDP_OUT || m->port));
+        assert(m->imu_hz >= 0 && m->imu_hz <= 10000 && m->angles_hz >= 0 && m->hil_hz >= 0 && m->hil_hz <= 10000);
+    }
     for (unsigned i = 0; i < o->can_count; i++) {
         assert(o->can[i].kind <= OPTIONS_CAN_LOG);
         assert(o->can[i].arg || (o->can[i].kind != OPTIONS_SOCKETCAN && o->can[i].kind != OPTIONS_CAN_LOG));

@@ -101,6 +101,7 @@ class Described:
     low: Any
     high: Any
     real: bool  # IEEE 754, of data_bytes
+    signed: bool  # an integer in two's complement
 
 
 def _described(v: Any) -> Described:
@@ -114,6 +115,7 @@ def _described(v: Any) -> Described:
         low=v.min,
         high=v.max,
         real=v.data_type in canopen.objectdictionary.FLOAT_TYPES,
+        signed=v.data_type in canopen.objectdictionary.SIGNED_TYPES,
     )
 
 

@@ -137,6 +137,60 @@ static void durations_have_units(void **state)
     assert_int_equal(ns, 5);
 }
 
+static void a_mavlink_link_has_a_kind_and_keys(void **state)
+{
+    (void)state;
+    assert_true(parse("--mavlink udp --mavlink tcp:0,imu=1000,hil=250,unit=b,sysid=255,compid=200,autopilot=px4 "
+                      "--mavlink pty:/tmp/m,angles=0 --mavlink udpin:7"));
+    assert_int_equal(o.mavlink_count, 4);
+    const struct options_mavlink *m = o.mavlink;
+    assert_true(m[0].kind == MAV_UDP_OUT && m[0].port == 14550 && m[0].sysid == 1 && m[0].compid == 1);
+    assert_true(m[0].imu_hz == 50 && m[0].angles_hz == 10 && m[0].hil_hz == 0 && !m[0].unit[0] && m[0].autopilot == 0);
+    assert_true(m[1].kind == MAV_TCP && m[1].port == 0 && m[1].imu_hz == 1000 && m[1].hil_hz == 250);
+    assert_true(m[1].sysid == 255 && m[1].compid == 200 && m[1].autopilot == 12);
+    assert_string_equal(m[1].unit, "b");
+    assert_true(m[2].kind == MAV_PTY && m[2].angles_hz == 0);
+    assert_string_equal(m[2].link, "/tmp/m");
+    assert_true(m[3].kind == MAV_UDP_IN && m[3].port == 7);
+}
+
+static void a_mavlink_link_that_is_wrong_is_told_what_would_be_right(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *arg, *expected;
+    } rows[] = {
+        {"", "udp[:PORT]"},
+        {"usb", "udp[:PORT]"},
+        {"udp:0", "from 1 to 65535"},
+        {"udp:65536", "from 1 to 65535"},
+        {"tcp:-1", "from 0"},
+        {"tcp:", "from 0"},
+        {"pty:", "pty[:LINK]"},
+        {"tcp,imu", "KEY=VALUE"},
+        {"tcp,", "KEY=VALUE"},
+        {"tcp,rate=5", "KEY=VALUE"},
+        {"tcp,imu=nan", "imu=HZ"},
+        {"tcp,imu=1e9", "imu=HZ"},
+        {"tcp,hil=-1", "hil=HZ"},
+        {"tcp,sysid=0", "sysid=N"},
+        {"tcp,compid=256", "compid=N"},
+        {"tcp,autopilot=apm", "generic, px4"},
+        {"tcp,unit=", "unit=NAME"},
+        {"tcp,unit=a_name_that_is_longer_than_any_name_of_a_unit", "unit=NAME"},
+    };
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        char line[256];
+        snprintf(line, sizeof line, "--mavlink %s", rows[i].arg);
+        char *argv[] = {"psa-emu", "--mavlink", (char *)rows[i].arg};
+        assert_false(options_parse(3, argv, &o, why, sizeof why));
+        assert_non_null(strstr(why, "--mavlink: expected"));
+        if (!strstr(why, rows[i].expected)) fail_msg("%s: %s", line, why);
+    }
+    assert_false(parse("--mavlink tcp --mavlink tcp --mavlink tcp --mavlink tcp --mavlink tcp"));
+    assert_non_null(strstr(why, "up to 4 MAVLink links"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -145,6 +199,8 @@ int main(void)
         cmocka_unit_test(none_and_the_end_of_options_are_understood),
         cmocka_unit_test(what_cannot_be_used_is_refused_in_one_line),
         cmocka_unit_test(durations_have_units),
+        cmocka_unit_test(a_mavlink_link_has_a_kind_and_keys),
+        cmocka_unit_test(a_mavlink_link_that_is_wrong_is_told_what_would_be_right),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

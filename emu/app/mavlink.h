@@ -1,0 +1,34 @@
+/* --mavlink: a unit of the bench as a MAVLink system (docs/mavlink.md). Its readings are those of its CAN frames. */
+#ifndef PSABENCH_APP_MAVLINK_H
+#define PSABENCH_APP_MAVLINK_H
+
+#include "app/mavlink_psa2.h"
+#include "app/options.h"
+#include "bench/bench.h"
+#include "link/mavlink/mav_port.h"
+
+struct mavlink {
+    struct mav_port port; /* first */
+    struct bench *bench;
+    struct unit *unit;
+    const struct options_mavlink *o;
+    struct can_node ear; /* on the unit's bus; sends nothing */
+    bool decodes;        /* the unit is a PSA-2 */
+    struct mavlink_psa2 psa2;
+    struct mav_param *params;
+};
+
+/* Whether the bench has the units that the options name. False with one line in why. */
+bool mavlink_check(const struct bench *b, const struct options *o, char *why, size_t cap);
+
+/* Opens one, checked; hubs: those of the buses. NULL with one line in why. */
+struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
+                             const struct options_mavlink *m, char *why, size_t cap);
+
+void mavlink_close(struct mavlink *m); /* its links are gone; mavlink_free() after they were reaped */
+void mavlink_free(struct mavlink *m);
+
+void mavlink_print_counters(const struct mavlink *m, FILE *out);
+const char *mavlink_kind_name(enum mav_port_kind kind);
+
+#endif
