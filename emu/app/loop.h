@@ -12,7 +12,7 @@
 
 #include <signal.h>
 
-#define LOOP_LINKS_MAX 640u /* all that the endpoints of one emulator can have: ports.c */
+#define LOOP_LINKS_MAX 768u /* all that the endpoints of one emulator can have: ports.c */
 
 struct loop {
     struct sched *sched;
