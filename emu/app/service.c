@@ -70,12 +70,14 @@ static void print_counters(struct service *s)
             (double)p->frames.max_ns * 1e-3, p->late, p->slips);
     }
     service_print_clients(s);
+    if (s->lcm) service_print_lcm(s);
 }
 
 void service_close(struct service *s)
 {
     service_end_files(s);
     if (s->loop.started && !s->o->quiet) print_counters(s);
+    service_close_lcm(s);
     service_sweep_detached(s, true);
     ports_close(&s->ports);
     control_run_forget(&s->control);

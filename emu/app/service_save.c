@@ -64,6 +64,7 @@ void service_abandon(struct service *s)
     if (b->recording) vcd_close(&b->vcd, b->sched.now_ns);
     b->recording = false;
     truth_log_close(&s->truth_log);
+    service_close_lcm(s);
     s->runner = NULL;
     control_cycles_forget(&s->control, NULL);
     control_run_forget(&s->control);

@@ -13,14 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
-from psabench.errors import BadInput, expected, output_error
+from psabench.errors import BadInput, expected
 from psabench.lcm.types import LcmType, type_of
 
 SYNC = 0xEDA1DA01
 HEADER = struct.Struct(">IqqII")
 CHANNEL_MAX = 63  # LCM_MAX_CHANNEL_NAME_LENGTH
 DATA_MAX = 1 << 28  # LCM_MAX_MESSAGE_SIZE
-ENDINGS = (".lcm", ".lcmlog")  # of file names
+ENDING = ".lcmlog"  # of file names
 
 
 @dataclass(frozen=True, kw_only=True)

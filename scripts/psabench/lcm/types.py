@@ -117,7 +117,7 @@ def type_of(data: bytes) -> LcmType | None:
     return _by_fingerprint().get(bytes(data[:8]))
 
 
-# ---- the hash of a struct, as lcm-gen's: names and kinds of the fields and their dimensions, not the name of the struct
+# ---- the hash of a struct, as lcm-gen's: of names, kinds and dimensions of the fields, not of the struct's name
 
 
 def _hashed(v: int, c: int) -> int:
