@@ -78,6 +78,9 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
                     ids.add(m.arbitration_id)
                 if len(reader) >= CHUNK:
                     yield reader.take()
+    except BadInput:
+        yield reader.take()  # what came before the damage is good
+        raise
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
     except (ValueError, IndexError, KeyError, EOFError, struct.error) as e:

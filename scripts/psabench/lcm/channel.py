@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import re
+import select
 import socket
 import time
 from collections import deque
@@ -93,8 +94,11 @@ class LcmBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         deadline_s = None if timeout is None else time.monotonic() + timeout
         while not self._frames:
-            left_s = 1.0 if deadline_s is None else deadline_s - time.monotonic()
-            if self._lcm.handle_timeout(max(0, round(left_s * 1e3))) == 0 and left_s <= 0.0:
+            left_s = None if deadline_s is None else max(0.0, deadline_s - time.monotonic())
+            # not handle_timeout(): it reports a signal as an error
+            if select.select([self._lcm.fileno()], [], [], left_s)[0]:
+                self._lcm.handle()
+            elif left_s is not None:
                 return None, False
         return self._frames.popleft(), False
 
