@@ -56,7 +56,7 @@ static bool create_lcm(struct lcm_udpm *u, const struct lcm_url *url, const char
     if (!load_symbol(u->library, "lcm_create", &create) || !load_symbol(u->library, "lcm_publish", &u->publish))
         return why_expected(why, cap, where, "another library", "%s with lcm_create() and lcm_publish()", library);
     u->lcm = create(text);
-    return u->lcm || why_fail(why, cap, "%s: liblcm did not open %s", where, text);
+    return u->lcm || why_expected(why, cap, where, "an error", "%s to open %s", library, text);
 }
 
 bool lcm_udpm_open(struct lcm_udpm *u, const struct lcm_url *url, const char *where, char *why, size_t cap)

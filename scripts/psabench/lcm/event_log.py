@@ -60,8 +60,8 @@ def _events(file: IO[bytes], path: Path) -> Iterator[Event]:
     while header := file.read(HEADER.size):
         event = _event(header, file)
         if event is None:
-            at = f"{path}: event {count + 1} is damaged"
-            raise BadInput(f"{at}; the {count} events before it are good" if count else f"{at}: no LCM log")
+            got = f"damaged bytes; the {count} events before them are good" if count else "other bytes"
+            raise BadInput(expected("an event of an LCM log", got, f"{path}: event {count + 1}"))
         count += 1
         yield event
 

@@ -30,7 +30,7 @@ def read_frames(path: Path, bus: str | None = None) -> Iterator[can.Message]:
         try:
             message = to_message(e.values)
         except ValueError as error:
-            raise BadInput(f"{path}: event {count} is damaged ({error})") from error
+            raise BadInput(expected("a CAN frame", f"damaged bytes ({error})", f"{path}: event {count}")) from error
         if bus is None or message.channel == bus:
             yield message
 

@@ -88,7 +88,10 @@ def test_a_log_that_is_cut_short_gives_what_is_whole_and_says_where(cut: int, tm
     path.write_bytes(whole[: begin + cut])
     frames = read_frames(path)
     assert_same([next(frames)], FRAMES[:1])
-    with pytest.raises(BadInput, match=r"a.lcmlog: event 3 is damaged; the 2 events before it are good"):
+    with pytest.raises(
+        BadInput,
+        match=r"event 3: expected an event of an LCM log, got damaged bytes; the 2 events before",
+    ):
         next(frames)
 
 
@@ -107,7 +110,7 @@ def test_a_header_that_cannot_be_is_no_log(offset: int, data: bytes, tmp_path: P
     path = tmp_path / "a.lcmlog"
     event = put_event(0, 0, "CHANNEL", b"data")
     path.write_bytes(event[:offset] + data + event[offset + len(data) :])
-    with pytest.raises(BadInput, match=r"a.lcmlog: event 1 is damaged: no LCM log"):
+    with pytest.raises(BadInput, match=r"a.lcmlog: event 1: expected an event of an LCM log, got other bytes"):
         list(read_events(path))
 
 
@@ -118,7 +121,7 @@ def test_a_frame_that_no_bus_carries_is_named(change: dict[str, object], tmp_pat
     path = tmp_path / "a.lcmlog"
     values = to_values(FRAMES[1], "can0") | change
     path.write_bytes(put_event(0, 0, "PSABENCH_CAN_can0", lcm_type("can_frame_t").encode(values)))
-    with pytest.raises(BadInput, match=r"a.lcmlog: event 1 is damaged \("):
+    with pytest.raises(BadInput, match=r"a.lcmlog: event 1: expected a CAN frame, got damaged bytes \("):
         list(read_frames(path))
 
 
