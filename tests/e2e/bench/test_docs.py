@@ -16,7 +16,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGES = sorted(p for p in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")] if "```console" in p.read_text())
+TEXTS = [ROOT / "README.md", ROOT / "examples/README.md", *ROOT.glob("docs/**/*.md")]
+PAGES = sorted(p for p in TEXTS if "```console" in p.read_text())
 BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^>]*) -->\n)?```console\n(?P<body>.*?)```", re.DOTALL)
 DONE = "-- done "
 
