@@ -35,12 +35,23 @@ static void send_frame(struct lcm_bus *b, const struct can_msg *m, int64_t t_ns)
     lcm_feed_send(b->feed, b->frames, out, psabench_lcm_can_frame_t_encode(out, 0, sizeof out, &frame), t_ns);
 }
 
+/* A unit joins its bus when it gets its power: that is when its place is found. */
+static uint8_t find_unit(struct lcm_bus *b, unsigned node_id)
+{
+    const struct control_bench *bench = b->feed->bench;
+    uint8_t *unit = &b->unit_of[node_id];
+    for (unsigned k = 0; *unit == LCM_NO_UNIT && node_id > 0 && k < bench->units; k++)
+        if (bench->node[k] && bench->node[k]->bus == b->node.bus && bench->unit[k]->cfg.node == node_id)
+            *unit = (uint8_t)k;
+    return *unit;
+}
+
 static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
     struct lcm_bus *b = ctx;
     send_frame(b, m, t_ns);
     if (m->flags & (CAN_EXT | CAN_RTR | CAN_ERROR)) return;
-    const uint8_t unit = b->unit_of[m->id & NODE_BITS];
+    const uint8_t unit = find_unit(b, m->id & NODE_BITS);
     if (unit == LCM_NO_UNIT) return;
     lcm_reading_take(b->feed, &b->feed->unit[unit], m, t_ns);
     lcm_register_take(b->feed, &b->feed->unit[unit], m, t_ns);
@@ -72,9 +83,6 @@ static void init_bus(struct lcm_feed *f, unsigned i)
     else snprintf(b->name, sizeof b->name, "can%u", i % CONTROL_BUSES_MAX);
     snprintf(b->frames, sizeof b->frames, "PSABENCH_CAN_%.15s", b->name);
     memset(b->unit_of, LCM_NO_UNIT, sizeof b->unit_of);
-    for (unsigned k = 0; k < bench->units; k++)
-        if (bench->node[k] && bench->node[k]->bus == bench->bus[i])
-            b->unit_of[bench->unit[k]->cfg.node & NODE_BITS] = (uint8_t)k;
     b->node = (struct can_node){.name = "lcm", .fd = true, .rx = on_frame, .error = on_error, .ctx = b};
     can_attach(bench->bus[i], &b->node);
 }

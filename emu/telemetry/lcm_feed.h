@@ -38,7 +38,7 @@ struct lcm_bus {
     struct lcm_feed *feed;
     struct can_node node;
     char name[16], frames[LCM_CHANNEL_MAX + 1];
-    uint8_t unit_of[128]; /* by node id; LCM_NO_UNIT */
+    uint8_t unit_of[128]; /* by node id, as far as they are known; else LCM_NO_UNIT */
 };
 
 struct lcm_feed {

@@ -36,7 +36,7 @@ static bool parse_udpm(const char *rest, struct lcm_url *u)
 {
     unsigned port = 7667;
     *u = (struct lcm_url){.kind = LCM_UDPM, .group = {239, 255, 76, 67}};
-    if (*rest && *rest != '?' && !parse_group(&rest, u->group)) return false;
+    if (*rest && *rest != '?' && *rest != ':' && !parse_group(&rest, u->group)) return false;
     if (*rest == ':') {
         rest++;
         if (!parse_number(&rest, 65535, &port) || port == 0) return false;

@@ -40,13 +40,15 @@ class LcmWriter(MessageWriter):
 
     def __init__(self, file: Any, **_: Any) -> None:
         self.file: BinaryIO = file if hasattr(file, "write") else Path(file).open("wb")  # noqa: SIM115 (until stop)
-        self.count = 0
+        self.count = self.size = 0  # events, and their bytes
 
     def on_message_received(self, msg: can.Message) -> None:
         bus = bus_name(msg.channel)
         data = lcm_type(TYPE).encode(to_values(msg, bus))
-        self.file.write(put_event(self.count, round(msg.timestamp * 1e6), FRAMES + bus, data))
+        event = put_event(self.count, round(msg.timestamp * 1e6), FRAMES + bus, data)
+        self.file.write(event)
         self.count += 1
+        self.size += len(event)
 
     def stop(self) -> None:
         self.file.close()

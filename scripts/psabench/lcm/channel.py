@@ -12,7 +12,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -118,7 +118,7 @@ class LogChannel:
 
     def __init__(self, path: Path) -> None:
         self._owned = Owned(path)
-        self._count = 0
+        self._count = self._size = 0
         try:
             self._file = OutputFile(path, "w")
         except OSError as e:
@@ -126,14 +126,15 @@ class LogChannel:
             raise output_error(path, e) from e
 
     def publish(self, channel: str, data: bytes) -> None:
-        end = self._file.tell() if self._file.seekable() else None
+        event = put_event(self._count, time.time_ns() // 1000, channel, data)
         try:
-            self._file.write(put_event(self._count, time.time_ns() // 1000, channel, data))
+            self._file.write(event)
         except Unstored as e:
-            if end is not None:
-                self._file.truncate(end)
+            with suppress(OSError):  # a device or a pipe
+                self._file.truncate(self._size)
             raise output_error(self._owned.path, e, f"stored {self._count} messages") from e
         self._count += 1
+        self._size += len(event)
 
     def close(self) -> None:
         self._file.close()

@@ -217,12 +217,11 @@ class Lcm(LcmWriter, Checked):
         super().__init__(OutputFile(path, "wb"))
 
     def on_message_received(self, m: can.Message) -> None:
-        begin = self.file.tell() if self.file.seekable() else None
         try:
             super().on_message_received(m)
         except OSError:
-            if begin is not None:
-                self.file.truncate(begin)
+            with suppress(OSError):  # a device or a pipe
+                self.file.truncate(self.size)
             raise
 
     def stored(self, written: int) -> int:

