@@ -16,7 +16,7 @@ FUZZ_S    ?= 20
 BENCH_S   ?= 180#                      seconds of measuring; 60 for a quick look
 SAN_E2E   := $(wildcard $(addprefix tests/e2e/*/test_,$(addsuffix .py,bad_* unit tools canopen faults_random cycles outputs text_ports)))
 # Build a part only, say DIRS='base chip' T=test_ads1282, while the rest does not compile.
-DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench app api
+DIRS      ?= base trace phys chip canopen board unit link command fault control scpi scenario bench telemetry app api
 UNIT      := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
 TIER      ?= all#                      tests of tests/tiers.toml: test, rest (what make test leaves out), all
 TESTS     ?= $(if $(filter check,$(MAKECMDGOALS)),$(if $(T),$(foreach t,$(T),$(if $(filter %/$(t).c,$(UNIT)),$(t),\
@@ -52,12 +52,13 @@ PY     := .venv/bin/python
 NO_GEN := setup run test test-all quick bench mutants clean help uninstall lock
 include $(if $(filter-out $(NO_GEN),$(or $(MAKECMDGOALS),all)),build/gen/gen.mk)
 
-SRC      := $(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c emu/$(d)/*/*.c)))
+LCM      := $(wildcard build/gen/lcm/*.c)#   none without lcm-gen: an emulator that has no --lcm
+SRC      := $(filter-out $(if $(LCM),%/service_no_lcm.c,emu/telemetry/% %/service_lcm.c),$(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c emu/$(d)/*/*.c))))
 MAIN     := $(filter emu/app/main.c,$(SRC))
 OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
 API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
-CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi scenario bench app,$(BUILD)/obj/emu/$(d)/%),$(OBJ))
+CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi scenario bench telemetry app,$(BUILD)/obj/emu/$(d)/%),$(OBJ))
 NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
 INSTALL  = BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' LIBDIR='$(LIBDIR)' VERSION='$(VERSION)' ABI=$(ABI_psabench) NAV_ABI=$(ABI_psabench-nav) tools/install
 UNIT_BIN := $(patsubst %,$(BUILD)/tests/%,$(basename $(notdir $(UNIT))))
@@ -97,6 +98,7 @@ $(BUILD)/%.pc: FORCE
 $(BUILD)/obj/%.o: %.cpp Makefile
 	$(call say,CXX)
 	$(Q)$(CXXCOMPILE) -MMD -MP -c -o $@ $<
+$(BUILD)/obj/build/gen/lcm/%.o: WARN := -w#   lcm-gen's code
 $(BUILD)/obj/%.o: %.c Makefile
 	$(call say,CC)
 	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
@@ -116,9 +118,9 @@ $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 	$(call say,LINK)
 	$(Q)$(LINK) -o $@ $(filter %.o,$^) $(filter-out %/emu.a,$(filter %.a,$^)) $(BUILD)/lib/emu.a $(LINK_LIBS)
-build/gen/gen.mk: $(wildcard proto/*.yaml proto/mavlink/*.xml) tools/gen_proto.py tools/gen_mavlink.py $(wildcard tools/protogen/*.py) | $(PY)
-	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D) && $(PY) tools/gen_mavlink.py --out $(@D)
-	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c))' > $@
+build/gen/gen.mk: $(wildcard proto/*.yaml proto/mavlink/*.xml proto/lcm/*.lcm) tools/gen_proto.py tools/gen_mavlink.py tools/gen_lcm $(wildcard tools/protogen/*.py) | $(PY)
+	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D) && $(PY) tools/gen_mavlink.py --out $(@D) && CC='$(CC)' tools/gen_lcm $(@D)/lcm
+	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c build/gen/lcm/*.c))' > $@
 $(PY):
 	tools/setup run
 

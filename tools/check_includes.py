@@ -32,9 +32,10 @@ MAY_INCLUDE = {
     "control": _MODELS | {"unit", "command", "fault", "scenario"},
     "scpi": _MODELS | {"unit", "command", "fault", "control"},
     "scenario": _COMMANDS,
+    "telemetry": _COMMANDS | {"link"},
     "bench": _COMMANDS | {"scenario", "control", "scpi", "link"},
     "api": {"base", "trace", "chip", "board", "board/*"},
-    "app": _COMMANDS | {"control", "scpi", "scenario", "bench", "link"},
+    "app": _COMMANDS | {"control", "scpi", "scenario", "bench", "telemetry", "link"},
 }
 ONE_ROOM = {"phys", "link"}  # layers whose parts may include each other
 # C11 without the headers of clocks, signals, locales, threads and jumps: those are the operating system's business.

@@ -98,7 +98,7 @@ static bool make_options(struct child_options *w, const struct options *parent, 
 {
     struct options *o = &w->o;
     *o = *parent;
-    o->restore = o->vcd = o->line = o->truth_log = o->resolved = NULL;
+    o->restore = o->vcd = o->line = o->truth_log = o->lcm = o->resolved = NULL;
     o->control = f->control;
     o->truth = f->truth;
     o->wait_client = false;

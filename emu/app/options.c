@@ -5,6 +5,7 @@
 #include "base/why.h"
 #include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
+#include "link/lcm/lcm_url.h"
 #include "link/logic/beagle_tcp.h"
 
 #include <errno.h>
@@ -240,6 +241,13 @@ static bool set_path(const struct target *t, const char *arg)
     return true;
 }
 
+static bool set_lcm(const struct target *t, const char *arg)
+{
+    struct lcm_url url;
+    t->o->lcm = arg;
+    return lcm_url_parse(arg, t->row->name, &url, t->why, t->cap);
+}
+
 static bool set_flag(const struct target *t, const char *arg)
 {
     (void)arg;
@@ -288,8 +296,11 @@ static const struct row rows[] = {
     {"--control", " PATH", set_path, IN(control), "Unix socket for commands, one JSON object per line"},
     {"--truth", " PATH", set_path, IN(truth), "Unix socket with the true parameters, for programs that compare results"},
     {"--restore", " FILE", set_path, IN(restore), "continue from a snapshot, instead of a SCENARIO"},
+    {"--lcm", " URL", set_lcm, 0, "publish frames, readings and instruments as LCM messages: udpm://[GROUP[:PORT]]\n"
+     "                           multicast on this machine, or file://PATH an event log"},
+    {"--lcm-truth", NULL, set_flag, IN(lcm_truth), "also publish the true state, for programs that compare results"},
     {"--truth-log", " FILE", set_path, IN(truth_log), "record the true state of every unit as lines of JSON"},
-    {"--truth-every", " TIME", set_truth_every, 0, "interval between records of --truth-log (default 10ms)"},
+    {"--truth-every", " TIME", set_truth_every, 0, "interval between records of --truth-log and --lcm-truth (default 10ms)"},
     {"--unit", " NAME", set_path, IN(unit), "unit whose lines --vcd, --line and --logic show (default: the first)"},
     {"--vcd", " FILE", set_path, IN(vcd), "record the lines as VCD"},
     {"--vcd-unit", " NS", set_vcd_unit, 0, "time unit of the VCD (default 10)"},
@@ -382,6 +393,7 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     if (o->pace == PACE_STEP && !o->control) {
         return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");
     }
+    if (o->lcm_truth && !o->lcm) return why_fail(why, cap, "--lcm-truth: expected --lcm URL, got none");
     if (o->wait_client && o->pace == PACE_STEP) {
         return why_fail(why, cap, "--wait-client: expected --pace wall or free, got step");
     }

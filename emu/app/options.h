@@ -99,7 +99,9 @@ struct options {
     int64_t line_hz;
     const char *control, *truth; /* paths of Unix sockets */
     const char *restore;         /* a snapshot instead of a scenario */
-    const char *truth_log;       /* file; NULL: none */
+    const char *lcm;             /* URL of link/lcm/lcm_url.h; NULL: none */
+    bool lcm_truth;
+    const char *truth_log; /* file; NULL: none */
     int64_t truth_every_ns;
     const char *resolved; /* file for the scenario with every key; NULL: none */
     struct options_rate bitrate, data_bitrate;

@@ -414,6 +414,7 @@ cJSON *ports_endpoints(const struct ports *p, const struct options *o)
     for (unsigned i = 0; i < p->logic.count; i++) add_logic(p->logic.port[i], all);
     for (unsigned i = 0; i < p->mavlink_count; i++) add_mavlink(p->mavlink[i], all);
     for (unsigned k = 0; k < p->scpi.count; k++) add_instrument(p->scpi.port[k], all);
+    if (o->lcm) add_endpoint(all, "lcm", o->lcm);
     if (o->vcd) add_endpoint(all, "vcd", o->vcd);
     if (o->control) add_endpoint(all, "control", o->control);
     if (o->truth) add_endpoint(all, "truth", o->truth);

@@ -1,4 +1,4 @@
-/* Files that grow while the emulator runs: VCD of lines, CAN logs, truth log. Each is checked after time has moved. A file
+/* Files that grow while the emulator runs: VCD of lines, CAN logs, truth log, LCM log. Each is checked after time has moved. A file
  * that ends early (full disk, limit, removed file) ends with a whole line, and one line on stderr gives the reason. */
 #define _GNU_SOURCE /* fileno */
 #include "app/service.h"
@@ -41,8 +41,7 @@ static void describe_stored(struct service *s, char stored[STORED_MAX])
     else snprintf(stored, STORED_MAX, "wrote %" PRIu64 " bytes", s->bench->vcd.bytes);
 }
 
-/* One line on stderr. */
-static void report(const char *what, const char *path, const char *reason, const char *stored)
+void service_report_file(const char *what, const char *path, const char *reason, const char *stored)
 {
     fprintf(stderr, "psa-emu: %s %s: %s; %s; the run continues\n", what, path, reason, stored);
 }
@@ -61,7 +60,7 @@ static void end_vcd(struct service *s)
     char stored[STORED_MAX], reason[REASON_MAX];
     describe_reason(&s->bench->vcd, reason);
     describe_stored(s, stored);
-    report("VCD file", s->vcd_path, reason, stored);
+    service_report_file("VCD file", s->vcd_path, reason, stored);
     snprintf(s->vcd_why, sizeof s->vcd_why, "%.100s: %s; %.80s", s->vcd_path, reason, stored);
     if (!s->bench->vcd.limited) s->incomplete = true;
 }
@@ -85,7 +84,7 @@ static void check_log(struct service *s, struct can_log *l, bool look)
     if (!l->error || l->reported) return;
     l->reported = true;
     snprintf(stored, sizeof stored, "stored %" PRIu64 " of %" PRIu64 " frames so far", l->stored, l->frames);
-    report("CAN log", l->path, own_file_strerror(l->error), stored);
+    service_report_file("CAN log", l->path, own_file_strerror(l->error), stored);
     s->incomplete = true;
 }
 
@@ -98,7 +97,7 @@ static void check_truth(struct service *s, bool look)
     l->reported = true;
     (void)own_file_cut(fileno(l->out));
     snprintf(stored, sizeof stored, "stored %" PRIu64 " lines", own_file_removed(fileno(l->out)) ? 0 : l->lines);
-    report("truth log", s->o->truth_log, own_file_strerror(l->error), stored);
+    service_report_file("truth log", s->o->truth_log, own_file_strerror(l->error), stored);
     s->incomplete = true;
 }
 
@@ -108,13 +107,14 @@ static void check_all(struct service *s, bool look)
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) check_log(s, &s->ports.can[i]->log, look);
     if (s->truth_log.out) check_truth(s, look);
+    if (s->lcm) service_check_lcm(s, look);
 }
 
 static bool has_files(const struct service *s)
 {
     bool log = false;
     for (unsigned i = 0; i < s->ports.can_count; i++) log |= s->ports.can[i]->kind == OPTIONS_CAN_LOG;
-    return log || s->bench->recording || s->truth_log.out;
+    return log || s->bench->recording || s->truth_log.out || s->lcm;
 }
 
 void service_check_files(struct service *s)
@@ -134,12 +134,13 @@ void service_end_files(struct service *s)
     s->bench->recording = recorded; /* for check_all() */
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) (void)can_log_flush(&s->ports.can[i]->log);
+    if (s->lcm) service_flush_lcm(s);
     check_all(s, true);
     s->bench->recording = false;
     const bool reported = s->truth_log.reported;
     const int error = truth_log_close(&s->truth_log);
     if (!error || reported) return;
-    report("truth log", s->o->truth_log, own_file_strerror(error), "its end is missing");
+    service_report_file("truth log", s->o->truth_log, own_file_strerror(error), "its end is missing");
     s->incomplete = true;
 }
 
@@ -207,7 +208,7 @@ bool service_open_truth_log(struct service *s, char *why, size_t cap)
 
 /* ---- what there is, for counters */
 
-static cJSON *add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error)
+cJSON *service_add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error)
 {
     cJSON *f = cJSON_CreateObject();
     cJSON_AddStringToObject(f, "kind", kind);
@@ -234,7 +235,7 @@ static void add_vcd(cJSON *files, const struct service *s)
     char reason[REASON_MAX];
     const struct vcd *v = &s->bench->vcd;
     describe_reason(v, reason);
-    cJSON *f = add_file(files, "vcd", s->vcd_path, (double)(v->bytes + v->len), v->error ? reason : NULL);
+    cJSON *f = service_add_file(files, "vcd", s->vcd_path, (double)(v->bytes + v->len), v->error ? reason : NULL);
     if (v->max_bytes) cJSON_AddNumberToObject(f, "max_bytes", (double)v->max_bytes);
 }
 
@@ -247,10 +248,11 @@ void service_describe_files(void *ctx, cJSON *result)
     for (unsigned i = 0; i < s->ports.can_count; i++) {
         const struct can_log *l = &s->ports.can[i]->log;
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG)
-            add_file(files, "can log", l->path, size_of(l->fd) + (double)l->len, error_text(l->error));
+            service_add_file(files, "can log", l->path, size_of(l->fd) + (double)l->len, error_text(l->error));
     }
     if (truth->out)
-        add_file(files, "truth log", s->o->truth_log, size_of(fileno(truth->out)), error_text(truth->error));
+        service_add_file(files, "truth log", s->o->truth_log, size_of(fileno(truth->out)), error_text(truth->error));
+    if (s->lcm) service_describe_lcm(s, files);
     logic_describe(&s->ports.logic, result);
     cJSON *journal = cJSON_AddObjectToObject(result, "journal");
     cJSON_AddNumberToObject(journal, "bytes", (double)s->journal.len);

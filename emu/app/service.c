@@ -71,12 +71,14 @@ static void print_counters(struct service *s)
     }
     service_print_clients(s);
     logic_print_counters(&s->ports.logic);
+    if (s->lcm) service_print_lcm(s);
 }
 
 void service_close(struct service *s)
 {
     service_end_files(s);
     if (s->loop.started && !s->o->quiet) print_counters(s);
+    service_close_lcm(s);
     service_sweep_detached(s, true);
     ports_close(&s->ports);
     control_run_forget(&s->control);

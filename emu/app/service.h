@@ -15,6 +15,8 @@
 /* Exit statuses of the process. */
 enum { SERVICE_DONE = 0, SERVICE_INPUT = 2, SERVICE_MACHINE = 3, SERVICE_INT = 130 };
 
+struct lcm_feed;
+
 struct service {
     const struct options *o;
     struct bench *bench;
@@ -37,6 +39,8 @@ struct service {
     uint32_t connections; /* connections of CAN clients before time began: of the snapshot */
     struct truth_log truth_log;
     struct capture_job capture;
+    struct lcm_feed *lcm; /* --lcm; NULL: none */
+    bool lcm_reported;    /* that its file failed, or that messages were lost */
     struct snapshot_observers observers;
     struct link input; /* --until-eof */
 };
@@ -84,6 +88,18 @@ void service_follow_capture(struct service *s);  /* after time has moved: trigge
 void service_end_capture(struct service *s);     /* a file under way ends */
 void service_abandon_capture(struct service *s); /* without a file */
 bool service_is_sliced(void *ctx);               /* for loop.sliced */
+
+/* service_lcm.c, or service_no_lcm.c where the emulator is built without LCM */
+bool service_open_lcm(struct service *s, char *why, size_t cap);
+void service_flush_lcm(struct service *s);
+void service_check_lcm(struct service *s, bool look);
+void service_describe_lcm(const struct service *s, cJSON *files);
+void service_print_lcm(const struct service *s);
+void service_close_lcm(struct service *s);
+
+/* For files that end early: one line on stderr. */
+void service_report_file(const char *what, const char *path, const char *reason, const char *stored);
+cJSON *service_add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error);
 
 /* service_save.c */
 bool service_snapshot(void *ctx, const char *path, cJSON *result, char *why);

@@ -237,7 +237,8 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
         (from->snapshot && !service_restore(s, from->snapshot, why, cap)) || !ports_check(&s->ports, b, o, why, cap);
     if (o->until_eof) until_eof(&s->input, &s->ports.links, &s->loop.quit);
     if (s->refused) return false;
-    if (ports_open(&s->ports, b, o, why, cap)) return service_open_truth_log(s, why, cap);
+    if (ports_open(&s->ports, b, o, why, cap))
+        return service_open_truth_log(s, why, cap) && service_open_lcm(s, why, cap);
     s->refused = s->ports.refused;
     return false;
 }

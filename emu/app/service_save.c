@@ -65,6 +65,7 @@ void service_abandon(struct service *s)
     b->recording = false;
     truth_log_close(&s->truth_log);
     service_abandon_capture(s);
+    service_close_lcm(s);
     s->runner = NULL;
     control_cycles_forget(&s->control, NULL);
     control_run_forget(&s->control);

@@ -17,6 +17,8 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import BadInput, expected
+from psabench.lcm.can_io import LcmReader
+from psabench.lcm.event_log import ENDING as LCM
 from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
@@ -35,8 +37,9 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
     """
-    if path.suffix not in MESSAGE_READERS:
-        raise BadInput(expected(f"an ending of {' '.join(sorted(MESSAGE_READERS))}", path.suffix or "none", path))
+    endings = sorted({*MESSAGE_READERS, LCM})
+    if path.suffix not in endings:
+        raise BadInput(expected(f"an ending of {' '.join(endings)}", path.suffix or "none", path))
     _check_there(path)
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
@@ -68,13 +71,16 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
     """Frames of the reader's node, some at a time; `ids` collects the 11-bit identifiers of all data frames."""
     read = 0
     try:
-        with can.LogReader(str(path)) as log:
+        with LcmReader(path) if path.suffix == LCM else can.LogReader(str(path)) as log:
             for read, m in enumerate(log, start=1):  # noqa: B007 (the number is in the message below)
                 reader.on_message(m)
                 if not (m.is_extended_id or m.is_error_frame or m.is_remote_frame):
                     ids.add(m.arbitration_id)
                 if len(reader) >= CHUNK:
                     yield reader.take()
+    except BadInput:
+        yield reader.take()  # what came before the damage is good
+        raise
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
     except (ValueError, IndexError, KeyError, EOFError, struct.error) as e:

@@ -20,9 +20,11 @@ from can.io.logger import MESSAGE_WRITERS
 from can.io.mf4 import MF4Writer
 
 from psabench.errors import BadInput, BenchError, expected, output_error
+from psabench.lcm.can_io import LcmWriter
+from psabench.lcm.event_log import ENDING as LCM
 from psabench.link.own import OutputFile, Owned, sqlite_error
 
-FORMATS = sorted(MESSAGE_WRITERS)  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
+FORMATS = sorted({*MESSAGE_WRITERS, LCM})  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
 MF4_MESSAGE, MF4_LEAST = 128, 65_536  # bytes of a message before compression, at most, and of the file's own blocks
 
 
@@ -38,7 +40,7 @@ class LogFile:
         self._written = 0
         self._owned = Owned(path)
         try:
-            self._writer = WRITERS.get(path.suffix, MESSAGE_WRITERS[path.suffix])(path)
+            self._writer = {**MESSAGE_WRITERS, **WRITERS}[path.suffix](path)
         except NotImplementedError as e:
             self._owned.release()
             raise BadInput(f"{path}: {e}") from e
@@ -208,7 +210,25 @@ class Mf4(MF4Writer, Checked):
         return written if self._saved else 0
 
 
-WRITERS: dict[str, Callable[[Path], MessageWriter]] = {".blf": Blf, ".db": Db, ".mf4": Mf4}
+class Lcm(LcmWriter, Checked):
+    """An event log of LCM. An event that does not fit is taken back."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(OutputFile(path, "wb"))
+
+    def on_message_received(self, m: can.Message) -> None:
+        try:
+            super().on_message_received(m)
+        except OSError:
+            with suppress(OSError):  # a device or a pipe
+                self.file.truncate(self.size)
+            raise
+
+    def stored(self, written: int) -> int:
+        return self.count
+
+
+WRITERS: dict[str, Callable[[Path], MessageWriter]] = {".blf": Blf, ".db": Db, ".mf4": Mf4, LCM: Lcm}
 
 
 def _cut_lines(path: Path) -> int:

@@ -6,16 +6,22 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from psabench.options import CAN_HELP, Parser, add_board, natural, node_of, positive
 
-FORMATS = ".asc .blf .csv .db .log .mf4 .trc .txt"  # of python-can, without loading it
+if TYPE_CHECKING:
+    import can
+
+FORMATS = ".asc .blf .csv .db .lcmlog .log .mf4 .trc .txt"  # of python-can and LCM, without loading it
 
 EPILOG = """\
 examples:
   psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, candump -L format
   psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        one minute, for CANalyzer
   psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
+  psabench record run.lcmlog --can socketcand:127.0.0.1:29536      for lcm-logplayer
+  psabench record run.log --lcm udpm://239.255.76.67:7667          what psa-emu --lcm publishes
 
 Stops at --for, --count, Ctrl-C, SIGTERM, or with exit status 3 when the link fails, the disk is full or the file is
 removed. The file is readable in each case and holds the messages counted as stored.
@@ -32,19 +38,30 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     )
     p.set_defaults(handler=_record)
     p.add_argument("file", type=Path, help=f"log file; its extension selects the format: {FORMATS}")
-    p.add_argument("--can", help=CAN_HELP)
+    source = p.add_mutually_exclusive_group()
+    source.add_argument("--can", help=CAN_HELP)
+    source.add_argument("--lcm", metavar="URL", help="CAN frames that are published with LCM, udpm://GROUP:PORT")
     add_board(p, "whose frames are counted")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     p.add_argument("--count", type=natural, help="stop after this number of CAN messages")
     return p.parse_args(words)
 
 
-def _record(args: argparse.Namespace) -> int:
+def _source(args: argparse.Namespace) -> can.BusABC:
+    if args.lcm is not None:
+        from psabench.lcm.channel import LcmBus
+
+        return LcmBus(args.lcm)
     from psabench.link.can_host import open_bus
+
+    return open_bus(args.can)
+
+
+def _record(args: argparse.Namespace) -> int:
     from psabench.link.record import record
 
     node = node_of(args)
-    r = record(open_bus(args.can), args.file, node, args.for_s, args.count, args.board)
+    r = record(_source(args), args.file, node, args.for_s, args.count, args.board)
     c = r.counters
     print(f"{r.stored} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
     print(f"frames of node {node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")

@@ -8,10 +8,11 @@ from __future__ import annotations
 import argparse
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
@@ -20,6 +21,10 @@ from psabench.options import Parser, natural, node_id, of_fields, positive, yes_
 from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
 from psabench.progress import Bar
 from psabench.shell import command_line
+
+if TYPE_CHECKING:
+    from psabench.estimate.uncertainty import Estimate
+    from psabench.procedures.head_bench import Progress
 
 EPILOG = """\
 psabench run PROCEDURE --help lists its options with units and defaults, and examples.
@@ -84,6 +89,10 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     "--seed": {"type": int, "metavar": "N", "help": "random seed; overrides the scenario"},
     "--real-time": {"action": "store_true", "help": "run at wall-clock pace"},
     "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "report folder (%(default)s)"},
+    "--lcm": {
+        "metavar": "URL",
+        "help": "publish progress and results with LCM: udpm://GROUP:PORT, or file://PATH an event log",
+    },
     "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
 }
 
@@ -241,7 +250,10 @@ def _calibrate(args: argparse.Namespace) -> int:
         g_mps2=args.gravity,
         params=_params(args),
     )
-    page, sections = run.run(options, Bar())
+    with progress_of(args) as told:
+        page, sections = run.run(options, told.progress)
+        for s in sections:
+            told.result(s.result.procedure, s.label, s.result.estimates, report.within_limits([s]))
     if args.verbose:
         for section in sections:
             print(report.console_table(section))
@@ -249,6 +261,27 @@ def _calibrate(args: argparse.Namespace) -> int:
     print(grading.verdict(sections))
     print(f"report: {page}")
     return 0 if report.within_limits(sections) else 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """Who follows a run."""
+
+    progress: Progress
+    result: Callable[[str, str, Sequence[Estimate], bool], None]
+
+
+@contextmanager
+def progress_of(args: argparse.Namespace) -> Iterator[Told]:
+    """A bar, and LCM where --lcm asks for it."""
+    if args.lcm is None:
+        yield Told(progress=Bar(), result=lambda *_: None)
+        return
+    from psabench.lcm.channel import publisher
+    from psabench.lcm.progress import LcmProgress, publish_result
+
+    with publisher(args.lcm) as out:
+        yield Told(progress=LcmProgress(out, args.procedure, Bar()), result=partial(publish_result, out))
 
 
 def _compare(args: argparse.Namespace) -> int:
@@ -272,7 +305,10 @@ def _gyro(args: argparse.Namespace) -> int:
     from psabench.report import gyro_grading, gyro_page
 
     options = of_fields(gyro_run.GyroOptions, args, params=_params(args))
-    sections = gyro_run.run(options, Bar())
+    with progress_of(args) as told:
+        sections = gyro_run.run(options, told.progress)
+        for s in sections:
+            told.result(options.procedure, s.label, s.result.estimates, gyro_grading.within_limits([s]))
     page = gyro_page.write(args.out, sections, gyro_run.facts(options))
     if args.verbose:
         for section in sections:
@@ -287,7 +323,7 @@ def _gyro(args: argparse.Namespace) -> int:
 
 # What each takes of COMMON.
 _STARTED = ("--scenario", "--seed", "--out", "--verbose")
-_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out", "--verbose")
+_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out", "--lcm", "--verbose")
 _HEAD = tuple(COMMON)
 
 _EXAMPLES: Mapping[str, str] = {

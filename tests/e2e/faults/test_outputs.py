@@ -25,6 +25,7 @@ import pytest
 from psabench.campaign.store import Origin, Part, Store
 from psabench.emulator import Emulator
 from psabench.errors import BenchError, ControlError
+from psabench.lcm.event_log import read_events
 from psabench.link.control import Control
 from psabench.link.own import Owned, output_text
 from psabench.link.vcd import read_vcd
@@ -56,7 +57,12 @@ def whole_truth(path: Path) -> bool:
     return lines.endswith("\n") and all("t_ns" in json.loads(line) for line in lines.splitlines())
 
 
+def whole_lcm(path: Path) -> bool:
+    return len(list(read_events(path))) > 0
+
+
 OUTPUTS = {
+    "lcm": Output(lambda p: ["--can", "none", "--lcm", f"file://{p}"], whole_lcm),
     "vcd": Output(lambda p: ["--can", "none", "--vcd", p], lambda p: read_vcd(p).end_ns > 0),
     "log": Output(lambda p: ["--can", f"log:{p}"], whole_log),
     "truth-log": Output(lambda p: ["--can", "none", "--truth-log", p, "--truth-every", "1ms"], whole_truth),
@@ -110,7 +116,10 @@ def test_a_full_disk_ends_the_file_whole_and_not_the_run(kind: str, disk: Path, 
     assert line.endswith("the run continues")
     assert OUTPUTS[kind].whole(copy)
     stored = int(re.findall(r"stored (\d+)", line)[0])
-    counted = {"vcd": copy.stat().st_size}.get(kind, copy.read_text().count("\n"))
+    counted = {
+        "vcd": lambda: copy.stat().st_size,
+        "lcm": lambda: len(list(read_events(copy))),
+    }.get(kind, lambda: copy.read_text().count("\n"))()
     assert stored == counted > 100
 
 
@@ -182,7 +191,8 @@ def test_a_second_emulator_is_refused_by_the_pid_of_the_first(kind: str, tmp_pat
         assert path.stat().st_size >= size, "the first one's file is left alone"
         first.communicate(timeout=TIMEOUT_S)
     assert first.returncode == 0
-    assert b"\0" not in path.read_bytes()
+    assert kind == "lcm" or b"\0" not in path.read_bytes()
+    assert OUTPUTS[kind].whole(path)
     assert psa_emu("stream", "--quiet", "--for", SHORT, *OUTPUTS[kind].options(str(path))).returncode == 0
 
 
