@@ -71,12 +71,17 @@ static bool open_udp(struct can_hub *hub, struct ports_can *c, const struct opti
     const int err = udp_can_open(&c->udp, hub, o->arg);
     if (!err) return true;
     if (err == -ENODEV || err == -ENETUNREACH || err == -EADDRNOTAVAIL) {
-        const bool v6 = strchr(o->arg, ':') != strrchr(o->arg, ':');
+        if (strchr(o->arg, ':') != strrchr(o->arg, ':'))
+            return why_fail(
+                why, cap,
+                "--can udp:%s: expected an interface with IPv6 multicast, which lo does not have, got none; "
+                "use --can udp, an IPv4 group",
+                o->arg);
         return why_fail(
             why, cap,
-            "--can udp:%s: expected a route for multicast, got none; as root: ip link set lo up && ip %sroute "
-            "add %s dev lo, or run it in `unshare -rn` after these",
-            o->arg, v6 ? "-6 " : "", v6 ? "ff00::/8 table local" : "239.0.0.0/8");
+            "--can udp:%s: expected a route for multicast, got none; as root: ip link set lo up && ip route "
+            "add 239.0.0.0/8 dev lo, or run all programs in `unshare -rn` after these commands",
+            o->arg);
     }
     return why_fail(why, cap, "--can udp:%s: %s", o->arg, strerror(-err));
 }

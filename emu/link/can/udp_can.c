@@ -195,7 +195,7 @@ static void note_overflow(struct udp_can *u, struct msghdr *h)
     }
 }
 
-static void refuse(struct udp_can *u, const char *what)
+static void refuse_datagram(struct udp_can *u, const char *what)
 {
     if (!u->refused_reported) log_line(u, what);
     u->refused_reported = true;
@@ -207,8 +207,8 @@ static void take_datagram(struct udp_can *u, const struct sockaddr_storage *from
 {
     struct can_msg m;
     if (same_address(from, &u->self, true)) return; /* our own */
-    if (!is_local(u, from)) refuse(u, "a datagram of another machine is refused");
-    else if (!udp_frame_decode(bytes, n, &m)) refuse(u, "a datagram that is no CAN frame is refused");
+    if (!is_local(u, from)) refuse_datagram(u, "a datagram of another machine is refused");
+    else if (!udp_frame_decode(bytes, n, &m)) refuse_datagram(u, "a datagram that is no CAN frame is refused");
     else can_hub_send(u->hub, &u->can, &m, t_ns);
 }
 
