@@ -5,6 +5,7 @@
 #include "base/why.h"
 #include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
+#include "link/can/udp_can.h"
 #include "link/lcm/lcm_url.h"
 #include "link/logic/beagle_tcp.h"
 
@@ -76,7 +77,11 @@ static bool set_can(const struct target *t, const char *arg)
     static const struct {
         const char *word;
         bool named; /* has to say which interface or file */
-    } kinds[] = {{"socketcand", false}, {"slcan", false}, {"socketcan", true}, {"log", true}}; /* options_can_kind */
+    } kinds[] = {{"socketcand", false},
+                 {"slcan", false},
+                 {"socketcan", true},
+                 {"udp", false},
+                 {"log", true}}; /* options_can_kind */
     enum { KINDS = sizeof kinds / sizeof *kinds };
     struct options *o = t->o;
     o->can_given = true;
@@ -93,10 +98,15 @@ static bool set_can(const struct target *t, const char *arg)
     unsigned k = 0;
     while (k < KINDS && !(strlen(kinds[k].word) == len && memcmp(kinds[k].word, kind, len) == 0)) k++;
     if (k == KINDS || (kinds[k].named && !rest))
-        return expected(t, arg, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none");
+        return expected(t, arg,
+                        "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], log:FILE or none");
     c->kind = (enum options_can_kind)k;
     if (c->kind == OPTIONS_SOCKETCAND && rest && !parse_u64(rest, 65535, &port))
         return expected(t, arg, "a port from 0 (any free port) to 65535");
+    struct sockaddr_storage group;
+    if (c->kind == OPTIONS_UDP && !c->arg) c->arg = UDP_CAN_GROUP;
+    if (c->kind == OPTIONS_UDP && !udp_can_group(c->arg, &group))
+        return expected(t, arg, "udp:GROUP, udp:GROUP:PORT or udp:[GROUP]:PORT, GROUP 239.x.y.z or ff..::..");
     c->port = (uint16_t)port;
     o->can_count++;
     return true;
@@ -277,6 +287,7 @@ static const struct row rows[] = {
      "                           BUS= it serves every bus by name\n"
      "        slcan[:LINK]       slcan on a pseudo-terminal; LINK becomes a symbolic link to it\n"
      "        socketcan:IFACE    kernel interface such as vcan0 or can0\n"
+     "        udp[:GROUP[:PORT]] UDP multicast as python-can has it, on this machine only (default 239.74.163.2:43113)\n"
      "        log:FILE           record every frame to FILE (candump -L format)\n"
      "        none               no adapter"},
     {"--pace", " wall|step|free", set_pace, 0, "time: real (default), only by commands of the control\n"

@@ -17,12 +17,12 @@
 
 #define OPTIONS_MAVLINK_MAX 4u
 
-enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_CAN_LOG };
+enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_UDP, OPTIONS_CAN_LOG };
 
 struct options_can {
     enum options_can_kind kind;
     char bus[16];    /* "": socketcand every bus, by the name that a client opens; others the first */
-    const char *arg; /* slcan: link or NULL; socketcan: interface; log: file */
+    const char *arg; /* slcan: link or NULL; socketcan: interface; udp: group; log: file */
     uint16_t port;   /* socketcand; 0: a free one */
 };
 

@@ -68,6 +68,26 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
     return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
 }
 
+static bool open_udp(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
+{
+    const int err = udp_can_open(&c->udp, hub, o->arg);
+    if (!err) return true;
+    if (err == -ENODEV || err == -ENETUNREACH || err == -EADDRNOTAVAIL) {
+        if (strchr(o->arg, ':') != strrchr(o->arg, ':'))
+            return why_fail(
+                why, cap,
+                "--can udp:%s: expected an interface with IPv6 multicast, which lo does not have, got none; "
+                "use --can udp, an IPv4 group",
+                o->arg);
+        return why_fail(
+            why, cap,
+            "--can udp:%s: expected a route for multicast, got none; as root: ip link set lo up && ip route "
+            "add 239.0.0.0/8 dev lo, or run all programs in `unshare -rn` after these commands",
+            o->arg);
+    }
+    return why_fail(why, cap, "--can udp:%s: %s", o->arg, strerror(-err));
+}
+
 static bool open_log(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     long owner = 0;
@@ -96,6 +116,7 @@ static bool open_can(struct ports *p, const struct options *o, char *why, size_t
     static open_fn *const open[] = {[OPTIONS_SOCKETCAND] = open_socketcand,
                                     [OPTIONS_SLCAN] = open_slcan,
                                     [OPTIONS_SOCKETCAN] = open_socketcan,
+                                    [OPTIONS_UDP] = open_udp,
                                     [OPTIONS_CAN_LOG] = open_log};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
@@ -339,12 +360,17 @@ static void add_key(cJSON *e, const char *key, const char *value)
     if (value) cJSON_AddStringToObject(e, key, value);
 }
 
-static void add_port(cJSON *e, unsigned port)
+static void add_number(cJSON *e, const char *key, unsigned value)
 {
     char number[12];
-    snprintf(number, sizeof number, "%u", port);
+    snprintf(number, sizeof number, "%u", value);
+    add_key(e, key, number);
+}
+
+static void add_port(cJSON *e, unsigned port)
+{
     add_key(e, "host", "127.0.0.1");
-    add_key(e, "port", number);
+    add_number(e, "port", port);
 }
 
 static void add_pty(cJSON *e, const struct pty *pty)
@@ -355,8 +381,10 @@ static void add_pty(cJSON *e, const struct pty *pty)
 
 static void add_can(const struct ports_can *c, cJSON *all)
 {
-    static const char *const kinds[] = {
-        [OPTIONS_SOCKETCAND] = "socketcand", [OPTIONS_SLCAN] = "slcan", [OPTIONS_SOCKETCAN] = "socketcan"};
+    static const char *const kinds[] = {[OPTIONS_SOCKETCAND] = "socketcand",
+                                        [OPTIONS_SLCAN] = "slcan",
+                                        [OPTIONS_SOCKETCAN] = "socketcan",
+                                        [OPTIONS_UDP] = "udp"};
     const bool log = c->kind == OPTIONS_CAN_LOG;
     cJSON *e = add_endpoint(all, log ? "log" : "can", log ? c->log.path : kinds[c->kind]);
     if (c->kind == OPTIONS_SOCKETCAND) add_port(e, c->socketcand.port);
@@ -364,6 +392,10 @@ static void add_can(const struct ports_can *c, cJSON *all)
     if (c->kind == OPTIONS_SOCKETCAN) {
         add_key(e, "channel", c->socketcan.can.name);
         add_key(e, "fd", c->socketcan.can.node.fd ? "true" : "false");
+    }
+    if (c->kind == OPTIONS_UDP) {
+        add_key(e, "group", c->udp.group);
+        add_number(e, "port", c->udp.port);
     }
     add_key(e, "bus", c->bus);
 }
@@ -456,6 +488,7 @@ static void close_can(struct ports_can *c)
     if (c->kind == OPTIONS_SOCKETCAND) socketcand_close(&c->socketcand);
     if (c->kind == OPTIONS_SLCAN) slcan_pty_close(&c->slcan);
     if (c->kind == OPTIONS_SOCKETCAN) socketcan_close(&c->socketcan);
+    if (c->kind == OPTIONS_UDP) udp_can_close(&c->udp);
     if (c->kind == OPTIONS_CAN_LOG) can_log_close(&c->log);
 }
 

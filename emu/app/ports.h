@@ -11,6 +11,7 @@
 #include "link/can/slcan_pty.h"
 #include "link/can/socketcan.h"
 #include "link/can/socketcand_tcp.h"
+#include "link/can/udp_can.h"
 #include "link/ctl_sock.h"
 #include "link/line/bus_pty.h"
 #include "link/line/line_pty.h"
@@ -28,6 +29,7 @@ struct ports_can {
         struct socketcand_server socketcand;
         struct slcan_pty slcan;
         struct socketcan socketcan;
+        struct udp_can udp;
         struct can_log log;
     };
 };

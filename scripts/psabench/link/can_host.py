@@ -21,6 +21,7 @@ from can.interfaces.socketcan import SocketcanBus
 
 from psabench.errors import BadInput, LinkError, expected
 from psabench.link.control import Control, Reply
+from psabench.link.udp_bus import LocalUdpBus, group_of
 
 BARRIER_S = 10.0  # timeout for a frame that the emulator says it has sent
 GREETING_S = 10.0  # timeout for the first words of a socketcand server
@@ -120,7 +121,7 @@ class CanHost(AbstractContextManager["CanHost"]):
     def __init__(self, bus: can.BusABC, clock: Clock) -> None:
         self.bus = bus
         self.clock = clock
-        self.shared = isinstance(bus, SocketcanBus)
+        self.shared = isinstance(bus, SocketcanBus | LocalUdpBus)
         self.received = self.sent = 0
         self.listeners: list[Listener] = []
 
@@ -199,14 +200,14 @@ def open_bus(spec: str | None) -> can.BusABC:
     """Open `INTERFACE:CHANNEL[,key=value...]` of python-can, or python-can's own configuration when spec is None.
 
     socketcand takes HOST:PORT as its channel: "socketcand:127.0.0.1:29536"; others the device, and options after
-    commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true".
+    commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true"; "udp:239.74.163.2:43113".
     Raises BadInput for a spec no one can use, LinkError when the link is not there.
     """
     arguments = _bus_arguments(spec)
     if arguments.get("interface") == "socketcand":
         _greet(arguments["host"], arguments["port"])
     try:
-        bus = can.Bus(**arguments)
+        bus = _open(arguments)
         if isinstance(bus, SocketcanBus):
             _enlarge_buffer(bus.socket)
         if (port := getattr(bus, "serialPortOrig", None)) is not None:
@@ -216,6 +217,12 @@ def open_bus(spec: str | None) -> can.BusABC:
         raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
         raise LinkError(f"--can {spec}: {e}") from e
+
+
+def _open(arguments: dict[str, Any]) -> can.BusABC:
+    if arguments.get("interface") == "udp":
+        return LocalUdpBus(**{k: v for k, v in arguments.items() if k != "interface"})
+    return can.Bus(**arguments)
 
 
 class ReadAhead:
@@ -292,6 +299,8 @@ def _bus_arguments(spec: str | None) -> dict[str, Any]:
         if not port.isdecimal():
             raise BadInput(expected("socketcand:HOST:PORT, e.g. socketcand:127.0.0.1:29536", repr(spec), "--can"))
         arguments |= {"channel": "can0", "host": host, "port": int(port), "tcp_tune": True}
+    if interface == "udp":
+        arguments |= dict(zip(("channel", "port"), group_of(channel), strict=True))
     if interface == "slcan":
         arguments["sleep_after_open"] = 0.0  # an emulator needs no 2 s to wake up
     return arguments | {k: _value(v) for k, v in (p.split("=", 1) for p in pairs)}

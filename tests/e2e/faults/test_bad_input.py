@@ -115,7 +115,11 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
 @pytest.mark.parametrize(
     ("args", "status", "says"),
     [
-        ("--can serial", 2, "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, log:FILE or none, got"),
+        (
+            "--can serial",
+            2,
+            "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], log:FILE or none, got",
+        ),
         ("--can socketcand:70000", 2, "a port from 0 (any free port) to 65535"),
         ("--can socketcan", 2, "socketcan:IFACE"),
         ("--can slcan:{file}", 3, "expected a new name or a symbolic link to a pty"),
