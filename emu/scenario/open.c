@@ -49,7 +49,8 @@ bool scenario_open(struct scenario *s, char *why, size_t cap)
             char what[512];
             if (!u->series[k].given || open_series(s->path, &u->series[k], &u->cfg.axis[k].series, what, sizeof what))
                 continue;
-            return why_fail(why, cap, "units.%s.axes.%c.signal: %s", u->name, "xyz"[k], what);
+            snprintf(why, cap, "units.%s.axes.%c.signal: %s", u->name, "xyz"[k], what);
+            return false;
         }
     }
     return true;

@@ -12,7 +12,7 @@
 
 enum series_between { SERIES_LINEAR, SERIES_HOLD };
 
-/* After the last sample: its value for ever; the first one again, after an interval as long as the last; no signal. */
+/* After the last sample: its value from then on; the first one again, after an interval as long as the last; no signal. */
 enum series_end { SERIES_END_HOLD, SERIES_END_REPEAT, SERIES_END_STOP };
 
 struct series_sample {
