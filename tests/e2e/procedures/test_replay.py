@@ -56,6 +56,11 @@ def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
     again = run("turns", "--replay", log, "--realisations", "2", "--out", tmp_path / "again")
     assert (live.returncode, again.returncode) == (0, 0), live.stderr + again.stderr
     name = "turns-quiet.csv"
+    alone = run("turns", "--condition", "quiet", "--realisations", "2", "--out", tmp_path / "alone")
+    assert alone.returncode == 0, alone.stderr
+    assert (tmp_path / "alone" / name).read_bytes() == (
+        tmp_path / "live" / name
+    ).read_bytes()  # recording changes nothing
     assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "live" / name).read_bytes()
 
 
