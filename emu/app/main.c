@@ -70,7 +70,7 @@ static bool load_bench(const struct options *o, const struct snapshot *from, str
 {
     const bool loaded = from ? scenario_parse(o->restore, from->scenario, from->scenario_len, s, why, cap)
                              : scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
-    if (!loaded) return false;
+    if (!loaded || !scenario_open(s, why, cap)) return false;
     override_scenario(s, o);
     bench_init(bench, s, 0);
     return timeline_check(bench, why, cap);

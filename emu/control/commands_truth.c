@@ -28,13 +28,16 @@ static void add_noise(const struct unit *u, cJSON *to)
 
 static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
 {
-    static const char *const names[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz"};
+    static const char *const names[] = {
+        [UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", [UNIT_RECORDED] = "recorded"};
     const enum unit_sensor sensor = u->cfg.axis[i].sensor;
     cJSON_AddStringToObject(to, "sensor", names[sensor]);
     if (sensor == UNIT_MEMS) yaml_dump(&scenario_mems_fields, &u->cfg.axis[i].mems, to);
     if (sensor == UNIT_MEMS) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
     if (sensor == UNIT_QUARTZ) add_section(&scenario_quartz_fields, &u->cfg.axis[i].quartz, "quartz", to);
     if (sensor == UNIT_QUARTZ) add_real(to, "sensor_a", unit_sensor_out(u, i, t_ns));
+    const bool current = u->cfg.board.afe[i].input == AFE_CURRENT;
+    if (sensor == UNIT_RECORDED) add_real(to, current ? "sensor_a" : "sensor_v", unit_sensor_out(u, i, t_ns));
     add_section(&scenario_afe_fields, &u->cfg.board.afe[i], "afe", to);
 }
 
@@ -140,7 +143,9 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
     cJSON *amperes = cJSON_AddArrayToObject(to, "sensor_a");
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         const double out = unit_sensor_out(u, i, t_ns);
-        const bool current = u->cfg.axis[i].sensor == UNIT_QUARTZ;
+        const enum unit_sensor sensor = u->cfg.axis[i].sensor;
+        const bool current =
+            sensor == UNIT_QUARTZ || (sensor == UNIT_RECORDED && u->cfg.board.afe[i].input == AFE_CURRENT);
         cJSON_AddItemToArray(volts, cJSON_CreateNumber(current ? 0.0 : out));
         cJSON_AddItemToArray(amperes, cJSON_CreateNumber(current ? out : 0.0));
     }

@@ -42,6 +42,19 @@ static const struct field mems_rows[] = {
 };
 const struct fields scenario_mems_fields = FIELDS(mems_rows);
 
+#define SERIES(m) offsetof(struct scenario_series, m)
+static const char *const betweens[] = {[SERIES_LINEAR] = "linear", [SERIES_HOLD] = "hold", NULL};
+static const char *const ends[] = {[SERIES_END_HOLD] = "hold", [SERIES_END_REPEAT] = "repeat", [SERIES_END_STOP] = "stop", NULL};
+static const struct field series_rows[] = {
+    {.key = "file",    .type = FIELD_TEXT, .offset = SERIES(file), .max = 256, .what = "CSV file; a relative path starts at the scenario's folder"},
+    {.key = "column",  .type = FIELD_TEXT, .offset = SERIES(column), .max = 48, .what = "name of the column: it ends in _mps2 for a mems or quartz sensor, in _v or _a for a recorded one"},
+    {.key = "start_s", .type = FIELD_REAL, .offset = SERIES(start_s), .min = -1e6, .max = 1e6, .what = "added to the times of the file"},
+    {.key = "between", .type = FIELD_CHOICE, .offset = SERIES(between), .choices = betweens, .what = "between two samples: a straight line, or the earlier one's value"},
+    {.key = "at_end",  .type = FIELD_CHOICE, .offset = SERIES(at_end), .choices = ends, .what = "after the last sample: its value, the file from its first sample, or no sensor"},
+    {.key = "sha256",  .type = FIELD_TEXT, .offset = SERIES(sha256), .max = 65, .what = "of the file; another file is refused. \"\": any"},
+};
+const struct fields scenario_series_fields = FIELDS(series_rows);
+
 #define QUARTZ(m) offsetof(struct quartz_g, m)
 static const struct field quartz_rows[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}

@@ -16,6 +16,7 @@
 #define PSABENCH_SCENARIO_SCENARIO_H
 
 #include "base/can.h"
+#include "base/sha256.h"
 #include "scenario/find.h"
 #include "unit/unit.h"
 
@@ -39,11 +40,23 @@ struct scenario_site {
     double latitude_deg, longitude_deg, height_m, azimuth_deg;
 };
 
+/* A signal from a file, by series_file.h. */
+struct scenario_series {
+    bool given;
+    char file[256];  /* relative: from the scenario's folder; scenario_open() makes it absolute */
+    char column[48]; /* its unit at the end */
+    double start_s;
+    enum series_between between;
+    enum series_end at_end;
+    char sha256[SHA256_HEX]; /* of the file; "": any */
+};
+
 struct scenario_unit {
     char name[32];
     const struct board_name *board; /* as the key says: of one type, several names */
     union board_profile_store profile;
     struct unit_cfg cfg; /* name and profile point into this struct once it is in its place: scenario_bind() */
+    struct scenario_series series[UNIT_AXES];
     double misalignment_arcsec[3]; /* to cfg.mounting by scenario_bind() */
     char bus_name[16];
     char level[32];     /* of a gyro unit: the unit that reads its level sensors; "": none */
@@ -90,6 +103,10 @@ bool scenario_load(const char *name, struct scenario *s, char *why, size_t cap);
 
 /* The same from memory; path says where relative profiles lie and is in messages. */
 bool scenario_parse(const char *path, const char *text, size_t len, struct scenario *s, char *why, size_t cap);
+
+/* Opens the files that signals come from: once, before scenario_bind(), when the struct's copies may go anywhere. The dump has
+ * their SHA-256 from then on, and refuses another file. False with one line in why. */
+bool scenario_open(struct scenario *s, char *why, size_t cap);
 
 /* Sets the pointers inside the units and the seed of every noise, and draws what the production spread leaves open: once,
  * when the struct stays where it is and its seed is the one to be used. */

@@ -100,13 +100,16 @@ static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *
 }
 
 // clang-format off
-static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", NULL};
+static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz",
+                                      [UNIT_RECORDED] = "recorded", NULL};
 #define AXIS(i)                                                                                                        \
     {.key = "sensor", .type = FIELD_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
-     .what = "type of the sensor; `none`: the channel is shorted"},                                                                        \
+     .what = "type of the sensor; `none`: the channel is shorted; `recorded`: its output comes from a file"},                               \
     {.type = FIELD_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
     {.key = "quartz", .type = FIELD_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
      .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
+    {.key = "signal", .type = FIELD_SECTION, .offset = UNIT(series[i]), .sub = &scenario_series_fields,                 \
+     .present = UNIT(series[i].given), .what = "what the sensor feels, or puts out, from a file: [recorded signals](recorded.md)"}, \
     {.key = "at_m", .type = FIELD_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
      .what = "position of the sensor in the unit's case, x, y, z"},                                                   \
     {.key = "afe", .type = FIELD_SECTION, .offset = UNIT(cfg.board.afe[i]), .sub = &scenario_afe_fields,                \
@@ -220,13 +223,42 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
     return true;
 }
 
+/* The column's unit has to be what the sensor takes. */
+static bool check_signal(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u, unsigned i)
+{
+    const struct scenario_series *s = &u->series[i];
+    const enum unit_sensor sensor = u->cfg.axis[i].sensor;
+    const bool current = u->cfg.board.afe[i].input == AFE_CURRENT;
+    const char *unit = sensor == UNIT_RECORDED ? (current ? "_a" : "_v") : "_mps2";
+    const size_t len = strlen(s->column), n = strlen(unit);
+    const struct yaml_node *at = yaml_at(node, "axes");
+    if (!s->given) {
+        return sensor != UNIT_RECORDED ||
+               yaml_file_fail(f, at, "axes", "%c: expected a signal for a recorded sensor, got none", "xyz"[i]);
+    }
+    if (sensor == UNIT_NO_SENSOR)
+        return yaml_file_fail(f, at, "axes", "%c.signal: expected a sensor that takes it, got none", "xyz"[i]);
+    if (!s->file[0]) return yaml_file_fail(f, at, "axes", "%c.signal: expected a file, got none", "xyz"[i]);
+    if (len <= n || strcmp(s->column + len - n, unit) != 0)
+        return yaml_file_fail(f, at, "axes", "%c.signal: expected a column that ends in %s, got \"%s\"", "xyz"[i], unit,
+                              s -> column);
+    return true;
+}
+
+static bool check_signals(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    for (unsigned i = 0; i < UNIT_AXES; i++)
+        if (!check_signal(f, node, u, i)) return false;
+    return true;
+}
+
 /* A name, a node and a number that no other unit of the scenario has. */
 static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        const struct scenario_unit *u)
 {
     if (!is_plain(u->name))
         return yaml_file_fail(f, yaml_at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
-    if (!check_inputs(f, node, u)) return false;
+    if (!check_inputs(f, node, u) || !check_signals(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
             return yaml_file_fail(f, yaml_at(node, "name"), "name",

@@ -45,16 +45,40 @@ static void gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_m
     for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
 }
 
+/* Output of a sensor that feels a_mps2, and its faults. */
+static double felt_signal(struct unit *u, unsigned axis, const double a_mps2[3], int64_t t_ns)
+{
+    warm_sensor(u, axis, t_ns);
+    const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
+                                                               : mems_out_v(&u->mems[axis], a_mps2, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
+}
+
 static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
 {
     struct unit *u = ctx;
     if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
     double a_mps2[3];
     gravity_mps2(u, axis, t_ns, a_mps2);
-    warm_sensor(u, axis, t_ns);
-    const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
-                                                               : mems_out_v(&u->mems[axis], a_mps2, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
+    return felt_signal(u, axis, a_mps2, t_ns);
+}
+
+/* The same where a series may be in place of the lab; one that has ended is no sensor. */
+static double recorded_signal(void *ctx, unsigned axis, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    double value;
+    if (!u->cfg.axis[axis].series.sample) return accel_signal(u, axis, t_ns);
+    if (!series_value(&u->cfg.axis[axis].series, t_ns, &value)) return 0.0;
+    if (u->cfg.axis[axis].sensor != UNIT_RECORDED) return felt_signal(u, axis, (double[3]){-value, 0.0, 0.0}, t_ns);
+    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], value, t_ns) : value;
+}
+
+static bool is_recorded(const struct unit *u)
+{
+    bool any = false;
+    for (unsigned i = 0; i < UNIT_AXES; i++) any |= u->cfg.axis[i].series.sample != NULL;
+    return any;
 }
 
 /* Of the case, wherever in it. */
@@ -158,6 +182,7 @@ static void init_board(struct unit *u, struct sched *s)
 {
     struct board_io io = {
         .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    if (is_recorded(u)) io.accel = recorded_signal;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;
     union board_profile_store defaults;
@@ -235,9 +260,13 @@ struct can_node *unit_node(const struct unit *u)
 
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
 {
-    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
-    double a_mps2[3];
-    gravity_mps2(u, axis, t_ns, a_mps2);
+    const enum unit_sensor sensor = u->cfg.axis[axis].sensor;
+    struct series *s = &u->cfg.axis[axis].series;
+    double a_mps2[3] = {0.0, 0.0, 0.0}, value = 0.0;
+    if (sensor == UNIT_NO_SENSOR || (s->sample && !series_value(s, t_ns, &value))) return 0.0;
+    if (sensor == UNIT_RECORDED) return value;
+    if (s->sample) a_mps2[0] = -value;
+    else gravity_mps2(u, axis, t_ns, a_mps2);
     warm_sensor(u, axis, t_ns);
     if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);

@@ -10,20 +10,23 @@
 #include "phys/sensor/fault.h"
 #include "phys/sensor/mems.h"
 #include "phys/sensor/quartz.h"
+#include "phys/sensor/series.h"
 #include "unit/boards.h"
 
 #define UNIT_AXES  BOARD_AXES
 #define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
 
-/* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. */
-enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ };
+/* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. Of RECORDED the
+ * series is the output itself, V or A by afe.input; a MEMS or quartz sensor with a series feels its m/s^2. */
+enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ, UNIT_RECORDED };
 
 struct unit_axis_cfg {
     enum unit_sensor sensor;
     struct mems_g mems;
     struct quartz_g quartz;
-    bool quartz_given; /* the scenario says something of it */
-    double at_m[3];    /* where it is in the unit, its case's axes */
+    bool quartz_given;    /* the scenario says something of it */
+    double at_m[3];       /* where it is in the unit, its case's axes */
+    struct series series; /* m/s^2: specific force along the input axis, in place of the lab's; RECORDED: the output */
 };
 
 struct unit_cfg {

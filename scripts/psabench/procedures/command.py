@@ -88,6 +88,12 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     },
     "--seed": {"type": int, "metavar": "N", "help": "random seed; overrides the scenario"},
     "--real-time": {"action": "store_true", "help": "run at wall-clock pace"},
+    "--record": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "store the frames of the run in a log (.log .blf .asc ...) and its calls in FILE.calls.csv",
+    },
+    "--replay": {"type": Path, "metavar": "FILE", "help": "run on such a log instead of a bench"},
     "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "report folder (%(default)s)"},
     "--lcm": {
         "metavar": "URL",

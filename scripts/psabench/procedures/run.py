@@ -17,7 +17,8 @@ from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
-from psabench.procedures.head_bench import Progress, Watch
+from psabench.procedures.head_bench import HeadBench, Progress, Watch
+from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder
 from psabench.procedures.registry import PROCEDURES, Procedure
 from psabench.procedures.result import ProcedureResult, made_params
@@ -57,11 +58,17 @@ class RunOptions:
     real_time: bool = False
     seed: int | None = None
     g_mps2: float | None = None  # local gravity; None: the condition's, standard gravity on another bench
+    record: Path | None = None  # CAN log of the run, its calls beside it
+    replay: Path | None = None  # such a log instead of a bench
     params: Mapping[str, Any] | None = None  # fields of the procedures' parameters, by name
 
 
 def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
     """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken."""
+    if options.replay:
+        return _replay(options, progress)
+    if options.record and len(options.procedures) * len(_conditions(options)) != 1:
+        raise BadInput(expected("one procedure on one bench (--condition quiet or realistic)", "several", "--record"))
     options.out.mkdir(parents=True, exist_ok=True)
     sections = []
     for condition in _conditions(options):
@@ -85,11 +92,44 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
     with ExitStack() as stack:
         bench = stack.enter_context(_bench(condition, options))
-        on_head = WireBench(bench.unit, bench.head, average=average, g_mps2=g_mps2)
+        wired = WireBench(bench.unit, bench.head, average=average, g_mps2=g_mps2)
+        on_head: HeadBench = wired
+        if options.record:
+            setup = {"procedure": procedure.name, "condition": condition.label, "average": average, "g_mps2": g_mps2}
+            setup |= {"node": bench.unit.node.node_id, "facts": _facts(options)}
+            on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
         result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
         truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
     return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
+
+
+def _replay(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
+    """The procedure that was recorded, on the recording: the same results and report, but for a truth."""
+    assert options.replay is not None
+    head = RecordedHead(options.replay)
+    name = str(head.setup["procedure"])
+    if list(options.procedures) != [name]:
+        raise BadInput(expected(f"run {name}, as recorded", " ".join(options.procedures), options.replay))
+    clash: dict[str, object] = {
+        "--record": options.record,
+        "--can": options.can,
+        "--head": options.head,
+        "--control": options.control,
+    }
+    clash |= {"--truth": options.truth, "--scenario": options.scenario, "--seed": options.seed}
+    clash |= {"--average": options.average, "--gravity": options.g_mps2}
+    for option, value in clash.items():
+        if value is not None:
+            raise BadInput(expected("no option of the bench beside --replay", option, "run"))
+    options.out.mkdir(parents=True, exist_ok=True)
+    procedure, label = PROCEDURES[name], str(head.setup.get("condition", ""))
+    params = made_params(procedure.params, name, options.params or {})
+    with CsvRecorder(options.out / f"{'-'.join(x for x in (name, label) if x)}.csv") as recorder:
+        result = procedure.run(head, params, Watch(progress=progress, record=recorder))
+    section = Section(label=label, result=result, truth=None, allowance=allowance(result, int(head.setup["average"])))
+    facts = {str(k): str(v) for k, v in head.setup["facts"].items()}
+    return report.write(options.out, [section], facts=facts), [section]
 
 
 def _there(options: RunOptions) -> bool:

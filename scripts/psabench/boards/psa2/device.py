@@ -76,6 +76,11 @@ class Psa2(Unit):
 
         31 significant bits: 9.3 nV a step, where a code of the stream has 1.19 uV. Needs a profile that reads 32 bits.
         """
-        full_scale_v = layout(message("PSA2_XY"))["X"].scale * 2**23
-        x, y, z = (int(self.node.read(OD.RAW_WORDS, sub)) / 2**31 * full_scale_v for sub in (1, 2, 3))
+        x, y, z = (raw_word_v(int(self.node.read(OD.RAW_WORDS, sub))) for sub in (1, 2, 3))
         return x, y, z
+
+
+def raw_word_v(word: int) -> float:
+    """Volts at the load of a whole 32-bit word of object 2201h."""
+    full_scale_v = layout(message("PSA2_XY"))["X"].scale * 2**23
+    return word / 2**31 * full_scale_v

@@ -1,0 +1,244 @@
+"""A run of a calibration as a recording, and procedures on it: the CAN log, and what was asked of the instruments.
+
+The log is of any of python-can's formats. A recording has no reaction: the calls of the procedure (head, readings) lie
+beside it in FILE.calls.csv, each with its argument, the answer, the bench's time and the number of frames received by
+then. On replay the procedure makes the same calls and is refused at the first other one. Readings are decoded again
+from the frames of the log, by number, so that what a format does to time stamps does not matter.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import numpy.typing as npt
+
+from psabench.boards.objects import Psa2Objects
+from psabench.boards.psa2.device import raw_word_v
+from psabench.boards.psa2.frames import FrameReader
+from psabench.conform.capture.log import CanFrame
+from psabench.conform.sources.can_logs import read_can
+from psabench.conform.sources.taken import Bounds
+from psabench.errors import BadInput, expected
+from psabench.estimate.face import Face
+from psabench.link.can_host import CanHost
+from psabench.link.log_file import LogFile
+from psabench.link.own import output_text
+from psabench.procedures.head_bench import HeadBench
+
+COLUMNS = ("call", "argument", "answer", "t_s", "frames")
+SETUP, END = "setup", "end"
+LONGEST_S = 1e9  # of a recording
+SDO_ANSWER = 0x580
+UPLOADED_4 = 0x43  # first byte of an answer that holds four bytes
+
+
+def calls_path(log: Path) -> Path:
+    """Where the calls of a log are."""
+    return log.with_name(log.name + ".calls.csv")
+
+
+class HeadRecorder(AbstractContextManager["HeadRecorder"]):
+    """A HeadBench that passes every call on and stores it; the frames of `host` go to the log meanwhile."""
+
+    def __init__(self, bench: HeadBench, host: CanHost, path: Path, setup: Mapping[str, Any]) -> None:
+        """Raises BadInput or OutputError when one of the two files cannot be made."""
+        self.g_mps2 = bench.g_mps2
+        self._bench, self._host, self._frames = bench, host, 0
+        self._t_s = bench.t_s
+        with ExitStack() as stack:
+            self._log = LogFile(path)
+            stack.callback(self._log.close)
+            file = stack.enter_context(output_text(calls_path(path), lambda: f"stored {self._frames} frames"))
+            self._csv = csv.writer(file, lineterminator="\n")
+            self._csv.writerow(COLUMNS)
+            self._stack = stack.pop_all()
+        host.listeners.append(self._keep)
+        self._store(SETUP, json.dumps(setup), "")
+
+    def _keep(self, message: can.Message) -> None:
+        if not message.is_error_frame:
+            self._frames += self._log(message)
+
+    def _store(self, call: str, argument: str, answer: str) -> None:
+        """A call that is over. Raises OutputError when the log could not take its frames."""
+        if self._log.error is not None:
+            raise self._log.error
+        self._t_s = self._bench.t_s
+        self._csv.writerow([call, argument, answer, repr(self._t_s), self._frames])
+
+    @property
+    def t_s(self) -> float:
+        """As of the last call: what the recording knows."""
+        return self._t_s
+
+    def turn(self, angle_deg: float) -> float:
+        scale_deg = self._bench.turn(angle_deg)
+        self._store("turn", repr(float(angle_deg)), repr(float(scale_deg)))
+        return scale_deg
+
+    def mount(self, face: Face) -> None:
+        self._bench.mount(face)
+        self._store("mount", face.value, "")
+
+    def wait(self, dwell_s: float) -> None:
+        self._bench.wait(dwell_s)
+        self._store("wait", repr(float(dwell_s)), "")
+
+    def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
+        u_v = self._bench.read(axis, readings)
+        self._store("read", f"{axis} {readings}", "")
+        return u_v
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        self._host.listeners.remove(self._keep)
+        try:
+            if kind is None:
+                self._store(END, "", "")
+        finally:
+            self._stack.__exit__(kind, *rest)
+        if kind is None and self._log.error is not None:
+            raise self._log.error
+
+
+class RecordedHead:
+    """A HeadBench whose answers are those of a recording."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadInput for a log or calls that are missing, cut, damaged or do not belong together."""
+        self.path = calls_path(path)
+        self._calls = _read_calls(self.path)
+        self._at = 0
+        self.setup = self._read_setup()
+        self.g_mps2 = float(self.setup["g_mps2"])
+        self._node, self._average = int(self.setup["node"]), int(self.setup["average"])
+        self._frames = _read_frames(path)
+        if len(self._frames) != int(self._calls[-1]["frames"]):
+            raise BadInput(
+                expected(f"{self._calls[-1]['frames']} frames, as {self.path} says", len(self._frames), path)
+            )
+
+    def _read_setup(self) -> dict[str, Any]:
+        row = self._next(SETUP, None)
+        try:
+            setup = json.loads(row["argument"])
+            _ = (
+                float(setup["g_mps2"]),
+                int(setup["node"]),
+                int(setup["average"]),
+                dict(setup["facts"]),
+                setup["procedure"],
+            )
+        except (ValueError, KeyError, TypeError) as e:
+            raise BadInput(expected("the set-up of a run", row["argument"][:60], self._where())) from e
+        return dict(setup)
+
+    @property
+    def t_s(self) -> float:
+        return float(self._calls[self._at - 1]["t_s"])
+
+    def turn(self, angle_deg: float) -> float:
+        return float(self._next("turn", repr(float(angle_deg)))["answer"])
+
+    def mount(self, face: Face) -> None:
+        self._next("mount", face.value)
+
+    def wait(self, dwell_s: float) -> None:
+        self._next("wait", repr(float(dwell_s)))
+
+    def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
+        begin = int(self._calls[self._at - 1]["frames"])
+        row = self._next("read", f"{axis} {readings}")
+        frames = self._frames[begin : int(row["frames"])]
+        if self._average:
+            return self._streamed(frames, axis, readings)
+        return self._words(frames, axis, readings)
+
+    def _streamed(self, frames: Sequence[CanFrame], axis: str, readings: int) -> npt.NDArray[np.float64]:
+        reader = FrameReader(self._node)
+        for f in frames:
+            reader.on_message(can.Message(timestamp=f.t_s, arbitration_id=f.can_id, data=f.data, is_fd=f.fd))
+        count = readings * self._average
+        u_v = reader.take().head(count).axis(axis)
+        self._check_count(len(u_v), count, "samples")
+        return np.asarray(u_v.reshape(readings, self._average).mean(axis=1), dtype=np.float64)
+
+    def _words(self, frames: Sequence[CanFrame], axis: str, readings: int) -> npt.NDArray[np.float64]:
+        """From the answers to the reads of the axis' whole word."""
+        head = bytes([UPLOADED_4]) + int(Psa2Objects.RAW_WORDS).to_bytes(2, "little") + bytes(["xyz".index(axis) + 1])
+        answers = [f.data[4:] for f in frames if f.can_id == SDO_ANSWER + self._node and f.data[:4] == head]
+        self._check_count(len(answers), readings, "words")
+        return np.array([raw_word_v(int.from_bytes(a, "little", signed=True)) for a in answers])
+
+    def _check_count(self, got: int, wanted: int, what: str) -> None:
+        if got != wanted:
+            raise BadInput(expected(f"{wanted} {what} in the log for this reading", got, self._where()))
+
+    def _next(self, call: str, argument: str | None) -> dict[str, str]:
+        """The next call of the recording. Raises BadInput when the procedure makes another one."""
+        row = self._calls[self._at]
+        self._at += 1
+        if row["call"] != call or argument not in (None, row["argument"]):
+            asked = f"{call} {argument or ''}".strip()
+            raise BadInput(
+                expected(f"{row['call']} {row['argument']}".strip(), f"{asked} (of the procedure)", self._where())
+            )
+        return row
+
+    def _where(self) -> str:
+        return f"{self.path}:{self._at + 1}"
+
+
+def _read_calls(path: Path) -> list[dict[str, str]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise BadInput(
+            f"{path}: {getattr(e, 'strerror', None) or e}; psabench run --record writes it beside the log"
+        ) from e
+    rows = list(csv.reader(text.splitlines()))
+    if not rows or tuple(rows[0]) != COLUMNS:
+        raise BadInput(expected(f"the columns {','.join(COLUMNS)}", ",".join(rows[0]) if rows else "none", f"{path}:1"))
+    calls, frames = [], 0
+    for line, row in enumerate(rows[1:], start=2):
+        call = dict(zip(COLUMNS, row, strict=False))
+        if (
+            len(row) != len(COLUMNS)
+            or not call["frames"].isdecimal()
+            or int(call["frames"]) < frames
+            or not _is_good(call)
+        ):
+            raise BadInput(
+                expected("a call, its answer, a time and a rising number of frames", ",".join(row), f"{path}:{line}")
+            )
+        frames = int(call["frames"])
+        calls.append(call)
+    if not calls or calls[-1]["call"] != END:
+        raise BadInput(expected("a last row `end`", "a run that was ended early", path))
+    return calls
+
+
+def _is_good(call: Mapping[str, str]) -> bool:
+    try:
+        return bool(np.isfinite([float(call["t_s"]), float(call["answer"] or 0)]).all())
+    except ValueError:
+        return False
+
+
+def _read_frames(path: Path) -> tuple[CanFrame, ...]:
+    """Raises BadInput for a log that cannot be read to its end."""
+    try:
+        take = read_can(path, Bounds(max_s=LONGEST_S))
+    except OSError as e:
+        raise BadInput(f"{path}: {e.strerror or e}") from e
+    except KeyError as e:
+        raise BadInput(expected("a CAN log by its ending", path.suffix or "none", path)) from e
+    if take.note:
+        raise BadInput(f"{path}: {take.note}")
+    return tuple(f for f in take.frames if not f.error)

@@ -1,0 +1,119 @@
+"""A calibration on its own recording gives what it gave live, byte for byte; a recording that cannot answer says so."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from psabench.emulator import Emulator
+from rig import PSABENCH
+
+pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]
+
+RESULTS = ("result.json", "report.html")
+
+
+def run(*args: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([PSABENCH, "run", *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def recorded(folder: Path, ending: str, procedure: str, *params: str) -> Path:
+    """A live run without the truth, recorded."""
+    log = folder / f"run{ending}"
+    with Emulator("calibrate", scpi=True) as emulator:
+        assert emulator.control_path is not None
+        done = run(procedure, "--control", emulator.control_path, "--record", log, "--out", folder / "live", *params)
+        assert done.returncode in (0, 1), done.stderr
+    return log
+
+
+@pytest.mark.parametrize(
+    ("procedure", "ending", "average"),
+    [
+        ("turns", ".log", "4"),
+        ("turns", ".blf", "4"),
+        ("turns", ".asc", "4"),
+        ("turns", ".csv", "4"),
+        ("turns", ".trc", "4"),
+        ("fourier", ".log", "4"),
+        ("reversal", ".blf", "4"),
+    ],
+)
+def test_a_replay_gives_the_live_results(procedure: str, ending: str, average: str, tmp_path: Path) -> None:
+    log = recorded(tmp_path, ending, procedure, "--average", average, "--realisations", "2")
+    done = run(procedure, "--replay", log, "--realisations", "2", "--out", tmp_path / "again")
+    assert done.returncode in (0, 1), done.stderr
+    for name in (*RESULTS, f"{procedure}.csv"):
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "live" / name).read_bytes(), name
+
+
+def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
+    """The quiet condition reads 32-bit words by SDO."""
+    log = tmp_path / "run.log"
+    live = run("turns", "--condition", "quiet", "--realisations", "2", "--record", log, "--out", tmp_path / "live")
+    again = run("turns", "--replay", log, "--realisations", "2", "--out", tmp_path / "again")
+    assert (live.returncode, again.returncode) == (0, 0), live.stderr + again.stderr
+    name = "turns-quiet.csv"
+    alone = run("turns", "--condition", "quiet", "--realisations", "2", "--out", tmp_path / "alone")
+    assert alone.returncode == 0, alone.stderr
+    assert (tmp_path / "alone" / name).read_bytes() == (
+        tmp_path / "live" / name
+    ).read_bytes()  # recording changes nothing
+    assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "live" / name).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def turns(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return recorded(tmp_path_factory.mktemp("turns"), ".log", "turns", "--average", "1", "--realisations", "2")
+
+
+def edited(turns: Path, folder: Path, old: str, new: str) -> Path:
+    """A copy, its calls changed."""
+    log = Path(shutil.copy(turns, folder))
+    calls = turns.with_name("run.log.calls.csv").read_text()
+    assert old in calls
+    log.with_name("run.log.calls.csv").write_text(calls.replace(old, new, 1))
+    return log
+
+
+def refused(log: Path, *args: str, procedure: str = "turns", realisations: str = "2") -> str:
+    out = log.parent / "out"
+    done = run(procedure, "--replay", log, "--realisations", realisations, "--out", out, *args)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr.splitlines()[-1]  # behind the progress
+
+
+def test_what_was_not_recorded_is_refused(turns: Path, tmp_path: Path) -> None:
+    assert "expected turn 271.0, got turn 270.0 (of the procedure)" in refused(
+        edited(turns, tmp_path, "turn,270.0", "turn,271.0")
+    )
+    assert "expected mount side, got turn 270.0 (of the procedure)" in refused(turns, realisations="3")
+    assert "expected run turns, as recorded, got fourier" in refused(turns, procedure="fourier")
+    assert "expected no option of the bench beside --replay, got --seed" in refused(turns, "--seed", "3")
+
+
+def test_a_damaged_recording_is_refused(turns: Path, tmp_path: Path) -> None:
+    log = Path(shutil.copy(turns, tmp_path))
+    assert "No such file or directory; psabench run --record writes it" in refused(log)
+    assert "expected a last row `end`" in refused(edited(turns, tmp_path, "\nend,", "\nwait,"))
+    assert "expected the columns" in refused(edited(turns, tmp_path, "call,", "cell,"))
+    assert "expected the set-up of a run" in refused(edited(turns, tmp_path, "average", "mean"))
+    assert "expected a call, its answer, a time" in refused(edited(turns, tmp_path, ",0.19", ",x0.19"))
+    log = edited(turns, tmp_path, "call,", "call,")
+    lines = log.read_text().splitlines(keepends=True)
+    log.write_text("".join(lines[:-1]))
+    assert "frames, as " in refused(log)
+    log.write_text("".join(lines)[:-3])
+    assert "its last line is cut" in refused(log)
+    at = next(k for k, line in enumerate(lines) if " 185#" in line)
+    log.write_text("".join([*lines[:at], lines[at].replace(" 185#", " 184#"), *lines[at + 1 :]]))
+    assert "in the log for this reading" in refused(log)
+
+
+def test_one_recording_is_of_one_run(tmp_path: Path) -> None:
+    done = run("turns", "--record", tmp_path / "r.log", "--out", tmp_path)
+    assert done.returncode == 2
+    assert "expected one procedure on one bench" in done.stderr
