@@ -1,4 +1,4 @@
-"""`psabench record`: all that is on the bus into a file of python-can's own formats, the stream's health counted."""
+"""`psabench record`: all that is on the bus into a log file, the stream's health counted."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def record(
     stamps: list[float] = []  # of the first and the last message
     received = 0
     with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
-        log = LogFile(path)
+        log = LogFile(path, {node: board})
 
         def keep(m: Message) -> None:
             nonlocal received

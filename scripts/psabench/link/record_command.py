@@ -9,12 +9,13 @@ from pathlib import Path
 
 from psabench.options import CAN_HELP, Parser, add_board, natural, node_of, positive
 
-FORMATS = ".asc .blf .csv .db .log .mf4 .trc .txt"  # of python-can, without loading it
+FORMATS = ".asc .blf .csv .db .log .mcap .mf4 .pcap .trc .txt"  # of log_file, without loading it
 
 EPILOG = """\
 examples:
   psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, candump -L format
   psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        one minute, for CANalyzer
+  psabench record run.mcap --can socketcand:127.0.0.1:29536        for Foxglove and PlotJuggler, decoded as well
   psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
 
 Stops at --for, --count, Ctrl-C, SIGTERM, or with exit status 3 when the link fails, the disk is full or the file is
