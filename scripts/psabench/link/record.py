@@ -46,7 +46,7 @@ def record(
     reader = reader_of(board, node)
     stamps: list[float] = []  # of the first and the last message
     received = 0
-    with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
+    with ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
         log = LogFile(path, {node: board})
 
         def keep(m: Message) -> None:
@@ -61,7 +61,7 @@ def record(
         host.listeners.append(keep)
         broken = None
         try:
-            _receive(host, for_s, count, lambda: pressed() or log.error is not None, log.check)
+            receive_until(host, for_s, count, lambda: pressed() or log.error is not None, log.check)
         except LinkError as e:
             broken = str(e)
         finally:
@@ -79,7 +79,7 @@ def record(
 
 
 @contextmanager
-def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
+def ctrl_c_noted() -> Iterator[Callable[[], bool]]:
     """Ctrl-C is the usual way to end a recording; it takes effect between two messages, never inside one."""
     pressed: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
@@ -89,7 +89,7 @@ def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _receive(
+def receive_until(
     host: CanHost, for_s: float | None, count: int | None, stop: Callable[[], bool], look: Callable[[], object]
 ) -> None:
     """Receive until it is over, with a look at the file every LOOK_S of real time."""

@@ -39,6 +39,7 @@ from psabench.logs.segments import SegmentFile
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK = 1 << 18  # bytes before compression
 MOST_CHUNK = 1 << 27  # bytes that a reader takes
+WINDOW = 1 << 27  # of zstandard, bytes
 CLOSING = struct.pack("<BQI", 0x0F, 4, 0) + struct.pack("<BQQQI", 0x02, 20, 0, 0, 0) + MAGIC  # no summary
 
 
@@ -178,7 +179,7 @@ def _unpacked(chunk: Chunk) -> bytes:
         return chunk.data
     if chunk.compression != "zstd":
         raise ValueError(expected("compression zstd or none", repr(chunk.compression[:20])))
-    with zstandard.ZstdDecompressor(max_window_size=MOST_CHUNK).stream_reader(chunk.data) as stream:
+    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(chunk.data) as stream:
         data = stream.read(MOST_CHUNK + 1)
     if len(data) > MOST_CHUNK:
         raise ValueError(expected(f"chunks of {MOST_CHUNK} bytes at most", "more"))

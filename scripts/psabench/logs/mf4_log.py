@@ -90,4 +90,3 @@ def _error(status: int, words: bytes) -> OSError:
         return OSError(int(number), text)
     ended = f"ended by {signal.Signals(-status).name}" if status < 0 else said[0][:160]
     return OSError(errno.EIO, f"asammdf could not write it: {ended}")
-

@@ -74,8 +74,7 @@ def frame_of(record: object) -> can.Message:
     bits = {attribute: record.get(name) for name, attribute in BITS.items()}
     if any(type(b) is not bool for b in bits.values()):
         raise ValueError(expected(f"true or false for {', '.join(BITS)}", str(list(bits.values()))[:60]))
-    return can.Message(
-        timestamp=float(t_s),
+    m = can.Message(
         arbitration_id=numbers[0],
         dlc=numbers[1],
         data=bytes.fromhex(data),
@@ -83,6 +82,8 @@ def frame_of(record: object) -> can.Message:
         check=True,
         **bits,
     )
+    m.timestamp = float(t_s)  # which python-can's check would not let be negative
+    return m
 
 
 def stamp_ns(t_s: float) -> int:
