@@ -53,8 +53,7 @@ def read_python_can(path: Path) -> Iterator[can.Message]:
                 yield m
                 read += 1
     except DAMAGE as e:
-        text = f"message {read + 1} is damaged ({e}); the {read} messages before it are decoded"
-        raise BadInput(f"{path}: {text}") from e
+        raise BadInput(f"{path}: message {read + 1} is damaged ({e}); the {read} messages before it are decoded") from e
 
 
 def read_mf4(path: Path) -> Iterator[can.Message]:
@@ -69,4 +68,4 @@ def read_mf4(path: Path) -> Iterator[can.Message]:
     with io.TextIOWrapper(log, encoding="utf-8") as text:
         yield from reader(text)
     if trouble:
-        raise BadInput(f"{path}: {trouble}")
+        raise BadInput(expected("a whole log", trouble, path))

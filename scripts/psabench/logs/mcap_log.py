@@ -78,13 +78,13 @@ class ChunkFile:
 
     def commit(self) -> None:
         """End the chunk and write it. Raises OSError: then it is not in the file, and nothing more can be added."""
-        self.writer.flush()
+        self.writer.flush()  # type: ignore[no-untyped-call]
         if data := self._segment.take():
             self._file.append(data)
 
     def finish(self) -> None:
         """Write the summary, for programs that jump in the file. Raises OSError."""
-        self.writer.finish()
+        self.writer.finish()  # type: ignore[no-untyped-call]
         self._file.append(self._segment.take(), tail=False)
 
     def close(self) -> None:
@@ -157,7 +157,7 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
                     yield frame_of(json.loads(r.data))
         except DAMAGE as e:
             said = " ".join(str(e).split())[:120] or type(e).__name__
-            raise BadInput(f"{path}: damaged behind message {n} ({said})") from e
+            raise BadInput(expected("a whole log", f"damage behind message {n} ({said})", path)) from e
 
 
 # What reading hostile bytes comes to; struct.error: a record that is too short; zstandard's own.

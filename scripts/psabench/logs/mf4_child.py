@@ -8,7 +8,7 @@ import os
 import resource
 import sys
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
@@ -55,7 +55,7 @@ def write(path: Path, frames: Sequence[can.Message], boards: Mapping[int, str]) 
     start_s = math.floor(stamps[0]) if len(stamps) else 0
     t_s = stamps - start_s
     mdf = asammdf.MDF(version="4.10")
-    mdf.header.start_time = datetime.fromtimestamp(start_s, tz=timezone.utc)
+    mdf.header.start_time = datetime.fromtimestamp(start_s, tz=UTC)
     kinds = np.array([1 if m.is_error_frame else 2 if m.is_remote_frame else 0 for m in frames], dtype=np.int64)
     bus = asammdf.SourceInformation(source_type=asammdf.SOURCE_BUS, bus_type=asammdf.BUS_TYPE_CAN)
     names = ("CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame")
@@ -63,7 +63,7 @@ def write(path: Path, frames: Sequence[can.Message], boards: Mapping[int, str]) 
     for kind, (name, dtype) in enumerate(zip(names, types, strict=True)):
         where = np.flatnonzero(kinds == kind)
         rows = np.zeros(len(where), dtype=dtype)
-        for row, k in enumerate(where):
+        for row, k in enumerate(where.tolist()):
             _fill(rows[row : row + 1], name, frames[k])
         mdf.append(asammdf.Signal(name=name, samples=rows, timestamps=t_s[where], source=bus))
     _append_decoded(mdf, frames, t_s, Decoder(boards))

@@ -75,7 +75,8 @@ class Mf4(Checked):
             )
             if done.returncode:
                 os.truncate(self._path, 0)  # a part of such a file cannot be read
-                raise _error(done.returncode, words.seek(0) or words.read())
+                words.seek(0)
+                raise _error(done.returncode, words.read())
         return int(done.stdout.split()[-1])
 
     def stored(self, written: int) -> int:

@@ -63,15 +63,16 @@ def frame_of(record: object) -> can.Message:
     """The frame of a raw record. Raises ValueError for anything else."""
     if not isinstance(record, dict):
         raise ValueError(expected("a raw record", type(record).__name__))
-    t_s, data = record.get("timestamp_s"), record.get("data")
+    t_s: Any = record.get("timestamp_s")
+    data: Any = record.get("data")
     if type(t_s) not in (float, int) or not math.isfinite(t_s) or abs(t_s) > MOST_S:
         raise ValueError(expected(f"timestamp_s, a number up to {MOST_S:g}", repr(t_s)[:40]))
     if not isinstance(data, str) or len(data) > 2 * MOST_DATA:
         raise ValueError(expected(f"data, up to {MOST_DATA} bytes in hexadecimal", repr(data)[:40]))
-    numbers = [record.get(name) for name in ("id", "dlc")]
+    numbers: list[Any] = [record.get(name) for name in ("id", "dlc")]
     if any(type(n) is not int for n in numbers):
         raise ValueError(expected("id and dlc, two integers", str(numbers)[:40]))
-    bits = {attribute: record.get(name) for name, attribute in BITS.items()}
+    bits: dict[str, Any] = {attribute: record.get(name) for name, attribute in BITS.items()}
     if any(type(b) is not bool for b in bits.values()):
         raise ValueError(expected(f"true or false for {', '.join(BITS)}", str(list(bits.values()))[:60]))
     m = can.Message(

