@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -51,6 +52,17 @@ def read_spool(lines: IO[bytes]) -> list[can.Message]:
 
 
 def write(path: Path, frames: Sequence[can.Message], boards: Mapping[int, str]) -> None:
+    """With the decoded channels, or the frames alone where these do not fit on the disk. Raises OSError."""
+    try:
+        _write(path, frames, Decoder(boards))
+    except OSError as e:
+        if e.errno not in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
+            raise
+        os.truncate(path, 0)
+        _write(path, frames, None)
+
+
+def _write(path: Path, frames: Sequence[can.Message], decoder: Decoder | None) -> None:
     stamps = np.maximum.accumulate(np.array([m.timestamp for m in frames], dtype=np.float64))
     start_s = math.floor(stamps[0]) if len(stamps) else 0
     t_s = stamps - start_s
@@ -66,7 +78,8 @@ def write(path: Path, frames: Sequence[can.Message], boards: Mapping[int, str]) 
         for row, k in enumerate(where.tolist()):
             _fill(rows[row : row + 1], name, frames[k])
         mdf.append(asammdf.Signal(name=name, samples=rows, timestamps=t_s[where], source=bus))
-    _append_decoded(mdf, frames, t_s, Decoder(boards))
+    if decoder:
+        _append_decoded(mdf, frames, t_s, decoder)
     with path.open("r+b") as file:
         mdf.save(file, compression=2)
     mdf.close()
@@ -101,7 +114,8 @@ def _append_decoded(mdf: Any, frames: Sequence[can.Message], t_s: signals.Floats
         if name and len(m.data) >= message(name).length:
             where.setdefault((topic, name), []).append(k)
     for (topic, name), rows in sorted(where.items()):
-        bits = signals.payload([bytes(frames[k].data) for k in rows], int(message(name).length))
+        length = int(message(name).length)
+        bits = signals.payload([bytes(frames[k].data[:length]) for k in rows], length)
         group = [
             _channel(f"{topic.strip('/').replace('/', '.')}.{signal}", s, signals.raw(bits, s), t_s[rows])
             for signal, s in signals.layout(message(name)).items()

@@ -63,6 +63,7 @@ def frames() -> list[can.Message]:
         ),
         can.Message(arbitration_id=0x185, is_extended_id=False, data=b"\x01", timestamp=T0_S + 1.5),  # too short
     ]  # fmt: skip
+    kinds.append(can.Message(arbitration_id=0, data=bytes(8), is_extended_id=False, timestamp=T0_S + 1.6))  # too long
     return [m for n, code in enumerate(X_CODES) for m in pair(n, code)] + kinds
 
 
@@ -105,7 +106,7 @@ def test_the_mcap_reader_has_the_decoded_messages_with_units(tmp_path: Path) -> 
         raw = [json.loads(m.data) for _, _, m in reader.iter_messages(topics=["/can_raw"])]
     assert summary is not None
     assert summary.statistics is not None
-    assert summary.statistics.message_count == len(frames()) + 2 * len(X_CODES)
+    assert summary.statistics.message_count == len(frames()) + 2 * len(X_CODES) + 1  # and NMT
     assert len(raw) == len(frames())
     values = [json.loads(m.data)["X_V"] for _, _, m in found]
     assert values == pytest.approx([code * 10 / 2**23 for code in X_CODES], abs=1e-9)
