@@ -22,8 +22,8 @@ from psabench import cli
 from psabench.conform.sources import mf4
 from psabench.errors import BadInput
 from psabench.link.log_file import LogFile
-from psabench.link.protocol_files import message
-from psabench.logs import mcap_log, records
+from psabench.link.protocol_files import database, message
+from psabench.logs import mcap_log, records, wireshark
 from psabench.logs.formats import read_frames
 from rosbags.highlevel import AnyReader
 
@@ -281,3 +281,31 @@ def test_convert_says_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixtur
     words = line.format(log=log, out=tmp_path / "out.mcap").split()
     assert cli.main(["convert", *words]) == 2
     assert text in capsys.readouterr().err
+
+
+LUA = Path(__file__).resolve().parents[3] / "share/wireshark/psabench.lua"
+
+
+def test_the_dissector_is_that_of_the_dbc() -> None:
+    assert LUA.read_text(encoding="utf-8") == wireshark.lua(), "python -m psabench.logs.wireshark > " + str(LUA)
+
+
+@WITH_TSHARK
+def test_the_dissector_shows_every_signal_as_cantools_decodes_it(tmp_path: Path) -> None:
+    """Each message of the DBC, full of random bits."""
+    chance = random.Random(5)
+    sent = [
+        can.Message(arbitration_id=m.frame_id, data=chance.randbytes(m.length), is_extended_id=False, is_fd=m.length > 8)
+        for m in database().messages
+        for _ in range(4)
+    ]
+    path = write(tmp_path / "bus.pcap", sent)
+    command = ["tshark", "-X", f"lua_script:{LUA}", "-r", str(path), "-T", "json", "-J", "psabench"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    shown = [packet["_source"]["layers"]["psabench"] for packet in json.loads(done.stdout)]
+    assert len(shown) == len(sent)
+    for m, layers in zip(sent, shown, strict=True):
+        name = database().get_message_by_frame_id(m.arbitration_id).name
+        values = message(name).decode(bytes(m.data), decode_choices=False)
+        wanted = {f"psabench.{name}.{records.columns(name)[s]}".lower(): v for s, v in values.items()}
+        assert {k: float(v) for k, v in layers.items()} == pytest.approx(wanted, rel=1e-12)
