@@ -197,7 +197,6 @@ def _writer(path: Path, boards: Mapping[int, str] | None) -> MessageWriter:
     return cast(MessageWriter, kind(path, boards) if path.suffix in DECODING else kind(path))
 
 
-
 def _cut_lines(path: Path) -> int:
     """Cut a file of lines behind its last whole one; how many messages it has."""
     text = path.read_bytes()

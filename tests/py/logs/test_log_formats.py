@@ -295,7 +295,9 @@ def test_the_dissector_shows_every_signal_as_cantools_decodes_it(tmp_path: Path)
     """Each message of the DBC, full of random bits."""
     chance = random.Random(5)
     sent = [
-        can.Message(arbitration_id=m.frame_id, data=chance.randbytes(m.length), is_extended_id=False, is_fd=m.length > 8)
+        can.Message(
+            arbitration_id=m.frame_id, data=chance.randbytes(m.length), is_extended_id=False, is_fd=m.length > 8
+        )
         for m in database().messages
         for _ in range(4)
     ]
