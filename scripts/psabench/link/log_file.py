@@ -36,6 +36,9 @@ class LogFile:
         self._owned = Owned(path)
         try:
             self._writer = _writer(path, boards)
+        except ImportError as e:
+            self._owned.release()
+            raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
         except NotImplementedError as e:
             self._owned.release()
             raise BadInput(f"{path}: {e}") from e

@@ -66,8 +66,11 @@ def _convert(args: argparse.Namespace) -> int:
 
 def _imu(args: argparse.Namespace) -> int:
     from psabench.logs.formats import read_frames
-    from psabench.logs.ros2 import write_imu
 
+    try:
+        from psabench.logs.ros2 import write_imu
+    except ImportError as e:
+        raise BadInput(expected(f"the Python package {e.name}", "none", "--ros2-imu")) from e
     if args.out.suffix != ".mcap":
         raise BadInput(expected("the ending .mcap for --ros2-imu", args.out.suffix or "none", args.out))
     if args.board != "psa2":

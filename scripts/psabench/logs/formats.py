@@ -40,7 +40,10 @@ def _reader(path: Path) -> Callable[[Path], Iterator[can.Message]]:
     if path.suffix not in READERS:
         return read_python_can
     module, _, name = READERS[path.suffix].partition(":")
-    function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
+    try:
+        function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
+    except ImportError as e:
+        raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
     return function
 
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from psabench.errors import expected
+from psabench.errors import BadInput, expected
 from psabench.options import CAN_HELP, Parser, add_board, node_of, positive
 
 PORT = 8765  # what Foxglove offers
@@ -40,7 +40,11 @@ def _port(text: str) -> int:
 
 def _view(args: argparse.Namespace) -> int:
     from psabench.link.can_host import open_bus
-    from psabench.logs.view import view
+
+    try:
+        from psabench.logs.view import view
+    except ImportError as e:
+        raise BadInput(expected(f"the Python package {e.name}", "none", "view")) from e
 
     def ready(address: str) -> None:
         print(f"ready {address}", flush=True)

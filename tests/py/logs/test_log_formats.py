@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import shutil
 import struct
 import subprocess
@@ -311,3 +312,21 @@ def test_the_dissector_shows_every_signal_as_cantools_decodes_it(tmp_path: Path)
         values = message(name).decode(bytes(m.data), decode_choices=False)
         wanted = {f"psabench.{name}.{records.columns(name)[s]}".lower(): v for s, v in values.items()}
         assert {k: float(v) for k, v in layers.items()} == pytest.approx(wanted, rel=1e-12)
+
+
+WITHOUT = (
+    "import sys; sys.modules.update({'mcap': None, 'mcap_ros2': None, 'foxglove': None}); import psabench.cli as c; "
+)
+
+
+@pytest.mark.parametrize(
+    "line", ["convert {log} {out}", "convert {out} new.pcap", "convert {log} {out} --ros2-imu", "view --can virtual:x"]
+)
+def test_a_package_that_is_missing_is_named(tmp_path: Path, line: str) -> None:
+    log, out = write(tmp_path / "bus.log", frames()), write(tmp_path / "bus.mcap", frames())
+    words = line.format(log=log, out=out).split()
+    done = subprocess.run(
+        [sys.executable, "-c", f"{WITHOUT} sys.exit(c.main({words}))"], capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert re.search(r"expected the Python package (mcap|foxglove)\S*, got none\n$", done.stderr)
