@@ -73,10 +73,10 @@ C_STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 
 # Texts of another form that stay, by file: part of the text, and why. A row goes with its text.
 DECLARED = {
-    ("scripts/psabench/boards/decode.py", "is damaged"): "the messages before the damage are decoded",
     ("scripts/psabench/boards/gyro/device.py", "rejected by the unit"): "the unit's own text",
     ("scripts/psabench/campaign/emulated.py", "psa-emu: "): "the emulator's own text",
     ("scripts/psabench/link/canopen_host.py", "remote frames"): "not supported by the transports",
+    ("scripts/psabench/logs/formats.py", "is damaged"): "the messages before the damage are decoded",
     ("scripts/psabench/options.py", "next(texts"): "argparse's messages, in this form where options.py knows them",
 }
 # The count of C texts of another form: states of links, files and the bus, and input texts to rewrite. Only lower it.

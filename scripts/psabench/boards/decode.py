@@ -1,27 +1,23 @@
-"""`psabench decode`: a CAN log (any format python-can reads) or a line-port capture into a CSV of SI values."""
+"""`psabench decode`: a CAN log (any format of psabench.logs) or a line-port capture into a CSV of SI values."""
 
 from __future__ import annotations
 
 import csv
-import struct
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
-import can
 import numpy as np
-from can.io.player import MESSAGE_READERS
 
 from psabench.boards.devices import of_board, reader_of
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import BadInput, expected
-from psabench.lcm.can_io import LcmReader
-from psabench.lcm.event_log import ENDING as LCM
 from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
+from psabench.logs.formats import READABLE, read_frames
 
 CHUNK = 4096  # samples decoded at once
 
@@ -37,9 +33,8 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
     """
-    endings = sorted({*MESSAGE_READERS, LCM})
-    if path.suffix not in endings:
-        raise BadInput(expected(f"an ending of {' '.join(endings)}", path.suffix or "none", path))
+    if path.suffix not in READABLE:
+        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
     _check_there(path)
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
@@ -69,23 +64,16 @@ def _check_there(path: Path) -> None:
 
 def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
     """Frames of the reader's node, some at a time; `ids` collects the 11-bit identifiers of all data frames."""
-    read = 0
     try:
-        with LcmReader(path) if path.suffix == LCM else can.LogReader(str(path)) as log:
-            for read, m in enumerate(log, start=1):  # noqa: B007 (the number is in the message below)
-                reader.on_message(m)
-                if not (m.is_extended_id or m.is_error_frame or m.is_remote_frame):
-                    ids.add(m.arbitration_id)
-                if len(reader) >= CHUNK:
-                    yield reader.take()
+        for m in read_frames(path):
+            reader.on_message(m)
+            if not (m.is_extended_id or m.is_error_frame or m.is_remote_frame):
+                ids.add(m.arbitration_id)
+            if len(reader) >= CHUNK:
+                yield reader.take()
     except BadInput:
         yield reader.take()  # what came before the damage is good
         raise
-    except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
-    except (ValueError, IndexError, KeyError, EOFError, struct.error) as e:
-        yield reader.take()  # what came before the damage is good
-        raise BadInput(f"{path}: message {read + 1} is damaged ({e}); the {read} messages before it are decoded") from e
     yield reader.take()
 
 

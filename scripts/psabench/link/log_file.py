@@ -1,4 +1,4 @@
-"""Logs in python-can's formats, with the number of messages that are on the disk.
+"""Logs in python-can's formats and our own (psabench.logs), with the number of messages that are on the disk.
 
 python-can's writers buffer, and one of them (SQLite) writes on a thread of its own, whose failure it does not report.
 Here a message counts when it is stored: after an error the file is cut behind its last whole record and read back.
@@ -8,31 +8,27 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 import can
 from can.io.generic import MessageWriter, TextIOMessageWriter
 from can.io.logger import MESSAGE_WRITERS
-from can.io.mf4 import MF4Writer
 
 from psabench.errors import BadInput, BenchError, expected, output_error
 from psabench.lcm.can_io import LcmWriter
-from psabench.lcm.event_log import ENDING as LCM
 from psabench.link.own import OutputFile, Owned, sqlite_error
-
-FORMATS = sorted({*MESSAGE_WRITERS, LCM})  # by ending: .log candump, .blf and .asc Vector, .mf4 (with asammdf) ...
-MF4_MESSAGE, MF4_LEAST = 128, 65_536  # bytes of a message before compression, at most, and of the file's own blocks
 
 
 class LogFile:
     """Writes messages into a file of its own. `error` is what ended it, if the machine did."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises BadInput for an unknown ending, a path that cannot be written, a file of another process."""
+    def __init__(self, path: Path, boards: Mapping[int, str] | None = None) -> None:
+        """boards: by node, for formats that decode. Raises BadInput: unknown ending, path, file of another process."""
         if path.suffix not in FORMATS:
             raise BadInput(expected(f"an ending of {' '.join(FORMATS)}", path.suffix or "none", path))
         self.path = path
@@ -40,7 +36,10 @@ class LogFile:
         self._written = 0
         self._owned = Owned(path)
         try:
-            self._writer = {**MESSAGE_WRITERS, **WRITERS}[path.suffix](path)
+            self._writer = _writer(path, boards)
+        except ImportError as e:
+            self._owned.release()
+            raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
         except NotImplementedError as e:
             self._owned.release()
             raise BadInput(f"{path}: {e}") from e
@@ -181,35 +180,6 @@ def _sqlite_errors() -> Iterator[None]:
         raise sqlite_error(e) from e
 
 
-class Mf4(MF4Writer, Checked):
-    """The format is written at the end: the recording ends while there is room for it."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._messages, self._saved = path, 0, False
-        super().__init__(path)
-
-    def on_message_received(self, m: can.Message) -> None:
-        super().on_message_received(m)
-        self._messages += 1
-
-    def check(self) -> None:
-        kept, free = MF4_MESSAGE * self._messages, shutil.disk_usage(self._path.parent).free
-        if free < kept + MF4_LEAST:
-            full = os.strerror(errno.ENOSPC)
-            raise OSError(errno.ENOSPC, f"{full}: {free} bytes are left, up to {kept} are kept until the end")
-
-    def stop(self) -> None:
-        try:
-            super().stop()
-            self._saved = True
-        finally:
-            if not self._saved:
-                os.truncate(self._path, 0)  # a part of such a file cannot be read
-
-    def stored(self, written: int) -> int:
-        return written if self._saved else 0
-
-
 class Lcm(LcmWriter, Checked):
     """An event log of LCM. An event that does not fit is taken back."""
 
@@ -228,7 +198,26 @@ class Lcm(LcmWriter, Checked):
         return self.count
 
 
-WRITERS: dict[str, Callable[[Path], MessageWriter]] = {".blf": Blf, ".db": Db, ".mf4": Mf4, LCM: Lcm}
+# Writers of our own by ending: module and class, loaded when such a file is written.
+WRITERS = {
+    ".blf": "psabench.link.log_file:Blf",
+    ".db": "psabench.link.log_file:Db",
+    ".lcmlog": "psabench.link.log_file:Lcm",
+    ".mcap": "psabench.logs.mcap_log:Mcap",
+    ".mf4": "psabench.logs.mf4_log:Mf4",
+    ".pcap": "psabench.logs.pcap:Pcap",
+}
+DECODING = (".mcap", ".mf4")  # they hold decoded messages, too
+FORMATS = sorted({*MESSAGE_WRITERS, *WRITERS})  # .log candump, .blf and .asc Vector ...
+
+
+def _writer(path: Path, boards: Mapping[int, str] | None) -> MessageWriter:
+    """boards: by node, where they differ from the DBC's."""
+    if path.suffix not in WRITERS:
+        return MESSAGE_WRITERS[path.suffix](path)
+    module, _, name = WRITERS[path.suffix].partition(":")
+    kind = getattr(import_module(module), name)
+    return cast(MessageWriter, kind(path, boards) if path.suffix in DECODING else kind(path))
 
 
 def _cut_lines(path: Path) -> int:

@@ -1,4 +1,4 @@
-"""`psabench record`: all that is on the bus into a file of python-can's own formats, the stream's health counted."""
+"""`psabench record`: all that is on the bus into a log file, the stream's health counted."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def record(
     reader = reader_of(board, node)
     stamps: list[float] = []  # of the first and the last message
     received = 0
-    with _ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
-        log = LogFile(path)
+    with ctrl_c_noted() as pressed, CanHost(bus, WallClock()) as host:
+        log = LogFile(path, {node: board})
 
         def keep(m: Message) -> None:
             nonlocal received
@@ -61,7 +61,7 @@ def record(
         host.listeners.append(keep)
         broken = None
         try:
-            _receive(host, for_s, count, lambda: pressed() or log.error is not None, log.check)
+            receive_until(host, for_s, count, lambda: pressed() or log.error is not None, log.check)
         except LinkError as e:
             broken = str(e)
         finally:
@@ -79,7 +79,7 @@ def record(
 
 
 @contextmanager
-def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
+def ctrl_c_noted() -> Iterator[Callable[[], bool]]:
     """Ctrl-C is the usual way to end a recording; it takes effect between two messages, never inside one."""
     pressed: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
@@ -89,7 +89,7 @@ def _ctrl_c_noted() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _receive(
+def receive_until(
     host: CanHost, for_s: float | None, count: int | None, stop: Callable[[], bool], look: Callable[[], object]
 ) -> None:
     """Receive until it is over, with a look at the file every LOOK_S of real time."""

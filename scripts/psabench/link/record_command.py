@@ -13,12 +13,13 @@ from psabench.options import CAN_HELP, Parser, add_board, natural, node_of, posi
 if TYPE_CHECKING:
     import can
 
-FORMATS = ".asc .blf .csv .db .lcmlog .log .mf4 .trc .txt"  # of python-can and LCM, without loading it
+FORMATS = ".asc .blf .csv .db .lcmlog .log .mcap .mf4 .pcap .trc .txt"  # of log_file, without loading it
 
 EPILOG = """\
 examples:
   psabench record run.log --can socketcand:127.0.0.1:29536         until Ctrl-C, candump -L format
   psabench record run.blf --can slcan:/dev/ttyACM0 --for 60        one minute, for CANalyzer
+  psabench record run.mcap --can socketcand:127.0.0.1:29536        for Foxglove and PlotJuggler, decoded as well
   psabench record run.asc --can socketcan:vcan0,fd=true --count 1000
   psabench record run.lcmlog --can socketcand:127.0.0.1:29536      for lcm-logplayer
   psabench record run.log --lcm udpm://239.255.76.67:7667          what psa-emu --lcm publishes

@@ -13,6 +13,7 @@ import pytest
 from psabench.conform.sources import mf4
 from psabench.errors import BadInput
 from psabench.link.log_file import FORMATS, LogFile
+from psabench.logs.formats import read_frames
 
 MESSAGES = 10_000
 WITH_MF4 = pytest.mark.skipif(not mf4.asammdf_is_there(), reason="asammdf is not there: make setup")
@@ -46,8 +47,7 @@ print(json.dumps([given, stored, str(log.error), log.error.exit_status if log.er
 
 
 def counted(command: Sequence[str], ending: str) -> tuple[int, int, str, int]:
-    asammdf = {"PYTHONPATH": str(mf4.FOLDER)} if ending == ".mf4" else {}  # python-can would load it each time
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | asammdf, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     given, stored, error, status = json.loads(done.stdout.splitlines()[-1])
@@ -55,20 +55,8 @@ def counted(command: Sequence[str], ending: str) -> tuple[int, int, str, int]:
 
 
 def read_back(path: Path) -> Iterator[tuple[int, bytes, float]]:
-    if path.suffix == ".mf4":
-        path = log_of_mf4(path)
-    with can.LogReader(path) as messages:
-        for m in messages:
-            yield m.arbitration_id, bytes(m.data), m.timestamp
-
-
-def log_of_mf4(path: Path) -> Path:
-    lines, why = mf4.candump_of(path, 1e12, 10 * MESSAGES)
-    assert why == ""
-    out = path.with_suffix(".from_mf4.log")
-    with lines:
-        out.write_bytes(lines.read())
-    return out
+    for m in read_frames(path):
+        yield m.arbitration_id, bytes(m.data), m.timestamp
 
 
 def assert_the_first(path: Path, stored: int) -> None:

@@ -52,7 +52,7 @@ def candump_of(path: Path, max_s: float, most_frames: int) -> tuple[IO[bytes], s
         bounds = [str(n) for n in (max_s, most_frames, MOST_MEMORY, MOST_CPU_S)]
         status = subprocess.run(
             [sys.executable, "-P", "-W", "ignore", __file__, str(path), *bounds],
-            env=os.environ | ONE_THREAD | {"TMPDIR": scratch, "PYTHONPATH": _search_path()},
+            env=os.environ | ONE_THREAD | {"TMPDIR": scratch, "PYTHONPATH": search_path()},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=words,
@@ -63,7 +63,7 @@ def candump_of(path: Path, max_s: float, most_frames: int) -> tuple[IO[bytes], s
     return log, trouble
 
 
-def _search_path() -> str:
+def search_path() -> str:
     return os.pathsep.join(filter(None, (str(FOLDER), os.environ.get("PYTHONPATH", ""))))
 
 
@@ -103,7 +103,7 @@ def _convert(path: str, max_s: float, most_frames: int, out: TextIO) -> None:
     writer.stop()
 
 
-def _limit(what: int, most: int) -> None:
+def limit(what: int, most: int) -> None:
     hard = resource.getrlimit(what)[1]
     resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
@@ -116,10 +116,10 @@ def _main(path: str, *bounds: str) -> None:
     out, sys.stdout = sys.stdout, sys.stderr
     used = resource.getrusage(resource.RUSAGE_SELF)
     cpu_s += round(used.ru_utime + used.ru_stime) + 1
-    _limit(resource.RLIMIT_AS, memory)
-    _limit(resource.RLIMIT_CPU, cpu_s)
-    _limit(resource.RLIMIT_FSIZE, MOST_LOG)
-    _limit(resource.RLIMIT_CORE, 0)
+    limit(resource.RLIMIT_AS, memory)
+    limit(resource.RLIMIT_CPU, cpu_s)
+    limit(resource.RLIMIT_FSIZE, MOST_LOG)
+    limit(resource.RLIMIT_CORE, 0)
     try:
         _convert(path, max_s, most_frames, out)
     except Exception as e:  # asammdf raises whatever its parsing comes to

@@ -1,0 +1,75 @@
+"""CAN logs by ending: one table of what reads them. psabench.link.log_file has the table of what writes them."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import can
+from can.io.player import MESSAGE_READERS
+
+from psabench.errors import BadInput, expected
+
+READERS: Mapping[str, str] = {  # our own: module and function
+    ".lcmlog": "psabench.lcm.frames:read_frames",
+    ".mcap": "psabench.logs.mcap_log:read_mcap",
+    ".mf4": "psabench.logs.formats:read_mf4",
+    ".pcap": "psabench.logs.pcap:read_pcap",
+}
+READABLE = sorted({*MESSAGE_READERS, *READERS})
+DAMAGE = (ValueError, IndexError, KeyError, EOFError, struct.error)  # what python-can's readers raise
+ALL_S, ALL_FRAMES = 1e12, 1 << 40
+
+
+def read_frames(path: Path) -> Iterator[can.Message]:
+    """Frames of a log, in the order of the file. Raises BadInput at a damage, after the frames before it."""
+    if path.suffix not in READABLE:
+        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
+    if not path.exists() or path.is_dir():
+        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+    try:
+        yield from _reader(path)(path)
+    except OSError as e:
+        raise BadInput(f"{path}: {e.strerror}") from e
+
+
+def _reader(path: Path) -> Callable[[Path], Iterator[can.Message]]:
+    if path.suffix not in READERS:
+        return read_python_can
+    module, _, name = READERS[path.suffix].partition(":")
+    try:
+        function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
+    except ImportError as e:
+        raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
+    return function
+
+
+def read_python_can(path: Path) -> Iterator[can.Message]:
+    """Raises BadInput for a damaged file."""
+    read = 0
+    try:
+        with can.LogReader(str(path)) as log:
+            for m in log:
+                yield m
+                read += 1
+    except DAMAGE as e:
+        raise BadInput(f"{path}: message {read + 1} is damaged ({e}); the {read} messages before it are decoded") from e
+
+
+def read_mf4(path: Path) -> Iterator[can.Message]:
+    """By asammdf in a process of its own. Raises BadInput."""
+    from psabench.conform.sources.mf4 import candump_of
+
+    try:
+        log, trouble = candump_of(path, ALL_S, ALL_FRAMES)
+    except ValueError as e:
+        raise BadInput(f"{path}: {e}") from e
+    reader: Any = can.CanutilsLogReader
+    with io.TextIOWrapper(log, encoding="utf-8") as text:
+        yield from reader(text)
+    if trouble:
+        raise BadInput(expected("a whole log", trouble, path))
