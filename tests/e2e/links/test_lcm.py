@@ -120,7 +120,7 @@ def test_readings_in_each_frame_form_are_those_of_the_host_s_decoder(tmp_path: P
 
 
 # What a board's readings have in common with the columns of the host's decoder: field, column, factor.
-COLUMNS = {
+COLUMNS: dict[str, list[tuple[str, str, float]]] = {
     "psd1": [("x_code", "X", 1), ("y_code", "Y", 1), ("z_code", "Z", 1), ("count", "CNT", 1), ("read_x", "READ_X", 1)],
     "pmka": [("x_v", "X", 1), ("z_v", "Z", 1), ("k_v", "K", 1), ("temp_degc", "T", 1), ("sequence", "SEQ", 1)],
     "pik": [("x_pulses", "X", 1), ("y_pulses", "Y", 1), ("z_pulses", "Z", 1), ("sequence", "SEQ", 1)],

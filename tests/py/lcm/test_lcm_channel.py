@@ -83,7 +83,7 @@ def test_progress_and_result_are_published_and_shown() -> None:
         link: lcm.LCM = out._channel  # type: ignore[assignment]
         got: list[tuple[str, dict[str, object]]] = []
         for channel, kind in (("PSABENCH_PROGRESS", "progress_t"), ("PSABENCH_RESULT", "result_t")):
-            link.subscribe(channel, lambda c, d, k=kind: got.append((c, lcm_type(k).decode(d))))
+            link.subscribe(channel, lambda c, d, k=kind: got.append((c, lcm_type(k).decode(d))))  # type: ignore[misc]
         with LcmProgress(out, "turns", Shown()).step("turns, direct", 3) as advance:
             for k in range(3):
                 shown.append(k)

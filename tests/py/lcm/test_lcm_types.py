@@ -54,7 +54,7 @@ def random_values(kind: LcmType, rng: random.Random) -> dict[str, Any]:
         if m.name in counts:
             values[m.name] = rng.randrange(9)
             continue
-        count = int(m.size) if m.size.isdecimal() else values.get(m.size)
+        count = int(m.size if m.size.isdecimal() else values.get(m.size, 0))
         if m.kind == "byte":
             values[m.name] = rng.randbytes(count)
         else:

@@ -140,7 +140,7 @@ static const struct {
     {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1:21: units.a.temp_degc: expected one value or a list of 4 numbers"},
     {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1:21: units.a.temp_degc: expected -60 to 125, got 200"},
     {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
-     "dir/s.yaml:4:17: units.a.axes.x.sensor: expected none, mems or quartz"},
+     "dir/s.yaml:4:17: units.a.axes.x.sensor: expected none, mems, quartz or recorded"},
     {"units:\n  - axes: {x: {sensor: quartz}}\n",
      "dir/s.yaml:2:11: units.a.axes: x: expected afe: {input: current} for a quartz sensor"},
     {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n",

@@ -125,8 +125,9 @@ static void armed_again_it_has_the_end_of_the_last_capture_as_its_pre_trigger(vo
     trace_set(&trace, INT, true, 510);
     trace_set(&trace, CLK, true, 600);
     trace_advance(&trace, 650);
-    fclose(begin_file());
+    FILE *first = begin_file();
     capture_end(&capture);
+    fclose(first);
     trace_set(&trace, INT, false, 700);
     trace_advance(&trace, 800);
     assert_int_equal(capture.trigger_ns, 700);
