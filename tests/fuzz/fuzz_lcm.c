@@ -49,16 +49,25 @@ CHECK(register_t)
 CHECK(instruments_t)
 CHECK(truth_t)
 
+/* Not decoded: the decoder of lcm-gen gives memcpy() a null pointer for a frame without data. */
 static void check_frame(const void *data, int len)
 {
-    psabench_lcm_can_frame_t f;
-    assert(psabench_lcm_can_frame_t_decode(data, 0, len, &f) == len);
-    const struct can_msg *m = &w.sent;
-    assert(strcmp(f.bus, "can0") == 0 && (uint32_t)f.id == m->id && f.length == m->len);
-    assert(f.remote == ((m->flags & CAN_RTR) != 0) && f.extended == ((m->flags & CAN_EXT) != 0));
-    assert(f.fd == ((m->flags & CAN_FD) != 0) && f.brs == ((m->flags & CAN_BRS) != 0) && !f.error);
-    assert(f.size == (f.remote ? 0 : m->len) && memcmp(f.data, m->data, (size_t)f.size) == 0);
-    psabench_lcm_can_frame_t_decode_cleanup(&f);
+    uint8_t want[LCM_MESSAGE_MAX];
+    struct can_msg *m = &w.sent;
+    const bool remote = m->flags & CAN_RTR;
+    char bus[] = "can0";
+    const psabench_lcm_can_frame_t f = {.t_ns = w.s.now_ns,
+                                        .epoch_ns = 1,
+                                        .bus = bus,
+                                        .id = (int32_t)m->id,
+                                        .extended = (m->flags & CAN_EXT) != 0,
+                                        .remote = remote,
+                                        .fd = (m->flags & CAN_FD) != 0,
+                                        .brs = (m->flags & CAN_BRS) != 0,
+                                        .length = m->len,
+                                        .size = remote ? 0 : m->len,
+                                        .data = m->data};
+    assert(psabench_lcm_can_frame_t_encode(want, 0, sizeof want, &f) == len && memcmp(want, data, (size_t)len) == 0);
     w.frames++;
 }
 
