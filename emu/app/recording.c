@@ -107,14 +107,13 @@ static void check_all(struct service *s, bool look)
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) check_log(s, &s->ports.can[i]->log, look);
     if (s->truth_log.out) check_truth(s, look);
-    if (s->lcm) service_check_lcm(s, look);
 }
 
 static bool has_files(const struct service *s)
 {
     bool log = false;
     for (unsigned i = 0; i < s->ports.can_count; i++) log |= s->ports.can[i]->kind == OPTIONS_CAN_LOG;
-    return log || s->bench->recording || s->truth_log.out || s->lcm;
+    return log || s->bench->recording || s->truth_log.out;
 }
 
 void service_check_files(struct service *s)
@@ -134,7 +133,7 @@ void service_end_files(struct service *s)
     s->bench->recording = recorded; /* for check_all() */
     for (unsigned i = 0; i < s->ports.can_count; i++)
         if (s->ports.can[i]->kind == OPTIONS_CAN_LOG) (void)can_log_flush(&s->ports.can[i]->log);
-    if (s->lcm) service_flush_lcm(s);
+    if (s->lcm) service_end_lcm(s);
     check_all(s, true);
     s->bench->recording = false;
     const bool reported = s->truth_log.reported;

@@ -41,6 +41,7 @@ struct service {
     struct capture_job capture;
     struct lcm_feed *lcm; /* --lcm; NULL: none */
     bool lcm_reported;    /* that its file failed, or that messages were lost */
+    int64_t lcm_look_ns;  /* wall time of the next look whether its file is there */
     struct snapshot_observers observers;
     struct link input; /* --until-eof */
 };
@@ -91,8 +92,7 @@ bool service_is_sliced(void *ctx);               /* for loop.sliced */
 
 /* service_lcm.c, or service_no_lcm.c where the emulator is built without LCM */
 bool service_open_lcm(struct service *s, char *why, size_t cap);
-void service_flush_lcm(struct service *s);
-void service_check_lcm(struct service *s, bool look);
+void service_end_lcm(struct service *s); /* all goes into the file, which is looked at */
 void service_describe_lcm(const struct service *s, cJSON *files);
 void service_print_lcm(const struct service *s);
 void service_close_lcm(struct service *s);

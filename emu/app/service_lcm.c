@@ -9,19 +9,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-bool service_open_lcm(struct service *s, char *why, size_t cap)
-{
-    if (!s->o->lcm) return true;
-    struct lcm_feed *f = calloc(1, sizeof *f);
-    if (!f) return why_fail(why, cap, "--lcm: out of memory");
-    if (!lcm_port_open(&f->port, s->o->lcm, &s->refused, why, cap)) {
-        free(f);
-        return false;
-    }
-    lcm_feed_start(f, &s->view, s->o->epoch_ns, s->o->lcm_truth ? s->o->truth_every_ns : 0);
-    s->lcm = f;
-    return true;
-}
+#define LOOK_NS INT64_C(1000000000) /* wall time between two checks that the file is still there */
 
 static void check_file(struct service *s, struct lcm_log *l, bool look)
 {
@@ -44,16 +32,43 @@ static void check_network(struct service *s, const struct lcm_udpm *u)
     service_say(text);
 }
 
-void service_flush_lcm(struct service *s)
-{
-    if (s->lcm->port.url.kind == LCM_FILE) (void)lcm_log_flush(&s->lcm->port.log);
-}
-
-void service_check_lcm(struct service *s, bool look)
+static void check_port(struct service *s, bool look)
 {
     struct lcm_port *p = &s->lcm->port;
     if (p->url.kind == LCM_FILE) check_file(s, &p->log, look);
     else check_network(s, &p->udpm);
+}
+
+/* On the feed's own event: a run without it does not ask. */
+static void on_tick(void *ctx)
+{
+    struct service *s = ctx;
+    const int64_t now_ns = pace_clock_ns();
+    const bool look = now_ns >= s->lcm_look_ns;
+    if (look) s->lcm_look_ns = now_ns + LOOK_NS;
+    check_port(s, look);
+}
+
+void service_end_lcm(struct service *s)
+{
+    if (s->lcm->port.url.kind == LCM_FILE) (void)lcm_log_flush(&s->lcm->port.log);
+    check_port(s, true);
+}
+
+bool service_open_lcm(struct service *s, char *why, size_t cap)
+{
+    if (!s->o->lcm) return true;
+    struct lcm_feed *f = calloc(1, sizeof *f);
+    if (!f) return why_fail(why, cap, "--lcm: out of memory");
+    if (!lcm_port_open(&f->port, s->o->lcm, &s->refused, why, cap)) {
+        free(f);
+        return false;
+    }
+    f->tick = on_tick;
+    f->ctx = s;
+    s->lcm = f;
+    lcm_feed_start(f, &s->view, s->o->epoch_ns, s->o->lcm_truth ? s->o->truth_every_ns : 0);
+    return true;
 }
 
 void service_describe_lcm(const struct service *s, cJSON *files)

@@ -9,15 +9,9 @@ bool service_open_lcm(struct service *s, char *why, size_t cap)
                     "--lcm: expected an emulator built with LCM (Debian: liblcm-bin, liblcm-dev), got one without");
 }
 
-void service_flush_lcm(struct service *s)
+void service_end_lcm(struct service *s)
 {
     (void)s;
-}
-
-void service_check_lcm(struct service *s, bool look)
-{
-    (void)s;
-    (void)look;
 }
 
 void service_describe_lcm(const struct service *s, cJSON *files)

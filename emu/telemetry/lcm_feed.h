@@ -42,7 +42,9 @@ struct lcm_bus {
 };
 
 struct lcm_feed {
-    struct lcm_port port; /* open before lcm_feed_start() */
+    struct lcm_port port;    /* open before lcm_feed_start() */
+    void (*tick)(void *ctx); /* after each message of the instruments; may be NULL */
+    void *ctx;
     const struct control_bench *bench;
     int64_t epoch_ns;       /* added to the simulated time */
     int64_t truth_every_ns; /* 0: no truth */
