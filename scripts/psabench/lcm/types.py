@@ -180,8 +180,8 @@ def _unpacked(m: Member, rest: _Rest, values: Mapping[str, Any]) -> Any:
     if m.kind == "byte":
         return rest.take(count)
     if m.kind == "string":
-        if not 0 <= count <= rest.left // 5:  # a length and a NUL at least
-            raise ValueError(expected(f"at most {rest.left // 5} texts", count, f"{rest.name}.{m.name}"))
+        if count < 0:
+            raise ValueError(expected("0 texts or more", count, f"{rest.name}.{m.name}"))
         return tuple(_unpacked_one(m.kind, rest) for _ in range(count))
     kind = _FORMATS[m.kind]
     data = rest.take(count * struct.calcsize(">" + kind))

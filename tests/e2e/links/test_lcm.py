@@ -116,6 +116,9 @@ def test_readings_in_each_frame_form_are_those_of_the_host_s_decoder(tmp_path: P
         assert np.array_equal(column(got, "sequence"), want.seq if form == 0 else np.full(len(got), -1))
         stamps = column(got, "t_sample_s")
         assert np.all(np.isnan(stamps)) if form == 1 else stamps[0] == pytest.approx(want.t_sample_s[0], abs=1e-9)
+        assert not np.any(np.isnan(stamps[:: 5 if form == 3 else 1])) or form == 1
+        if form == 3:  # the frame has the instant of its first sample alone
+            assert np.all(np.isnan(stamps.reshape(-1, 5)[:, 1:]))
         assert np.array_equal(column(got, "sample"), np.arange(len(got)) % 5 if form == 3 else np.zeros(len(got)))
 
 

@@ -129,6 +129,13 @@ def test_a_count_is_not_believed(name: str, field: str, count: int) -> None:
         kind.decode(data[:at] + struct.pack(">i", count) + data[at + 4 :])
 
 
+def test_a_count_below_zero_is_refused_even_where_nothing_follows() -> None:
+    kind = parse("package a; struct b { int32_t n; string s[n]; }")
+    with pytest.raises(ValueError, match=r"b.s: expected 0 texts or more, got -1"):
+        kind.decode(kind.fingerprint + struct.pack(">i", -1))
+    assert kind.decode(kind.fingerprint + struct.pack(">i", 0)) == {"n": 0, "s": ()}
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [({"id": 1 << 31}, "can_frame_t.id: expected int32_t"), ({"bus": 5}, "bus"), ({"size": 3}, "expected 3 elements")],
