@@ -174,7 +174,7 @@ def test_register_accesses_are_published_with_their_names(make_rig: MakeRig, tmp
     rig = make_rig("socketcand", extra=["--lcm", f"file://{path}"])
     rig.host.advance(0.5)  # until the board has been set up
     node = rig.unit.node
-    assert node.read(0x2000, 2) == 0x52
+    assert node.read(0x2000, 2) == 0x56
     node.write(0x2000, 3, 0x09)
     with pytest.raises(Exception, match=r"(?i)06010002|read-only|abort"):
         node.write(0x2000, 1, 0x00)
@@ -184,7 +184,7 @@ def test_register_accesses_are_published_with_their_names(make_rig: MakeRig, tmp
     keys = ("object", "name", "address", "index", "sub", "write", "value", "abort")
     got = [tuple(v[k] for k in keys) for v in on(list(read_events(path)), "PSABENCH_REGISTER_a")]
     x = "Accelerometer converter X"
-    assert (x, "CONFIG0", 1, 0x2000, 2, False, 0x52, 0) in got
+    assert (x, "CONFIG0", 1, 0x2000, 2, False, 0x56, 0) in got
     assert (x, "CONFIG1", 2, 0x2000, 3, True, 0x09, 0) in got
     assert (x, "ID", 0, 0x2000, 1, True, 0, 0x06010002) in got
     assert ("", "", -1, 0x5000, 0, False, 0, 0x06020000) in got
@@ -196,7 +196,7 @@ def test_instruments_show_what_their_readouts_show(make_rig: MakeRig, tmp_path: 
     rig = make_rig("socketcand", scenario, extra=["--lcm", f"file://{path}"])
     rig.control.call("head.turn", angle_deg=30.0)
     rig.control.call("table.rate", axis=1, rate_dps=10.0)
-    rig.control.call("run", for_s=20.05)
+    rig.host.advance(20.05)
     shown = {name: rig.control.call(f"{name}.read").result for name in ("head", "supply", "chamber")}
     assert rig.emulator.stop() == 0
     events = list(read_events(path))
