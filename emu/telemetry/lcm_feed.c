@@ -79,9 +79,11 @@ static void init_bus(struct lcm_feed *f, unsigned i)
     struct lcm_bus *b = &f->bus[i];
     const struct control_bench *bench = f->bench;
     b->feed = f;
-    if (bench->bus_name[i]) snprintf(b->name, sizeof b->name, "%.15s", bench->bus_name[i]);
-    else snprintf(b->name, sizeof b->name, "can%u", i % CONTROL_BUSES_MAX);
-    snprintf(b->frames, sizeof b->frames, "PSABENCH_CAN_%.15s", b->name);
+    char name[sizeof b->name] = "";
+    if (bench->bus_name[i]) snprintf(name, sizeof name, "%.15s", bench->bus_name[i]);
+    else snprintf(name, sizeof name, "can%u", i % CONTROL_BUSES_MAX);
+    memcpy(b->name, name, sizeof name);
+    snprintf(b->frames, sizeof b->frames, "PSABENCH_CAN_%s", name);
     memset(b->unit_of, LCM_NO_UNIT, sizeof b->unit_of);
     b->node = (struct can_node){.name = "lcm", .fd = true, .rx = on_frame, .error = on_error, .ctx = b};
     can_attach(bench->bus[i], &b->node);
