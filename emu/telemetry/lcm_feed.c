@@ -79,7 +79,7 @@ static void init_bus(struct lcm_feed *f, unsigned i)
     struct lcm_bus *b = &f->bus[i];
     const struct control_bench *bench = f->bench;
     b->feed = f;
-    char name[sizeof b->name];
+    char name[sizeof b->name] = "";
     if (bench->bus_name[i]) snprintf(name, sizeof name, "%.15s", bench->bus_name[i]);
     else snprintf(name, sizeof name, "can%u", i % CONTROL_BUSES_MAX);
     memcpy(b->name, name, sizeof name);

@@ -242,7 +242,7 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
         (
             "record --can socketcand:127.0.0.1:{port} {dir}/x.xyz",
             2,
-            "expected an ending of .asc .blf .csv .db .log .mf4 .trc .txt, got .xyz",
+            "expected an ending of .asc .blf .csv .db .lcmlog .log .mcap .mf4 .pcap .trc .txt, got .xyz",
         ),
         ("record --can socketcand:127.0.0.1:{port} {dir}/no/x.log", 2, "No such file or directory"),
         ("decode {dir}/no.log", 2, "no.log: no such file"),
