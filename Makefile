@@ -62,7 +62,8 @@ CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi 
 NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
 INSTALL  = BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' LIBDIR='$(LIBDIR)' VERSION='$(VERSION)' ABI=$(ABI_psabench) NAV_ABI=$(ABI_psabench-nav) tools/install
 UNIT_BIN := $(patsubst %,$(BUILD)/tests/%,$(basename $(notdir $(UNIT))))
-FUZZ      ?= $(sort $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)))
+FUZZ_SRC  := $(sort $(wildcard tests/fuzz/fuzz_*.c tests/fuzz/*/fuzz_*.c))
+FUZZ      ?= $(sort $(patsubst fuzz_%.c,%,$(notdir $(FUZZ_SRC))))
 FUZZ_BIN := $(FUZZ:%=$(BUILD)/fuzz/fuzz_%)
 BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
 
@@ -112,7 +113,7 @@ $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer
 $(BUILD)/tests/test_nav: $(BUILD)/libpsabench-nav.a
 $(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
-$(foreach t,$(FUZZ),$(eval $(BUILD)/fuzz/fuzz_$(t): $(BUILD)/obj/tests/fuzz/fuzz_$(t).o))
+$(foreach t,$(FUZZ_SRC),$(eval $(BUILD)/fuzz/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach c,ads1282 ads1256 ad7712,$(eval $(filter $(BUILD)/fuzz/fuzz_$(c)_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/support/$(c)_world.o))
 $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
@@ -167,7 +168,7 @@ bench: ## speed beside Verilog models of the same board and against the targets,
 	@PYTHONPATH=tools BENCH_CC='$(CC)' BENCH_CFLAGS='$(CFLAGS)' $(PY) -m tests.bench.run --seconds $(BENCH_S)
 bench-bin: all $(BENCH_BIN)
 FUZZ_MAKE := $(MAKE) --no-print-directory CC=clang SAN=address,undefined,fuzzer-no-link BUILD=build-fuzz
-fuzz: ## each tests/fuzz/fuzz_*.c for FUZZ_S seconds (libFuzzer, sanitizers; some: make fuzz FUZZ='psa2 api' FUZZ_S=3600)
+fuzz: ## each fuzz_*.c of tests/fuzz for FUZZ_S seconds (libFuzzer, sanitizers; some: make fuzz FUZZ='psa2 api' FUZZ_S=3600)
 	@$(FUZZ_MAKE) fuzz-each
 fuzz-check: ## the fuzz corpus, then some thousand inputs for each target, the same each time
 	@$(FUZZ_MAKE) FUZZ_S=check fuzz-each
@@ -183,13 +184,14 @@ format: ## rewrite C and Python in the project's format
 	$(PY) -m ruff format .
 docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, requirements, tables of the pages, FIDELITY.md
 	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs
+	$(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions under $(DESTDIR)$(PREFIX)
 	@$(INSTALL) install
 uninstall: ## remove what install put there
 	@$(INSTALL) uninstall
-foreign: all ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/mavlink.md)
+foreign: all ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/tools/mavlink.md)
 	@tools/foreign
 wheel: all ## build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
@@ -201,4 +203,4 @@ clean: ## remove everything that was built; .venv stays
 	rm -rf build build-* compile_commands.json
 help: ## this list
 	@sed -n 's/^\([a-z_.0-9-]*\):.* ## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r t d; do printf '  %-22s %s\n' "$$t" "$$d"; done
--include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d) $(BENCH_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d) $(FUZZ_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d)
+-include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d) $(BENCH_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d) $(FUZZ_SRC:%.c=$(BUILD)/obj/%.d)

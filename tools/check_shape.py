@@ -155,15 +155,15 @@ class Rule:
 
 RULES = {
     "import-circles": Rule(import_circles, 0, 0),
-    "folders-over-30-files": Rule(large_folders, 3, 0),
-    "loose-modules": Rule(loose_modules, 13, 12),
+    "folders-over-30-files": Rule(large_folders, 0, 0),
+    "loose-modules": Rule(loose_modules, 12, 12),
     "object-numbers": Rule(object_numbers, 0, 0),
-    f"modules-that-name-{BOARD}": Rule(places_of_board, 5, 3),
-    "one-word-functions-python": Rule(one_word_functions, 962, 926),
+    f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
+    "one-word-functions-python": Rule(one_word_functions, 926, 926),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, more logs and recorded units.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 54_000, 54_000),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 42_600, 42_600),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_580, 1_580),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 53_900, 53_900),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 42_550, 42_550),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_570, 1_570),
 }
 
 

@@ -1,6 +1,7 @@
 #include "app/mavlink.h"
 
 #include "base/why.h"
+#include "board/psa2/psa2.h"
 #include "canopen/co_node.h"
 #include "gen/parameter_names.h"
 #include "gen/psa2_od.h"
@@ -146,13 +147,34 @@ static unsigned make_params(struct mavlink *m)
 
 /* ---- the unit's frames */
 
+/* PSABENCH_STATUS of the dialect has the board's bits. */
+_Static_assert((int)PSABENCH_STATUS_SETTLED == (int)PSA2_ST_SETTLED && (int)PSABENCH_STATUS_CLIP == (int)PSA2_ST_CLIP &&
+                   (int)PSABENCH_STATUS_OVERRUN == (int)PSA2_ST_OVERRUN &&
+                   (int)PSABENCH_STATUS_TEMP_NEW == (int)PSA2_ST_TEMP_NEW,
+               "PSABENCH_STATUS");
+
+struct mav_reading mavlink_reading(const struct psa2_reading *r)
+{
+    struct mav_reading out = {.t_ns = r->t_ns,
+                              .lost = r->lost,
+                              .temp_code = r->temp_code,
+                              .temp_channel = r->temp_channel < 0 ? 0 : (uint8_t)r->temp_channel,
+                              .status = r->status};
+    memcpy(out.code, r->code, sizeof out.code);
+    memcpy(out.volts, r->volts, sizeof out.volts);
+    return out;
+}
+
 static void on_frame(void *ctx, const struct can_msg *frame, int64_t t_ns)
 {
     struct mavlink *m = ctx;
-    struct mav_reading r[MAVLINK_PSA2_READINGS];
+    struct psa2_reading r[PSA2_READINGS_MAX];
     mav_station_frame(&m->port.station, frame, t_ns);
-    const unsigned n = m->decodes ? mavlink_psa2_take(&m->psa2, frame, t_ns, r) : 0;
-    for (unsigned i = 0; i < n; i++) mav_station_reading(&m->port.station, &r[i]);
+    const unsigned n = m->decodes ? psa2_reading_take(&m->psa2, frame, t_ns, r) : 0;
+    for (unsigned i = 0; i < n; i++) {
+        const struct mav_reading out = mavlink_reading(&r[i]);
+        mav_station_reading(&m->port.station, &out);
+    }
 }
 
 /* What the unit has now: a host may have written it before this link was opened (--restore). */

@@ -1,11 +1,11 @@
-/* --mavlink: a unit of the bench as a MAVLink system (docs/mavlink.md). Its readings are those of its CAN frames. */
+/* --mavlink: a unit of the bench as a MAVLink system (docs/tools/mavlink.md). Its readings are those of its CAN frames. */
 #ifndef PSABENCH_APP_MAVLINK_H
 #define PSABENCH_APP_MAVLINK_H
 
-#include "app/mavlink_psa2.h"
 #include "app/options.h"
 #include "bench/bench.h"
 #include "link/mavlink/mav_port.h"
+#include "telemetry/psa2_reading.h"
 
 struct mavlink {
     struct mav_port port; /* first */
@@ -14,7 +14,7 @@ struct mavlink {
     const struct options_mavlink *o;
     struct can_node ear; /* on the unit's bus; sends nothing */
     bool decodes;        /* the unit is a PSA-2 */
-    struct mavlink_psa2 psa2;
+    struct psa2_reader psa2;
     struct mav_param *params;
 };
 
@@ -24,6 +24,9 @@ bool mavlink_check(const struct bench *b, const struct options *o, char *why, si
 /* Opens one, checked; hubs: those of the buses. NULL with one line in why. */
 struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
                              const struct options_mavlink *m, char *why, size_t cap);
+
+/* A reading as a station takes it. Pure. */
+struct mav_reading mavlink_reading(const struct psa2_reading *r);
 
 void mavlink_close(struct mavlink *m); /* its links are gone; mavlink_free() after they were reaped */
 void mavlink_free(struct mavlink *m);

@@ -1,7 +1,6 @@
 #define _GNU_SOURCE /* getopt_long */
 #include "app/options.h"
 
-#include "app/options_mavlink.h"
 #include "base/why.h"
 #include "command/utf8.h"
 #include "link/can/socketcand_tcp.h"
@@ -324,7 +323,7 @@ static const struct row rows[] = {
      "                           times)"},
     {"--bus-port", " [UNIT:]LINK", set_bus_port, 0, "bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
      "                           (default: the first unit that has one); LINK as above; may be given several times"},
-    {"--mavlink", " KIND[,...]", set_mavlink, 0, "a unit as a MAVLink system (docs/mavlink.md). KIND: udp[:PORT] (sends to 127.0.0.1),\n"
+    {"--mavlink", " KIND[,...]", set_mavlink, 0, "a unit as a MAVLink system (docs/tools/mavlink.md). KIND: udp[:PORT] (sends to 127.0.0.1),\n"
      "                           udpin[:PORT], tcp[:PORT] (wait for clients there), pty[:LINK]. Then, after commas:\n"
      "                           unit=NAME, sysid=N, compid=N, autopilot=generic|px4|ardupilot|invalid, imu=HZ,\n"
      "                           angles=HZ, hil=HZ (HIL messages, from the truth; off)"},

@@ -15,7 +15,8 @@
 #define OPTIONS_BUS_MAX   8u
 #define OPTIONS_LOGIC_MAX 4u
 
-#define OPTIONS_MAVLINK_MAX 4u
+#define OPTIONS_MAVLINK_MAX  4u
+#define OPTIONS_MAVLINK_PORT 14550u /* where ground stations listen; of tcp: 5760 */
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_UDP, OPTIONS_CAN_LOG };
 
@@ -118,6 +119,10 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
 /* Instead of the adapters that o has: those of a text with spaces between them, each as --can would have it. The text
  * is cut up and stays the caller's. False with one line in why. */
 bool options_cans(struct options *o, char *text, char *why, size_t cap);
+
+/* The argument of --mavlink: KIND[:PORT|:LINK][,KEY=VALUE...]; kept by pointer. Pure; bounded. False with what would be right in
+ * *form. */
+bool options_mavlink(const char *arg, struct options_mavlink *o, const char **form);
 
 /* The text of --help. False: it cannot be written. */
 bool options_print_help(FILE *out);

@@ -1,4 +1,4 @@
-#include "app/options_mavlink.h"
+#include "app/options.h"
 
 #include "link/mavlink/mav_wire.h"
 

@@ -41,11 +41,6 @@ static void describe_stored(struct service *s, char stored[STORED_MAX])
     else snprintf(stored, STORED_MAX, "wrote %" PRIu64 " bytes", s->bench->vcd.bytes);
 }
 
-void service_report_file(const char *what, const char *path, const char *reason, const char *stored)
-{
-    fprintf(stderr, "psa-emu: %s %s: %s; %s; the run continues\n", what, path, reason, stored);
-}
-
 enum { REASON_MAX = 64 };
 
 static void describe_reason(const struct vcd *v, char reason[REASON_MAX])
@@ -206,17 +201,6 @@ bool service_open_truth_log(struct service *s, char *why, size_t cap)
 }
 
 /* ---- what there is, for counters */
-
-cJSON *service_add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error)
-{
-    cJSON *f = cJSON_CreateObject();
-    cJSON_AddStringToObject(f, "kind", kind);
-    cJSON_AddStringToObject(f, "path", path);
-    cJSON_AddNumberToObject(f, "bytes", bytes);
-    if (error) cJSON_AddStringToObject(f, "error", error);
-    cJSON_AddItemToArray(files, f);
-    return f;
-}
 
 static double size_of(int fd)
 {

@@ -14,11 +14,6 @@ static void on_signal(int number)
     stop_signal = number;
 }
 
-void service_say(const char *text)
-{
-    fprintf(stderr, "psa-emu: %s\n", text);
-}
-
 void service_power_up(struct service *s)
 {
     bench_power_up(s->bench);

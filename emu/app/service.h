@@ -2,7 +2,6 @@
 #ifndef PSABENCH_APP_SERVICE_H
 #define PSABENCH_APP_SERVICE_H
 
-#include "app/capture_job.h"
 #include "app/loop.h"
 #include "app/ports.h"
 #include "bench/bench.h"
@@ -11,9 +10,34 @@
 #include "bench/truth_log.h"
 #include "control/control.h"
 #include "fault/fault.h"
+#include "trace/capture.h"
 
 /* Exit statuses of the process. */
 enum { SERVICE_DONE = 0, SERVICE_INPUT = 2, SERVICE_MACHINE = 3, SERVICE_INT = 130 };
+
+/* The ring capture of a running emulator: probe.arm and its files. */
+
+#define CAPTURE_FILES_SHOWN 16u
+#define CAPTURE_PATH_MAX    4096 /* Linux takes no longer path */
+
+struct capture_file {
+    char path[CAPTURE_PATH_MAX];
+    uint64_t number; /* from 1; 0: none */
+    int64_t trigger_ns, from_ns, end_ns;
+    uint64_t bytes, lost;
+    char why[96]; /* why it has ended early; "": it has not */
+};
+
+struct capture_job {
+    struct capture core;
+    char path[CAPTURE_PATH_MAX]; /* as given */
+    unsigned unit;
+    uint32_t files, done;
+    uint64_t max_bytes;
+    uint64_t number;                               /* files begun since the start */
+    FILE *out;                                     /* being written */
+    struct capture_file file[CAPTURE_FILES_SHOWN]; /* number n is at n % CAPTURE_FILES_SHOWN */
+};
 
 struct lcm_feed;
 
@@ -67,7 +91,6 @@ int service_live(struct service *s);
 
 /* ---- for the files of the service */
 
-void service_say(const char *text);       /* on stderr */
 void service_power_up(struct service *s); /* bench, faults and timeline of the scenario */
 
 /* clients.c */
@@ -97,7 +120,8 @@ void service_describe_lcm(const struct service *s, cJSON *files);
 void service_print_lcm(const struct service *s);
 void service_close_lcm(struct service *s);
 
-/* For files that end early: one line on stderr. */
+/* report.c: one line on stderr, of a file that ends early too; an entry of counters */
+void service_say(const char *text);
 void service_report_file(const char *what, const char *path, const char *reason, const char *stored);
 cJSON *service_add_file(cJSON *files, const char *kind, const char *path, double bytes, const char *error);
 

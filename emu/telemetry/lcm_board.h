@@ -4,6 +4,8 @@
 
 #include "telemetry/lcm_feed.h"
 
+#include <string.h>
+
 typedef void lcm_take_fn(struct lcm_feed *f, struct lcm_unit *u, const struct can_msg *m, int64_t t_ns);
 
 /* A message of a board. */
@@ -13,16 +15,29 @@ struct lcm_row {
     lcm_take_fn *take;
 };
 
-/* A PSA-2 in its four frame forms: lcm_psa2.c. */
-lcm_take_fn lcm_psa2_take_zt, lcm_psa2_take_fast, lcm_psa2_take_frame, lcm_psa2_take_block;
-
 /* Keeps frame `part` of a reading that has several; out of its turn it is dropped with those before it. */
-void lcm_reading_keep(struct lcm_unit *u, unsigned part, const struct can_msg *m);
+static inline void lcm_reading_keep(struct lcm_unit *u, unsigned part, const struct can_msg *m)
+{
+    u->parts = part == 0 || u->parts == part ? part + 1 : 0;
+    if (u->parts) memcpy(u->part[part], m->data, sizeof u->part[part]);
+}
 
 /* The last frame came: whether the `parts` before it are there. A new reading begins. */
-bool lcm_reading_complete(struct lcm_unit *u, unsigned parts);
+static inline bool lcm_reading_complete(struct lcm_unit *u, unsigned parts)
+{
+    const bool complete = u->parts == parts;
+    u->parts = 0;
+    return complete;
+}
 
 /* The generated structs have char * for a text that they only read. */
-char *lcm_text(const char *text);
+static inline char *lcm_text(const char *text)
+{
+    union {
+        const char *read;
+        char *generated;
+    } u = {.read = text};
+    return u.generated;
+}
 
 #endif

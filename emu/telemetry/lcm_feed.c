@@ -10,11 +10,6 @@
 
 enum { NODE_BITS = 0x7F };
 
-void lcm_feed_send(struct lcm_feed *f, const char *channel, const void *data, int len, int64_t t_ns)
-{
-    if (len > 0) lcm_port_publish(&f->port, channel, data, (size_t)len, (t_ns + f->epoch_ns) / 1000);
-}
-
 static void send_frame(struct lcm_bus *b, const struct can_msg *m, int64_t t_ns)
 {
     uint8_t out[LCM_MESSAGE_MAX], data[sizeof m->data];
@@ -68,6 +63,7 @@ static void init_unit(struct lcm_feed *f, unsigned i)
 {
     struct lcm_unit *u = &f->unit[i];
     *u = (struct lcm_unit){.unit = f->bench->unit[i], .name = f->bench->unit_name[i]};
+    u->psa2.node = u->unit->cfg.node;
     u->board = lcm_board_of(u->unit->type->name);
     if (u->board) snprintf(u->readings, sizeof u->readings, "%s%.31s", lcm_board_channel(u->board), u->name);
     snprintf(u->registers, sizeof u->registers, "PSABENCH_REGISTER_%.31s", u->name);

@@ -3,12 +3,13 @@
  *
  * An observer: it has a node on each bus that sends nothing, and events that look and change nothing. Readings and registers
  * come from the frames on the bus, as any other receiver has them. Nothing allocates. The same run publishes the same
- * messages. Channels: docs/lcm.md. */
+ * messages. Channels: docs/tools/lcm.md. */
 #ifndef PSABENCH_TELEMETRY_LCM_FEED_H
 #define PSABENCH_TELEMETRY_LCM_FEED_H
 
 #include "command/view.h"
 #include "link/lcm/lcm_port.h"
+#include "telemetry/psa2_reading.h"
 
 #define LCM_INSTRUMENTS_NS (NS_PER_S / 10) /* between two messages of what the instruments show */
 
@@ -29,6 +30,7 @@ struct lcm_unit {
     char readings[LCM_CHANNEL_MAX + 1], registers[LCM_CHANNEL_MAX + 1], truth[LCM_CHANNEL_MAX + 1]; /* channels */
     uint8_t part[2][8]; /* frames of a reading that is not complete */
     unsigned parts;
+    struct psa2_reader psa2;
     struct lcm_request request;
 };
 
@@ -58,7 +60,10 @@ void lcm_feed_start(struct lcm_feed *f, const struct control_bench *bench, int64
 
 void lcm_feed_stop(struct lcm_feed *f); /* the port stays open */
 
-/* For the files of the folder: sends a message of LCM_MESSAGE_MAX bytes at most. */
-void lcm_feed_send(struct lcm_feed *f, const char *channel, const void *data, int len, int64_t t_ns);
+/* For the files of the folder: a message of LCM_MESSAGE_MAX bytes at most; len <= 0: it could not be encoded. */
+static inline void lcm_feed_send(struct lcm_feed *f, const char *channel, const void *data, int len, int64_t t_ns)
+{
+    if (len > 0) lcm_port_publish(&f->port, channel, data, (size_t)len, (t_ns + f->epoch_ns) / 1000);
+}
 
 #endif

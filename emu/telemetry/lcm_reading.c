@@ -1,9 +1,12 @@
 #include "telemetry/lcm_reading.h"
 
+#include "board/psa2/psa2.h"
 #include "gen/lcm/psabench_lcm_gyro_reading_t.h"
 #include "gen/lcm/psabench_lcm_pik_reading_t.h"
 #include "gen/lcm/psabench_lcm_pmka_reading_t.h"
+#include "gen/lcm/psabench_lcm_psa2_reading_t.h"
 #include "gen/lcm/psabench_lcm_psd1_reading_t.h"
+#include "gen/psa2_od.h"
 #include "gen/psabench_can.h"
 #include "gen/psabench_scale.h"
 #include "telemetry/lcm_board.h"
@@ -13,19 +16,6 @@
 #define PSD1_VOLTS      (10.0 / 32768.0) /* a code of AIN2, gain 1 */
 #define RADPS_OF_DEGPH  (3.14159265358979323846 / 648000.0)
 #define COUNT_OF(table) (sizeof(table) / sizeof *(table))
-
-void lcm_reading_keep(struct lcm_unit *u, unsigned part, const struct can_msg *m)
-{
-    u->parts = part == 0 || u->parts == part ? part + 1 : 0;
-    if (u->parts) memcpy(u->part[part], m->data, sizeof u->part[part]);
-}
-
-bool lcm_reading_complete(struct lcm_unit *u, unsigned parts)
-{
-    const bool complete = u->parts == parts;
-    u->parts = 0;
-    return complete;
-}
 
 static void keep_first(struct lcm_feed *f, struct lcm_unit *u, const struct can_msg *m, int64_t t_ns)
 {
@@ -159,6 +149,38 @@ static void take_level(struct lcm_feed *f, struct lcm_unit *u, const struct can_
     lcm_feed_send(f, u->readings, out, psabench_lcm_gyro_reading_t_encode(out, 0, sizeof out, &r), t_ns);
 }
 
+/* ---- PSA-2 */
+
+static void take_psa2(struct lcm_feed *f, struct lcm_unit *u, const struct can_msg *m, int64_t t_ns)
+{
+    uint8_t out[LCM_MESSAGE_MAX];
+    struct psa2_reading read[PSA2_READINGS_MAX];
+    const unsigned n = psa2_reading_take(&u->psa2, m, t_ns, read);
+    for (unsigned i = 0; i < n; i++) {
+        const struct psa2_reading *p = &read[i];
+        const psabench_lcm_psa2_reading_t r = {.t_ns = t_ns,
+                                               .epoch_ns = f->epoch_ns,
+                                               .unit = lcm_text(u->name),
+                                               .form = (int8_t)p->form,
+                                               .sample = (int8_t)p->sample,
+                                               .x_code = p->code[0],
+                                               .y_code = p->code[1],
+                                               .z_code = p->code[2],
+                                               .x_v = p->volts[0],
+                                               .y_v = p->volts[1],
+                                               .z_v = p->volts[2],
+                                               .sequence = p->sequence,
+                                               .t_sample_s = p->t_sample_s,
+                                               .temp_code = p->temp_code,
+                                               .temp_channel = p->temp_channel,
+                                               .temp_new = (p->status & PSA2_ST_TEMP_NEW) != 0,
+                                               .settled = p->form == PSA2_FORM_FAST || p->status & PSA2_ST_SETTLED,
+                                               .clipped = (p->status & PSA2_ST_CLIP) != 0,
+                                               .overrun = (p->status & PSA2_ST_OVERRUN) != 0};
+        lcm_feed_send(f, u->readings, out, psabench_lcm_psa2_reading_t_encode(out, 0, sizeof out, &r), t_ns);
+    }
+}
+
 /* ---- boards, by the identifiers of their messages at node 0 */
 
 #define MESSAGE(name, bytes, function)                                                                                 \
@@ -172,10 +194,9 @@ static const struct lcm_row pmka[] = {MESSAGE(PMKA_CODES, 8, keep_first), MESSAG
 static const struct lcm_row pik[] = {MESSAGE(PIK_COUNTS, 8, take_counts)};
 static const struct lcm_row gyro[] = {MESSAGE(GYRO_RATES, 8, keep_first), MESSAGE(GYRO_ANGLES, 8, keep_second),
                                       MESSAGE(GYRO_LEVEL, 8, take_level)};
-static const struct lcm_row psa2[] = {MESSAGE(PSA2_XY, 8, keep_first), MESSAGE(PSA2_ZT, 8, lcm_psa2_take_zt),
-                                      MESSAGE(PSA2_FAST, 8, lcm_psa2_take_fast),
-                                      MESSAGE(PSA2_FRAME, 16, lcm_psa2_take_frame),
-                                      MESSAGE(PSA2_BLOCK, 64, lcm_psa2_take_block)};
+static const struct lcm_row psa2[] = {MESSAGE(PSA2_XY, 8, take_psa2), MESSAGE(PSA2_ZT, 8, take_psa2),
+                                      MESSAGE(PSA2_FAST, 8, take_psa2), MESSAGE(PSA2_FRAME, 16, take_psa2),
+                                      MESSAGE(PSA2_BLOCK, 64, take_psa2)};
 // clang-format on
 
 struct lcm_board {

@@ -33,7 +33,7 @@ static void answer_ping(struct mav_station *s, const mavlink_message_t *m, int64
     mavlink_ping_t p;
     (void)t_ns;
     mavlink_msg_ping_decode(m, &p);
-    if (p.target_system || p.target_component) return; /* somebody's answer */
+    if (p.target_system || p.target_component) return; /* an answer to another system */
     p.target_system = m->sysid;
     p.target_component = m->compid;
     mav_send(s, MAV_KIND(PING), &p);

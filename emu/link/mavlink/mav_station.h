@@ -1,4 +1,4 @@
-/* A MAVLink system whose sensor is a unit on the CAN bus: what it sends, and what it answers (docs/mavlink.md).
+/* A MAVLink system whose sensor is a unit on the CAN bus: what it sends, and what it answers (docs/tools/mavlink.md).
  *
  * It knows no transport: frames go out through send(), to every peer alike, and messages come in whole. Readings and readouts
  * are handed in or asked for through callbacks; it has no way to the truth but mav_io.world, which is NULL unless the user

@@ -1,7 +1,7 @@
 /* A signal given by samples: what a sensor felt, or put out, at recorded instants.
  *
  * The value at an instant is that of the sample before it (hold), or lies on the straight line to the next one (linear). Before the
- * first sample it is the first one's. The samples belong to whoever made them and never change. Pure but for the place of the last
+ * first sample it is the first one's. The samples are the caller's and never change. Pure but for the place of the last
  * look, from which the next one is found in a step; one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_SERIES_H
 #define PSABENCH_PHYS_SENSOR_SERIES_H

@@ -37,7 +37,7 @@ def open_lcm(url: str) -> Any:
 
     if url == MEMORY:
         return lcm.LCM(url)
-    group, port = _address(url)
+    group, port = _udpm_address(url)
     _check_route(url, group, port)
     try:
         return lcm.LCM(f"udpm://{group}:{port}?ttl=0&recv_buf_size={RECEIVE_BYTES}")
@@ -45,7 +45,7 @@ def open_lcm(url: str) -> Any:
         raise LinkError(f"{url}: {e}") from e
 
 
-def _address(url: str) -> tuple[str, int]:
+def _udpm_address(url: str) -> tuple[str, int]:
     match = _ADDRESS.fullmatch(url)
     if "ttl=" in url and not url.endswith("ttl=0"):
         raise BadInput(expected("ttl=0, so that messages stay on this machine", repr(url), "--lcm"))

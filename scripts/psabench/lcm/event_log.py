@@ -50,15 +50,15 @@ def read_events(path: Path) -> Iterator[Event]:
     """All events of a log, in its order. Raises BadInput for a file that cannot be read and where it is damaged."""
     try:
         with path.open("rb") as file:
-            yield from _events(file, path)
+            yield from _all_events(file, path)
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
 
 
-def _events(file: IO[bytes], path: Path) -> Iterator[Event]:
+def _all_events(file: IO[bytes], path: Path) -> Iterator[Event]:
     count = 0
     while header := file.read(HEADER.size):
-        event = _event(header, file)
+        event = _next_event(header, file)
         if event is None:
             got = f"damaged bytes; the {count} events before them are good" if count else "other bytes"
             raise BadInput(expected("an event of an LCM log", got, f"{path}: event {count + 1}"))
@@ -66,7 +66,7 @@ def _events(file: IO[bytes], path: Path) -> Iterator[Event]:
         yield event
 
 
-def _event(header: bytes, file: IO[bytes]) -> Event | None:
+def _next_event(header: bytes, file: IO[bytes]) -> Event | None:
     if len(header) < HEADER.size:
         return None
     sync, number, t_us, channel_size, size = HEADER.unpack(header)

@@ -17,11 +17,6 @@ from typing import Any
 from psabench.errors import BadInput, expected
 from psabench.places import proto_file
 
-TYPES = (
-    "can_frame_t gyro_reading_t instruments_t pik_reading_t pmka_reading_t progress_t psa2_reading_t psd1_reading_t "
-    "register_t result_t truth_t"
-).split()
-
 _FORMATS = {"int8_t": "b", "int16_t": "h", "int32_t": "i", "int64_t": "q", "float": "f", "double": "d", "boolean": "b"}
 _PRIMITIVES = {*_FORMATS, "byte", "string"}
 _MASK = (1 << 64) - 1
@@ -53,10 +48,10 @@ class LcmType:
         base = 0x12345678
         for m in self.members:
             for text in (m.name, m.kind):
-                base = _hashed_text(base, text)
-            base = _hashed(base, 1 if m.size else 0)
+                base = _hash_text(base, text)
+            base = _hash_byte(base, 1 if m.size else 0)
             if m.size:
-                base = _hashed_text(_hashed(base, 0 if m.size.isdecimal() else 1), m.size)
+                base = _hash_text(_hash_byte(base, 0 if m.size.isdecimal() else 1), m.size)
         return struct.pack(">Q", (base << 1 & _MASK) + (base >> 63))
 
     def encode(self, values: Mapping[str, Any]) -> bytes:
@@ -64,7 +59,7 @@ class LcmType:
         parts = [self.fingerprint]
         for m in self.members:
             try:
-                parts.append(_packed(m, values[m.name], values))
+                parts.append(_pack_member(m, values[m.name], values))
             except (KeyError, struct.error, TypeError, AttributeError) as e:
                 raise ValueError(expected(m.kind, repr(values.get(m.name)), f"{self.name}.{m.name}")) from e
         return b"".join(parts)
@@ -76,7 +71,7 @@ class LcmType:
             raise ValueError(expected(f"a message of the type {self.name}", data[: rest.at].hex() or "none"))
         values: dict[str, Any] = {}
         for m in self.members:
-            values[m.name] = _unpacked(m, rest, values)
+            values[m.name] = _unpack_member(m, rest, values)
         if rest.left:
             raise ValueError(expected(f"{rest.at} bytes", len(data), self.name))
         return values
@@ -108,8 +103,14 @@ def lcm_type(name: str) -> LcmType:
 
 
 @cache
+def type_names() -> tuple[str, ...]:
+    """The types of proto/lcm."""
+    return tuple(sorted(p.stem for p in proto_file("lcm/can_frame_t.lcm").parent.glob("*.lcm")))
+
+
+@cache
 def _by_fingerprint() -> Mapping[bytes, LcmType]:
-    return {t.fingerprint: t for t in map(lcm_type, TYPES)}
+    return {t.fingerprint: t for t in map(lcm_type, type_names())}
 
 
 def type_of(data: bytes) -> LcmType | None:
@@ -120,34 +121,34 @@ def type_of(data: bytes) -> LcmType | None:
 # ---- the hash of a struct, as lcm-gen's: of names, kinds and dimensions of the fields, not of the struct's name
 
 
-def _hashed(v: int, c: int) -> int:
+def _hash_byte(v: int, c: int) -> int:
     signed = v - (1 << 64) if v >> 63 else v
     return ((v << 8) ^ (signed >> 55)) + c & _MASK
 
 
-def _hashed_text(v: int, text: str) -> int:
-    v = _hashed(v, len(text))
+def _hash_text(v: int, text: str) -> int:
+    v = _hash_byte(v, len(text))
     for c in text.encode("ascii"):
-        v = _hashed(v, c)
+        v = _hash_byte(v, c)
     return v
 
 
 # ---- values
 
 
-def _count(m: Member, values: Mapping[str, Any]) -> int:
+def _array_size(m: Member, values: Mapping[str, Any]) -> int:
     return int(m.size) if m.size.isdecimal() else int(values[m.size])
 
 
-def _packed(m: Member, value: Any, values: Mapping[str, Any]) -> bytes:
+def _pack_member(m: Member, value: Any, values: Mapping[str, Any]) -> bytes:
     if not m.size:
-        return b"".join(_packed_each(m.kind, [value]))
-    if len(value) != _count(m, values):
-        raise ValueError(expected(f"{_count(m, values)} elements", len(value), m.name))
-    return bytes(value) if m.kind == "byte" else b"".join(_packed_each(m.kind, value))
+        return b"".join(_pack_each(m.kind, [value]))
+    if len(value) != _array_size(m, values):
+        raise ValueError(expected(f"{_array_size(m, values)} elements", len(value), m.name))
+    return bytes(value) if m.kind == "byte" else b"".join(_pack_each(m.kind, value))
 
 
-def _packed_each(kind: str, values: Any) -> Iterator[bytes]:
+def _pack_each(kind: str, values: Any) -> Iterator[bytes]:
     for v in values:
         if kind == "string":
             text = v.encode("utf-8") + b"\0"
@@ -173,22 +174,22 @@ class _Rest:
         return self.data[self.at - size : self.at]
 
 
-def _unpacked(m: Member, rest: _Rest, values: Mapping[str, Any]) -> Any:
+def _unpack_member(m: Member, rest: _Rest, values: Mapping[str, Any]) -> Any:
     if not m.size:
-        return _unpacked_one(m.kind, rest)
-    count = _count(m, values)
+        return _unpack_one(m.kind, rest)
+    count = _array_size(m, values)
     if m.kind == "byte":
         return rest.take(count)
     if m.kind == "string":
         if count < 0:
             raise ValueError(expected("0 texts or more", count, f"{rest.name}.{m.name}"))
-        return tuple(_unpacked_one(m.kind, rest) for _ in range(count))
+        return tuple(_unpack_one(m.kind, rest) for _ in range(count))
     kind = _FORMATS[m.kind]
     data = rest.take(count * struct.calcsize(">" + kind))
     return struct.unpack(f">{count}{kind}", data)
 
 
-def _unpacked_one(kind: str, rest: _Rest) -> Any:
+def _unpack_one(kind: str, rest: _Rest) -> Any:
     if kind == "string":
         (size,) = struct.unpack(">i", rest.take(4))
         text = rest.take(size)

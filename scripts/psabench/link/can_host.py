@@ -207,7 +207,7 @@ def open_bus(spec: str | None) -> can.BusABC:
     if arguments.get("interface") == "socketcand":
         _greet(arguments["host"], arguments["port"])
     try:
-        bus = _open(arguments)
+        bus = _open_interface(arguments)
         if isinstance(bus, SocketcanBus):
             _enlarge_buffer(bus.socket)
         if (port := getattr(bus, "serialPortOrig", None)) is not None:
@@ -219,7 +219,7 @@ def open_bus(spec: str | None) -> can.BusABC:
         raise LinkError(f"--can {spec}: {e}") from e
 
 
-def _open(arguments: dict[str, Any]) -> can.BusABC:
+def _open_interface(arguments: dict[str, Any]) -> can.BusABC:
     if arguments.get("interface") == "udp":
         return LocalUdpBus(**{k: v for k, v in arguments.items() if k != "interface"})
     return can.Bus(**arguments)

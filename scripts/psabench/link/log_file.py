@@ -36,7 +36,7 @@ class LogFile:
         self._written = 0
         self._owned = Owned(path)
         try:
-            self._writer = _writer(path, boards)
+            self._writer = _open_writer(path, boards)
         except ImportError as e:
             self._owned.release()
             raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
@@ -211,7 +211,7 @@ DECODING = (".mcap", ".mf4")  # they hold decoded messages, too
 FORMATS = sorted({*MESSAGE_WRITERS, *WRITERS})  # .log candump, .blf and .asc Vector ...
 
 
-def _writer(path: Path, boards: Mapping[int, str] | None) -> MessageWriter:
+def _open_writer(path: Path, boards: Mapping[int, str] | None) -> MessageWriter:
     """boards: by node, where they differ from the DBC's."""
     if path.suffix not in WRITERS:
         return MESSAGE_WRITERS[path.suffix](path)

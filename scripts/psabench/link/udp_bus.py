@@ -1,7 +1,7 @@
 """CAN over UDP multicast on this machine: python-can's udp_multicast bus with hop limit 0 and without its own echoes.
 
-A datagram comes back to each member of its group, the sender included, and python-can takes it for a frame of somebody
-else. This bus sends from a port of its own and passes over what comes from there. Source of the frame format:
+A datagram comes back to each member of its group, the sender included, and python-can takes it for a frame of another
+node. This bus sends from a port of its own and passes over what comes from there. Source of the frame format:
 python-can 4.6, interfaces/udp_multicast.
 """
 

@@ -17,14 +17,14 @@ examples:
   psabench convert run.mcap run.pcap            for Wireshark
   psabench convert run.log imu.mcap --ros2-imu  a ROS 2 bag of sensor_msgs/Imu, m/s^2
 
-The endings select the formats; docs/logs.md says what each keeps.
+The endings select the formats; docs/tools/logs.md says what each keeps.
 """
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench convert`. Raises BadInput."""
     p = Parser(prog="psabench convert", description="Convert a CAN log to another format.", epilog=EPILOG)
-    p.set_defaults(handler=_convert)
+    p.set_defaults(handler=_convert_log)
     p.add_argument("file", type=Path, help="CAN log that is read")
     p.add_argument("out", type=Path, help="CAN log that is written")
     add_board(p, "whose frames are decoded")
@@ -33,13 +33,13 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _convert(args: argparse.Namespace) -> int:
+def _convert_log(args: argparse.Namespace) -> int:
     from psabench.logs.formats import read_frames
 
     if args.out.exists() and args.file.exists() and args.out.samefile(args.file):
         raise BadInput(expected("another file than the one that is read", args.out, "OUT"))
     if args.ros2_imu:
-        return _imu(args)
+        return _convert_imu(args)
     from psabench.link.log_file import LogFile
 
     frames = read_frames(args.file)
@@ -64,7 +64,7 @@ def _convert(args: argparse.Namespace) -> int:
     return 0
 
 
-def _imu(args: argparse.Namespace) -> int:
+def _convert_imu(args: argparse.Namespace) -> int:
     from psabench.logs.formats import read_frames
 
     try:

@@ -32,12 +32,12 @@ def read_frames(path: Path) -> Iterator[can.Message]:
     if not path.exists() or path.is_dir():
         raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
     try:
-        yield from _reader(path)(path)
+        yield from _reader_of(path)(path)
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
 
 
-def _reader(path: Path) -> Callable[[Path], Iterator[can.Message]]:
+def _reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:
     if path.suffix not in READERS:
         return read_python_can
     module, _, name = READERS[path.suffix].partition(":")

@@ -149,7 +149,7 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
     n = 0
     with path.open("rb") as file:
         try:
-            for r in _records(StreamReader(file, emit_chunks=True, record_size_limit=MOST_CHUNK)):
+            for r in _read_records(StreamReader(file, emit_chunks=True, record_size_limit=MOST_CHUNK)):
                 if isinstance(r, Channel) and r.topic == RAW_TOPIC and r.message_encoding == "json":
                     channels.add(r.id)
                 elif isinstance(r, Message) and r.channel_id in channels:
@@ -164,16 +164,16 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
 DAMAGE = (McapError, ValueError, struct.error, EOFError, IndexError, zstandard.ZstdError, MemoryError, OverflowError)
 
 
-def _records(reader: StreamReader) -> Iterator[McapRecord]:
+def _read_records(reader: StreamReader) -> Iterator[McapRecord]:
     """Those in chunks as well."""
     for r in reader.records:
         if isinstance(r, Chunk):
-            yield from breakup_chunk(replace(r, compression="", data=_unpacked(r)), validate_crc=True)
+            yield from breakup_chunk(replace(r, compression="", data=_decompressed_chunk(r)), validate_crc=True)
         else:
             yield r
 
 
-def _unpacked(chunk: Chunk) -> bytes:
+def _decompressed_chunk(chunk: Chunk) -> bytes:
     """Never more than MOST_CHUNK, whatever the chunk says. Raises ValueError."""
     if chunk.compression == "":
         return chunk.data

@@ -54,15 +54,15 @@ def read_spool(lines: IO[bytes]) -> list[can.Message]:
 def write(path: Path, frames: Sequence[can.Message], boards: Mapping[int, str]) -> None:
     """With the decoded channels, or the frames alone where these do not fit on the disk. Raises OSError."""
     try:
-        _write(path, frames, Decoder(boards))
+        _write_file(path, frames, Decoder(boards))
     except OSError as e:
         if e.errno not in (errno.ENOSPC, errno.EFBIG, errno.EDQUOT):
             raise
         os.truncate(path, 0)
-        _write(path, frames, None)
+        _write_file(path, frames, None)
 
 
-def _write(path: Path, frames: Sequence[can.Message], decoder: Decoder | None) -> None:
+def _write_file(path: Path, frames: Sequence[can.Message], decoder: Decoder | None) -> None:
     stamps = np.maximum.accumulate(np.array([m.timestamp for m in frames], dtype=np.float64))
     start_s = math.floor(stamps[0]) if len(stamps) else 0
     t_s = stamps - start_s
@@ -76,7 +76,7 @@ def _write(path: Path, frames: Sequence[can.Message], decoder: Decoder | None) -
         where = np.flatnonzero(kinds == kind)
         rows = np.zeros(len(where), dtype=dtype)
         for row, k in enumerate(where.tolist()):
-            _fill(rows[row : row + 1], name, frames[k])
+            _fill_row(rows[row : row + 1], name, frames[k])
         mdf.append(asammdf.Signal(name=name, samples=rows, timestamps=t_s[where], source=bus))
     if decoder:
         _append_decoded(mdf, frames, t_s, decoder)
@@ -85,7 +85,7 @@ def _write(path: Path, frames: Sequence[can.Message], decoder: Decoder | None) -
     mdf.close()
 
 
-def _fill(row: Any, name: str, m: can.Message) -> None:
+def _fill_row(row: Any, name: str, m: can.Message) -> None:
     """One row of python-can's types."""
     values: dict[str, Any] = {
         "BusChannel": can.util.channel2int(m.channel) or 0,
@@ -117,13 +117,13 @@ def _append_decoded(mdf: Any, frames: Sequence[can.Message], t_s: signals.Floats
         length = int(message(name).length)
         bits = signals.payload([bytes(frames[k].data[:length]) for k in rows], length)
         group = [
-            _channel(f"{topic.strip('/').replace('/', '.')}.{signal}", s, signals.raw(bits, s), t_s[rows])
+            _signal_channel(f"{topic.strip('/').replace('/', '.')}.{signal}", s, signals.raw(bits, s), t_s[rows])
             for signal, s in signals.layout(message(name)).items()
         ]
         mdf.append(group, acq_name=topic.strip("/"), comment=message(name).comment or "")
 
 
-def _channel(name: str, s: signals.Signal, samples: signals.Ints, t_s: signals.Floats) -> Any:
+def _signal_channel(name: str, s: signals.Signal, samples: signals.Ints, t_s: signals.Floats) -> Any:
     linear = {"a": s.scale, "b": s.offset}
     return asammdf.Signal(
         name=name,

@@ -76,14 +76,14 @@ class Mf4(Checked):
             if done.returncode:
                 os.truncate(self._path, 0)  # a part of such a file cannot be read
                 words.seek(0)
-                raise _error(done.returncode, words.read())
+                raise _child_error(done.returncode, words.read())
         return int(done.stdout.split()[-1])
 
     def stored(self, written: int) -> int:
         return self._saved
 
 
-def _error(status: int, words: bytes) -> OSError:
+def _child_error(status: int, words: bytes) -> OSError:
     """The child's last words begin with the number of the error, if it was one of the file."""
     said = words.decode(errors="replace").splitlines()[-1:] or [f"exit status {status}"]
     number, _, text = said[0].partition(" ")

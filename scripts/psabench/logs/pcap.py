@@ -105,17 +105,17 @@ class Pcap(Checked):
 def read_pcap(path: Path) -> Iterator[can.Message]:
     """Frames of a pcap file of either byte order and resolution. Raises BadInput."""
     with path.open("rb") as file:
-        order, unit_s = _header(path, file)
+        order, unit_s = _file_header(path, file)
         n = 0
         while head := file.read(16):
             n += 1
             try:
-                yield _next(file, head, order, unit_s)
+                yield _next_packet(file, head, order, unit_s)
             except ValueError as e:
                 raise BadInput(f"{path}: frame {n}: {e}") from e
 
 
-def _header(path: Path, file: BinaryIO) -> tuple[str, float]:
+def _file_header(path: Path, file: BinaryIO) -> tuple[str, float]:
     head = file.read(24)
     for order in "<>":
         if len(head) == 24 and (magic := struct.unpack_from(f"{order}I", head)[0]) in (MAGIC_NS, MAGIC_US):
@@ -126,7 +126,7 @@ def _header(path: Path, file: BinaryIO) -> tuple[str, float]:
     raise BadInput(expected("a pcap file", "another file (pcapng: editcap -F pcap IN OUT)", path))
 
 
-def _next(file: BinaryIO, head: bytes, order: str, unit_s: float) -> can.Message:
+def _next_packet(file: BinaryIO, head: bytes, order: str, unit_s: float) -> can.Message:
     if len(head) < 16:
         raise ValueError(expected("a whole record", f"{len(head)} bytes"))
     seconds, parts, length, _ = struct.unpack(f"{order}IIII", head)

@@ -114,8 +114,8 @@ class Decoder:
         if m.arbitration_id not in self._known:
             name = message_name(m.arbitration_id, self.boards)
             node = m.arbitration_id & 0x7F
-            everybody_s = name in ("NMT", "SYNC")
-            topic = f"/{name}" if everybody_s else f"/node{node}/{name}"
+            broadcast = name in ("NMT", "SYNC")
+            topic = f"/{name}" if broadcast else f"/node{node}/{name}"
             self._known[m.arbitration_id] = (topic, name) if name else ("", "")
         return self._known[m.arbitration_id]
 
@@ -148,12 +148,12 @@ def schema(name: str) -> dict[str, Any]:
         "title": name,
         "type": "object",
         "description": message(name).comment or "",
-        "properties": {names[s.name]: _property(s) for s in message(name).signals},
+        "properties": {names[s.name]: _schema_property(s) for s in message(name).signals},
         "required": list(names.values()),
     }
 
 
-def _property(s: Any) -> dict[str, Any]:
+def _schema_property(s: Any) -> dict[str, Any]:
     texts = [s.comment or "", f"unit: {s.unit}" if s.unit else ""]
     choices = ", ".join(f"{k} {v}" for k, v in (s.choices or {}).items())
     return {

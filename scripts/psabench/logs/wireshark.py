@@ -64,13 +64,13 @@ for id in pairs(layouts) do DissectorTable.get("can.id"):add(id, psabench) end
 """
 
 
-def lua() -> str:
+def dissector_text() -> str:
     """The whole script."""
-    body = (line for m in sorted(database().messages, key=lambda m: m.frame_id) for line in _message(m))
+    body = (line for m in sorted(database().messages, key=lambda m: m.frame_id) for line in _message_table(m))
     return HEAD + "\n".join(body) + "\n" + TAIL
 
 
-def _message(m: Any) -> Iterator[str]:
+def _message_table(m: Any) -> Iterator[str]:
     yield f'add({m.frame_id}, "{m.name}", {m.length})'
     names = columns(m.name)
     for s in m.signals:
@@ -80,4 +80,4 @@ def _message(m: Any) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(lua())
+    sys.stdout.write(dissector_text())

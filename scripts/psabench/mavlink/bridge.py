@@ -257,7 +257,7 @@ class LiveBridge(Bridge):
         self.station.send_parameter(job.index)
 
     def _follow_scale(self, p: Parameter) -> None:
-        """Zero signal and scale factor that somebody wrote are those of the readings from now on."""
+        """Zero signal and scale factor that another host wrote are those of the readings from now on."""
         for k, axis in enumerate(AXES.upper()):
             if p.name == f"ZERO_V_{axis}":
                 self.scale.zero_v[k] = p.value

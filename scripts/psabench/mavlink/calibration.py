@@ -22,7 +22,7 @@ _ENDINGS = (("_v_per_g2", ""), ("_v_per_g", ""), ("_deg", "_DEG"), ("_v", "_V"))
 
 
 class Cancelled(Exception):
-    """Somebody asked to end the calibration."""
+    """A ground station asked to end the calibration."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,7 @@ MAV_CMD_PREFLIGHT_CALIBRATION with param5 = 1 runs the procedure; with zeros alo
 """
 
 
-def port(text: str) -> Any:
+def mavlink_port(text: str) -> Any:
     """A value of --mavlink; it needs no library."""
     from psabench.mavlink.ports import port_spec
 
@@ -37,7 +37,7 @@ def port(text: str) -> Any:
         raise argparse.ArgumentTypeError(str(e)) from e
 
 
-def rate(text: str) -> float:
+def stream_rate(text: str) -> float:
     """Hz, 0 for off."""
     try:
         value = float(text)
@@ -61,10 +61,10 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         description="Be a MAVLink system: readings of a PSA-2 on CAN, its parameters, and calibrations that run.",
         epilog=EPILOG,
     )
-    p.set_defaults(handler=_mavlink)
+    p.set_defaults(handler=_run_mavlink)
     p.add_argument(
         "--mavlink",
-        type=port,
+        type=mavlink_port,
         default="udp:14550",
         metavar="PORT",
         help="udp[:PORT] (sends to 127.0.0.1), udpin[:PORT] or tcp[:PORT] (wait there) (%(default)s)",
@@ -74,9 +74,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument(
         "--autopilot", choices=AUTOPILOTS, default="px4", help="autopilot of the heartbeat; MAVSDK calibrates px4 alone"
     )
-    p.add_argument("--imu", type=rate, default=50.0, metavar="HZ", help="rate of HIGHRES_IMU (%(default)g)")
-    p.add_argument("--angles", type=rate, default=5.0, metavar="HZ", help="rate of ATTITUDE (%(default)g)")
-    p.add_argument("--codes", type=rate, metavar="HZ", help="rate of PSABENCH_ACCEL (each reading)")
+    p.add_argument("--imu", type=stream_rate, default=50.0, metavar="HZ", help="rate of HIGHRES_IMU (%(default)g)")
+    p.add_argument("--angles", type=stream_rate, default=5.0, metavar="HZ", help="rate of ATTITUDE (%(default)g)")
+    p.add_argument("--codes", type=stream_rate, metavar="HZ", help="rate of PSABENCH_ACCEL (each reading)")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     group = p.add_argument_group("the bench")
     group.add_argument("--can", help=BUS_HELP)
@@ -100,22 +100,22 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _mavlink(args: argparse.Namespace) -> int:
+def _run_mavlink(args: argparse.Namespace) -> int:
     from psabench.mavlink.bridge import LiveBridge, LogBridge
 
     if args.log and (args.can or args.head or args.control):
         raise BadInput(expected("a log or a bench", "both", "--log"))
     if not 0.0 <= args.speed < float("inf"):
         raise BadInput(expected("0 or a number above it", args.speed, "--speed"))
-    options = _options(args)
+    options = _bridge_options(args)
     if args.log:
         log = LogBridge(options, args.log, args.node, args.speed)
-        return _run(log)
-    with _bench(args) as bench:
-        return _run(LiveBridge(options, bench))
+        return _run_bridge(log)
+    with _open_bench(args) as bench:
+        return _run_bridge(LiveBridge(options, bench))
 
 
-def _options(args: argparse.Namespace) -> Any:
+def _bridge_options(args: argparse.Namespace) -> Any:
     from psabench.mavlink.bridge import BridgeOptions
     from psabench.mavlink.calibration import CalibrationPlan
     from psabench.mavlink.station import AUTOPILOTS as NUMBERS
@@ -133,7 +133,7 @@ def _options(args: argparse.Namespace) -> Any:
     )
 
 
-def _bench(args: argparse.Namespace) -> Any:
+def _open_bench(args: argparse.Namespace) -> Any:
     from psabench.bench import Bench
 
     if args.can or args.control:
@@ -143,7 +143,7 @@ def _bench(args: argparse.Namespace) -> Any:
     return Bench.start(args.scenario, pace=pace, seed=args.seed, node=args.node)
 
 
-def _run(bridge: Any) -> int:
+def _run_bridge(bridge: Any) -> int:
     port = bridge.station.port
     print(f"ready mavlink={bridge.options.port.kind} host={port.host} port={port.port}\nready all", flush=True)
     try:

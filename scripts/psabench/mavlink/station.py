@@ -128,7 +128,7 @@ class Station:
     # ---- the calibration under way, from the main thread
 
     def cancelled(self) -> bool:
-        """Whether somebody asked to end it."""
+        """Whether a ground station asked to end it."""
         return self._cancelled.is_set()
 
     def calibration_progress(self, percent: int) -> None:
@@ -226,14 +226,14 @@ class Station:
     def _take_read(self, m: Any) -> None:
         index = self.parameters.find(m.param_id, m.param_index)
         if index is None:
-            self.text(WARNING, f"{_printable(m.param_id)}: expected a parameter of this system")
+            self.text(WARNING, f"{_printable_text(m.param_id)}: expected a parameter of this system")
         else:
             self._ask(index)
 
     def _take_set(self, m: Any) -> None:
         index = self.parameters.find(m.param_id)
         if index is None:
-            self.text(WARNING, f"{_printable(m.param_id)}: expected a parameter of this system")
+            self.text(WARNING, f"{_printable_text(m.param_id)}: expected a parameter of this system")
             return
         p = self.parameters[index]
         try:
@@ -334,5 +334,5 @@ class Station:
             self.send(mavlink().MAVLink_timesync_message(self._time_us() * 1000, m.ts1))
 
 
-def _printable(text: str) -> str:
+def _printable_text(text: str) -> str:
     return "".join(c if " " <= c <= "~" else "?" for c in text)

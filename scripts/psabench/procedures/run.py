@@ -66,7 +66,7 @@ class RunOptions:
 def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
     """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken."""
     if options.replay:
-        return _replay(options, progress)
+        return _replay_run(options, progress)
     if options.record and len(options.procedures) * len(_conditions(options)) != 1:
         raise BadInput(expected("one procedure on one bench (--condition quiet or realistic)", "several", "--record"))
     options.out.mkdir(parents=True, exist_ok=True)
@@ -104,7 +104,7 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
     return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
 
 
-def _replay(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
+def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
     """The procedure that was recorded, on the recording: the same results and report, but for a truth."""
     assert options.replay is not None
     head = RecordedHead(options.replay)

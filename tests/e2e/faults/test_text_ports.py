@@ -345,6 +345,8 @@ def test_without_descriptors_connections_are_refused_once_said_and_the_loop_slee
     with subprocess.Popen(argv, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT, preexec_fn=few) as run:
         assert run.stdout is not None
         ports = [int(line.split("port=")[1]) for line in iter(run.stdout.readline, "ready all\n") if "port=" in line]
+        held = Path(f"/proc/{run.pid}/fd")
+        idle = len(list(held.iterdir()))
         with ExitStack() as stack:
             taken = 0
             for _ in range(30):
@@ -358,6 +360,7 @@ def test_without_descriptors_connections_are_refused_once_said_and_the_loop_slee
             assert until_closed(late) == b""
             assert select.select([late], [], [], 0.5)[0] == [late]
             assert cpu_s(run.pid) - before < 0.1, "it turns in circles"
+        until(lambda: len(list(held.iterdir())) == idle, "descriptors of the connections that have ended are free")
         with Control(control) as c:  # there is room again
             assert c.call("time").result["t_s"] == 0.0
         _, err = run.communicate(timeout=TIMEOUT_S)

@@ -288,7 +288,9 @@ LUA = Path(__file__).resolve().parents[3] / "share/wireshark/psabench.lua"
 
 
 def test_the_dissector_is_that_of_the_dbc() -> None:
-    assert LUA.read_text(encoding="utf-8") == wireshark.lua(), "python -m psabench.logs.wireshark > " + str(LUA)
+    assert LUA.read_text(encoding="utf-8") == wireshark.dissector_text(), "python -m psabench.logs.wireshark > " + str(
+        LUA
+    )
 
 
 @WITH_TSHARK

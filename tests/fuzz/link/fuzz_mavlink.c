@@ -3,7 +3,7 @@
  * the user asked for it. */
 #include "fuzz.h"
 
-#include "app/mavlink_psa2.h"
+#include "app/mavlink.h"
 #include "base/bits.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static struct world {
     struct mav_station m;
     struct mav_parser out, in;
     struct mav_sender peer;
-    struct mavlink_psa2 psa2;
+    struct psa2_reader psa2;
     bool hil;
 } w;
 
@@ -74,12 +74,15 @@ static double on_value(void *ctx, unsigned which, int64_t t_ns)
 
 static void on_ear(void *ctx, const struct can_msg *m, int64_t t_ns)
 {
-    struct mav_reading out[MAVLINK_PSA2_READINGS];
+    struct psa2_reading out[PSA2_READINGS_MAX];
     (void)ctx;
     mav_station_frame(&w.m, m, t_ns);
-    const unsigned n = mavlink_psa2_take(&w.psa2, m, t_ns, out);
-    assert(n <= MAVLINK_PSA2_READINGS);
-    for (unsigned i = 0; i < n; i++) mav_station_reading(&w.m, &out[i]);
+    const unsigned n = psa2_reading_take(&w.psa2, m, t_ns, out);
+    assert(n <= PSA2_READINGS_MAX);
+    for (unsigned i = 0; i < n; i++) {
+        const struct mav_reading r = mavlink_reading(&out[i]);
+        mav_station_reading(&w.m, &r);
+    }
 }
 
 /* Of the link's: to its unit, an upload or an expedited download. */

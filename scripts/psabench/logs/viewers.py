@@ -30,7 +30,7 @@ LINE = re.compile(rb"\$var\s+wire\s+1\s+\S+\s+(\w+)\s+\$end")
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench waveform`. Raises BadInput."""
     p = Parser(prog="psabench waveform", description="Write viewer files, install decoders.", epilog=EPILOG)
-    p.set_defaults(handler=_waveform)
+    p.set_defaults(handler=_run_waveform)
     p.add_argument("file", type=Path, nargs="?", help="VCD file of psa-emu --vcd")
     p.add_argument("--decoders", action="store_true", help="copy the sigrok decoders into FOLDER")
     folder = user_decoders()
@@ -44,7 +44,7 @@ def user_decoders() -> Path:
     return Path(data) / "libsigrokdecode/decoders"
 
 
-def _waveform(args: argparse.Namespace) -> int:
+def _run_waveform(args: argparse.Namespace) -> int:
     if args.file is None and not args.decoders:
         raise BadInput(expected("a VCD file or --decoders", "none", "waveform"))
     written = write_sessions(args.file) if args.file else []
@@ -54,7 +54,7 @@ def _waveform(args: argparse.Namespace) -> int:
     return 0
 
 
-def shipped(folder: str) -> Path:
+def shipped_folder(folder: str) -> Path:
     """A folder of this package, of the checkout, or of an installation. Raises BadInput."""
     installed = Path(sys.prefix) / "share/psabench" / folder
     for place in (BUNDLE / "share/psabench" / folder, CHECKOUT / folder, installed):
@@ -76,15 +76,17 @@ def write_sessions(vcd: Path) -> list[Path]:
     board = scope[1].decode()
     written = []
     for ending in (".gtkw", ".pvs"):
-        ours = shipped("share") / f"{board}{ending}"
-        text = ours.read_text(encoding="utf-8") if ours.is_file() else gtkw(board, lines) if ending == ".gtkw" else ""
+        ours = shipped_folder("share") / f"{board}{ending}"
+        text = (
+            ours.read_text(encoding="utf-8") if ours.is_file() else gtkw_text(board, lines) if ending == ".gtkw" else ""
+        )
         if text:
             replace_file(vcd.with_suffix(ending), text)
             written.append(vcd.with_suffix(ending))
     return written
 
 
-def gtkw(scope: str, lines: Sequence[str]) -> str:
+def gtkw_text(scope: str, lines: Sequence[str]) -> str:
     """A GTKWave save file with all lines, in the order of the recording."""
     return "\n".join(["[timestart] 0", "@28", *(f"{scope}.{line}" for line in lines), ""])
 
@@ -92,7 +94,7 @@ def gtkw(scope: str, lines: Sequence[str]) -> str:
 def install_decoders(folder: Path) -> list[Path]:
     """Copies of the decoders, which replace earlier ones. Raises BadInput, OutputError."""
     written = []
-    for decoder in sorted(d for d in shipped("decoders").iterdir() if (d / "pd.py").is_file()):
+    for decoder in sorted(d for d in shipped_folder("decoders").iterdir() if (d / "pd.py").is_file()):
         try:
             (folder / decoder.name).mkdir(parents=True, exist_ok=True)
             for source in sorted(decoder.glob("*.py")):

@@ -1,26 +1,28 @@
-#include "app/mavlink_psa2.h"
+#include "telemetry/psa2_reading.h"
 
+#include "board/psa2/psa2.h"
 #include "gen/psa2_od.h"
 #include "gen/psabench_can.h"
+#include "gen/psabench_scale.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { DBC_NODE = 5, SHIFT_FAST = 8, NS_PER_US = 1000, NS_PER_TICK = 4000 };
 
-static const double volts_per_code = 10.0 / 8388608.0;
-
 static uint8_t status_of(unsigned settled, unsigned clip, unsigned overrun, unsigned temp_new)
 {
-    return (uint8_t)((settled ? PSABENCH_STATUS_SETTLED : 0) | (clip ? PSABENCH_STATUS_CLIP : 0) |
-                     (overrun ? PSABENCH_STATUS_OVERRUN : 0) | (temp_new ? PSABENCH_STATUS_TEMP_NEW : 0));
+    return (uint8_t)((settled ? PSA2_ST_SETTLED : 0) | (clip ? PSA2_ST_CLIP : 0) | (overrun ? PSA2_ST_OVERRUN : 0) |
+                     (temp_new ? PSA2_ST_TEMP_NEW : 0));
 }
 
-static void set_codes(struct mav_reading *r, int32_t x, int32_t y, int32_t z)
+static void set_codes(struct psa2_reading *r, int32_t x, int32_t y, int32_t z)
 {
     const int32_t code[3] = {x, y, z};
+    const double scale_v[3] = {PSABENCH_PSA2_XY_X_SCALE, PSABENCH_PSA2_XY_Y_SCALE, PSABENCH_PSA2_ZT_Z_SCALE};
     for (unsigned k = 0; k < 3; k++) {
         r->code[k] = code[k];
-        r->volts[k] = code[k] * volts_per_code;
+        r->volts[k] = code[k] * scale_v[k];
     }
 }
 
@@ -33,7 +35,7 @@ static int64_t unwrap_ns(uint64_t stamp, int64_t unit_ns, unsigned bits, int64_t
 }
 
 /* Numbers missing before this one; a board that was reset begins at 0. */
-static uint32_t gap_before(struct mavlink_psa2 *d, uint16_t seq)
+static uint32_t gap_before(struct psa2_reader *d, uint16_t seq)
 {
     const uint16_t gap = (uint16_t)(seq - d->seq - 1);
     const uint32_t lost = d->has_seq && seq != 0 ? gap : 0;
@@ -42,7 +44,7 @@ static uint32_t gap_before(struct mavlink_psa2 *d, uint16_t seq)
     return lost;
 }
 
-static unsigned take_xy(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out)
+static unsigned take_xy(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out)
 {
     (void)t_ns;
     (void)out;
@@ -51,7 +53,7 @@ static unsigned take_xy(struct mavlink_psa2 *d, const struct can_msg *m, int64_t
     return 0;
 }
 
-static unsigned take_zt(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out)
+static unsigned take_zt(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out)
 {
     struct psabench_psa2_xy_t xy;
     struct psabench_psa2_zt_t zt;
@@ -59,43 +61,54 @@ static unsigned take_zt(struct mavlink_psa2 *d, const struct can_msg *m, int64_t
     d->has_xy = false;
     psabench_psa2_xy_unpack(&xy, d->xy.data, d->xy.len);
     psabench_psa2_zt_unpack(&zt, m->data, m->len);
-    *out = (struct mav_reading){.t_ns = unwrap_ns(zt.tstamp, NS_PER_TICK, 16, t_ns),
-                                .lost = gap_before(d, xy.seq),
-                                .temp_code = zt.t,
-                                .temp_channel = zt.channel,
-                                .status = status_of(zt.settled, zt.clip, zt.overrun, zt.t_new)};
+    *out = (struct psa2_reading){.form = PSA2_FORM_PAIR,
+                                 .sequence = xy.seq,
+                                 .t_sample_s = zt.tstamp * PSABENCH_PSA2_ZT_TSTAMP_SCALE,
+                                 .t_ns = unwrap_ns(zt.tstamp, NS_PER_TICK, 16, t_ns),
+                                 .lost = gap_before(d, xy.seq),
+                                 .temp_code = zt.t,
+                                 .temp_channel = (int8_t)zt.channel,
+                                 .status = status_of(zt.settled, zt.clip, zt.overrun, zt.t_new)};
     set_codes(out, xy.x, xy.y, zt.z);
     return 1;
 }
 
-static unsigned take_fast(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out)
+static unsigned take_fast(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out)
 {
     struct psabench_psa2_fast_t f;
     psabench_psa2_fast_unpack(&f, m->data, m->len);
-    *out = (struct mav_reading){.t_ns = t_ns, .lost = d->has_toggle && f.tog == d->toggle};
+    *out = (struct psa2_reading){.form = PSA2_FORM_FAST,
+                                 .sequence = -1,
+                                 .t_sample_s = NAN,
+                                 .t_ns = t_ns,
+                                 .lost = d->has_toggle && f.tog == d->toggle,
+                                 .temp_channel = -1};
     set_codes(out, f.x * SHIFT_FAST, f.y * SHIFT_FAST, f.z * SHIFT_FAST);
     d->toggle = f.tog;
     d->has_toggle = true;
     return 1;
 }
 
-static unsigned take_frame(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out)
+static unsigned take_frame(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out)
 {
     struct psabench_psa2_frame_t f;
     (void)d;
     psabench_psa2_frame_unpack(&f, m->data, m->len);
-    *out = (struct mav_reading){.t_ns = unwrap_ns(f.tstamp, NS_PER_US, 32, t_ns),
-                                .temp_code = f.t,
-                                .temp_channel = f.channel,
-                                .status = status_of(f.settled, f.clip, f.overrun, f.t_new)};
+    *out = (struct psa2_reading){.form = PSA2_FORM_FRAME,
+                                 .sequence = -1,
+                                 .t_sample_s = f.tstamp * PSABENCH_PSA2_FRAME_TSTAMP_SCALE,
+                                 .t_ns = unwrap_ns(f.tstamp, NS_PER_US, 32, t_ns),
+                                 .temp_code = f.t,
+                                 .temp_channel = (int8_t)f.channel,
+                                 .status = status_of(f.settled, f.clip, f.overrun, f.t_new)};
     set_codes(out, f.x, f.y, f.z);
     return 1;
 }
 
 /* A sample of a block has the bits of a PSA2_FRAME but for the time stamp; the samples follow the first in equal steps. */
-static unsigned take_block(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out)
+static unsigned take_block(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out)
 {
-    enum { HEAD = 4, SAMPLE = 12, COUNT = MAVLINK_PSA2_READINGS };
+    enum { HEAD = 4, SAMPLE = 12, COUNT = PSA2_READINGS_MAX };
     const uint32_t stamp_us =
         (uint32_t)m->data[0] | (uint32_t)m->data[1] << 8 | (uint32_t)m->data[2] << 16 | (uint32_t)m->data[3] << 24;
     const int64_t first_ns = unwrap_ns(stamp_us, NS_PER_US, 32, t_ns);
@@ -107,6 +120,9 @@ static unsigned take_block(struct mavlink_psa2 *d, const struct can_msg *m, int6
         struct can_msg one = {.len = PSABENCH_PSA2_FRAME_LENGTH};
         memcpy(one.data, &m->data[HEAD + SAMPLE * k], SAMPLE);
         (void)take_frame(d, &one, t_ns, &out[k]);
+        out[k].form = PSA2_FORM_BLOCK;
+        out[k].sample = (uint8_t)k;
+        out[k].t_sample_s = k ? NAN : stamp_us * PSABENCH_PSA2_BLOCK_TSTAMP_SCALE;
         out[k].t_ns = first_ns + step_ns * (int64_t)k;
     }
     d->block_us = stamp_us;
@@ -117,7 +133,7 @@ static unsigned take_block(struct mavlink_psa2 *d, const struct can_msg *m, int6
 static const struct {
     uint32_t id;
     uint8_t flags, len;
-    unsigned (*take)(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns, struct mav_reading *out);
+    unsigned (*take)(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns, struct psa2_reading *out);
 } rows[] = {
     {PSABENCH_PSA2_XY_FRAME_ID, 0, PSABENCH_PSA2_XY_LENGTH, take_xy},
     {PSABENCH_PSA2_ZT_FRAME_ID, 0, PSABENCH_PSA2_ZT_LENGTH, take_zt},
@@ -126,8 +142,8 @@ static const struct {
     {PSABENCH_PSA2_BLOCK_FRAME_ID, CAN_FD, PSABENCH_PSA2_BLOCK_LENGTH, take_block},
 };
 
-unsigned mavlink_psa2_take(struct mavlink_psa2 *d, const struct can_msg *m, int64_t t_ns,
-                           struct mav_reading out[MAVLINK_PSA2_READINGS])
+unsigned psa2_reading_take(struct psa2_reader *d, const struct can_msg *m, int64_t t_ns,
+                           struct psa2_reading out[PSA2_READINGS_MAX])
 {
     for (unsigned i = 0; i < sizeof rows / sizeof *rows; i++) {
         const uint32_t id = rows[i].id - DBC_NODE + d->node;
