@@ -53,7 +53,7 @@ NO_GEN := setup run test test-all quick bench mutants clean help uninstall lock
 include $(if $(filter-out $(NO_GEN),$(or $(MAKECMDGOALS),all)),build/gen/gen.mk)
 
 LCM      := $(wildcard build/gen/lcm/*.c)#   none without lcm-gen: an emulator that has no --lcm
-SRC      := $(filter-out $(if $(LCM),%/service_no_lcm.c,emu/telemetry/% %/service_lcm.c),$(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c emu/$(d)/*/*.c))))
+SRC      := $(filter-out $(if $(LCM),%/service_no_lcm.c,emu/telemetry/lcm_% %/service_lcm.c),$(sort $(foreach d,$(DIRS),$(wildcard emu/$(d)/*.c emu/$(d)/*/*.c))))
 MAIN     := $(filter emu/app/main.c,$(SRC))
 OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
@@ -122,8 +122,7 @@ $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 build/gen/gen.mk: $(wildcard proto/*.yaml proto/mavlink/*.xml proto/lcm/*.lcm) tools/gen_proto.py tools/gen_mavlink.py tools/gen_lcm $(wildcard tools/protogen/*.py) | $(PY)
 	@mkdir -p $(@D) && $(PY) tools/gen_proto.py --out $(@D) && $(PY) tools/gen_mavlink.py --out $(@D) && CC='$(CC)' tools/gen_lcm $(@D)/lcm
 	@echo 'GEN_SRC := $$(sort $$(wildcard build/gen/*.c build/gen/lcm/*.c))' > $@
-$(PY):
-	tools/setup run
+$(PY): ; tools/setup run
 
 setup: ## system packages (as root or with sudo) and .venv, all that make test needs
 	tools/setup test
@@ -183,24 +182,19 @@ format: ## rewrite C and Python in the project's format
 	find emu tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp' | xargs clang-format -i
 	$(PY) -m ruff format .
 docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, requirements, tables of the pages, FIDELITY.md
-	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs
-	$(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua
+	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions under $(DESTDIR)$(PREFIX)
 	@$(INSTALL) install
-uninstall: ## remove what install put there
-	@$(INSTALL) uninstall
-foreign: all ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/tools/mavlink.md)
-	@tools/foreign
+uninstall: ; @$(INSTALL) uninstall ## remove what install put there
+foreign: all ; @tools/foreign ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/tools/mavlink.md)
 wheel: all ## build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
 compile_commands.json: Makefile $(SRC) $(GEN_SRC) ## how each file is compiled, for editors and clang-tidy
 	@python3 tools/compile_commands.py '$(COMPILE)' $(SRC) $(GEN_SRC) -- '$(COMPILE) -Itests/unit' $(UNIT) > $@
-lock: $(PY) ## pin requirements*.in in requirements*.lock
-	tools/lock
-clean: ## remove everything that was built; .venv stays
-	rm -rf build build-* compile_commands.json
+lock: $(PY) ; tools/lock ## pin requirements*.in in requirements*.lock
+clean: ; rm -rf build build-* compile_commands.json ## remove everything that was built; .venv stays
 help: ## this list
 	@sed -n 's/^\([a-z_.0-9-]*\):.* ## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r t d; do printf '  %-22s %s\n' "$$t" "$$d"; done
 -include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d) $(BENCH_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d) $(FUZZ_SRC:%.c=$(BUILD)/obj/%.d)

@@ -163,7 +163,7 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, more logs and recorded units.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 53_900, 53_900),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 42_550, 42_550),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_570, 1_570),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_575, 1_575),
 }
 
 

@@ -199,7 +199,7 @@ static void set_scale(struct mavlink *m, struct mav_cfg *c, int64_t t_ns)
 
 static void open_station(struct mavlink *m, const struct options *o, unsigned params)
 {
-    const struct options_mavlink *a = m->o;
+    const struct mav_options *a = m->o;
     const struct mav_io io = {.ctx = m,
                               .send = mav_port_send,
                               .readouts = on_readouts,
@@ -237,7 +237,7 @@ static int find_unit(const struct bench *b, const char *name)
 bool mavlink_check(const struct bench *b, const struct options *o, char *why, size_t cap)
 {
     for (unsigned i = 0; i < o->mavlink_count; i++) {
-        const struct options_mavlink *m = &o->mavlink[i];
+        const struct mav_options *m = &o->mavlink[i];
         const int unit = find_unit(b, m->unit);
         if (unit < 0 || (unsigned)unit >= b->scenario.unit_count)
             return why_fail(why, cap, "--mavlink %s: expected a unit of the scenario, got \"%s\"", m->arg, m->unit);
@@ -255,7 +255,7 @@ static bool fail_open(const struct mavlink *m, int err, char *why, size_t cap)
 }
 
 struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
-                             const struct options_mavlink *a, char *why, size_t cap)
+                             const struct mav_options *a, char *why, size_t cap)
 {
     struct mavlink *m = calloc(1, sizeof *m);
     const unsigned unit = (unsigned)find_unit(b, a->unit);

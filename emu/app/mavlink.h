@@ -11,7 +11,7 @@ struct mavlink {
     struct mav_port port; /* first */
     struct bench *bench;
     struct unit *unit;
-    const struct options_mavlink *o;
+    const struct mav_options *o;
     struct can_node ear; /* on the unit's bus; sends nothing */
     bool decodes;        /* the unit is a PSA-2 */
     struct psa2_reader psa2;
@@ -23,7 +23,7 @@ bool mavlink_check(const struct bench *b, const struct options *o, char *why, si
 
 /* Opens one, checked; hubs: those of the buses. NULL with one line in why. */
 struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
-                             const struct options_mavlink *m, char *why, size_t cap);
+                             const struct mav_options *m, char *why, size_t cap);
 
 /* A reading as a station takes it. Pure. */
 struct mav_reading mavlink_reading(const struct psa2_reading *r);

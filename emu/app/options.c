@@ -240,7 +240,7 @@ static bool set_mavlink(const struct target *t, const char *arg)
     struct options *o = t->o;
     const char *form;
     if (o->mavlink_count == OPTIONS_MAVLINK_MAX) return expected(t, arg, "up to %u MAVLink links", OPTIONS_MAVLINK_MAX);
-    return options_mavlink(arg, &o->mavlink[o->mavlink_count++], &form) || expected(t, arg, "%s", form);
+    return mav_options_parse(arg, &o->mavlink[o->mavlink_count++], &form) || expected(t, arg, "%s", form);
 }
 
 static bool set_path(const struct target *t, const char *arg)

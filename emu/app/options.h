@@ -3,7 +3,7 @@
 #define PSABENCH_APP_OPTIONS_H
 
 #include "app/pace.h"
-#include "link/mavlink/mav_kind.h"
+#include "link/mavlink/mav_options.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -15,8 +15,7 @@
 #define OPTIONS_BUS_MAX   8u
 #define OPTIONS_LOGIC_MAX 4u
 
-#define OPTIONS_MAVLINK_MAX  4u
-#define OPTIONS_MAVLINK_PORT 14550u /* where ground stations listen; of tcp: 5760 */
+#define OPTIONS_MAVLINK_MAX 4u
 
 enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_UDP, OPTIONS_CAN_LOG };
 
@@ -44,16 +43,6 @@ struct options_bus {
 struct options_logic {
     uint16_t port;     /* 0: a free one */
     const char *lines; /* names with commas; NULL: the board's default */
-};
-
-struct options_mavlink {
-    const char *arg; /* as given */
-    enum mav_port_kind kind;
-    uint16_t port;                    /* 0: a free one */
-    char link[256];                   /* of the pty; "": none */
-    char unit[32];                    /* "": the first */
-    uint8_t sysid, compid, autopilot; /* autopilot: MAV_AUTOPILOT */
-    double imu_hz, angles_hz, hil_hz; /* 0: not sent */
 };
 
 /* Of the buses, instead of the scenario's. */
@@ -87,7 +76,7 @@ struct options {
     unsigned bus_count;
     struct options_logic logic[OPTIONS_LOGIC_MAX];
     unsigned logic_count;
-    struct options_mavlink mavlink[OPTIONS_MAVLINK_MAX];
+    struct mav_options mavlink[OPTIONS_MAVLINK_MAX];
     unsigned mavlink_count;
     enum pace_kind pace;
     int64_t for_ns; /* end of the run; INT64_MAX: none */
@@ -119,10 +108,6 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
 /* Instead of the adapters that o has: those of a text with spaces between them, each as --can would have it. The text
  * is cut up and stays the caller's. False with one line in why. */
 bool options_cans(struct options *o, char *text, char *why, size_t cap);
-
-/* The argument of --mavlink: KIND[:PORT|:LINK][,KEY=VALUE...]; kept by pointer. Pure; bounded. False with what would be right in
- * *form. */
-bool options_mavlink(const char *arg, struct options_mavlink *o, const char **form);
 
 /* The text of --help. False: it cannot be written. */
 bool options_print_help(FILE *out);

@@ -32,9 +32,10 @@ from psabench.boards.unit import Unit
 from psabench.emulator import Emulator, Forked
 from psabench.errors import BadInput, BenchError, ControlError, TimeOut, expected
 from psabench.faults import Fault, Faults
-from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument, visa_address
+from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument
 from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control, Reply
+from psabench.link.endpoints import FIRST, emulator_buses, emulator_endpoints, opening_order, scpi_addresses
 from psabench.probe import Probe
 
 NS = 1_000_000_000
@@ -42,7 +43,6 @@ SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is hea
 SERIAL_SLICE_NS = NS // 20  # with slcan: a full pseudo-terminal stops time, and no one reads it while a slice runs
 AWAY_SLICE_NS = 60 * NS  # no one receives meanwhile: they are as short
 NONE = "none"  # as the CAN specification: no bus
-FIRST = "can0"  # name of a bus that has no other
 
 Kind = TypeVar("Kind", bound=Instrument)
 Board = TypeVar("Board", bound=Unit)
@@ -172,10 +172,10 @@ class Bench(AbstractContextManager["Bench"]):
         unknown = set(scpi or {}) - set(KINDS)
         if unknown:
             raise BadInput(expected(", ".join(KINDS), ", ".join(sorted(unknown)), "scpi"))
-        told = _endpoints(Path(control)) if control else []
+        told = emulator_endpoints(Path(control)) if control else []
         one: Mapping[str, str | None]
         if can is None and control:
-            one = emulator_buses(sorted(told, key=_ease), Path(control))
+            one = emulator_buses(sorted(told, key=opening_order), Path(control))
         else:
             one = {} if can == NONE else {FIRST: can} if can is None or isinstance(can, str) else can
         return cls(
@@ -459,45 +459,3 @@ def slices_s(dwell_s: float, slice_ns: int) -> Iterator[float]:
     dwell_ns = round(dwell_s * NS)
     for begun_ns in range(0, dwell_ns, slice_ns):
         yield min(slice_ns, dwell_ns - begun_ns) / NS
-
-
-def _endpoints(control: Path) -> list[dict[str, str]]:
-    """Those of an emulator that is there. Raises LinkError."""
-    with Control(control) as c:
-        return [{k: str(v) for k, v in e.items()} for e in c.call("endpoints").result["endpoints"]]
-
-
-def _ease(endpoint: Mapping[str, str]) -> int:
-    """Adapters that more than one program may open come first: a pseudo-terminal has room for one."""
-    return ("socketcand", "socketcan", "udp", "slcan").index(endpoint["can"]) if "can" in endpoint else -1
-
-
-def emulator_buses(endpoints: Sequence[Mapping[str, str]], control: Path | None) -> dict[str, str | None]:
-    """How python-can opens the buses of an emulator that units are on, by name, through its `ready` endpoints."""
-    with ExitStack() as stack:
-        units = stack.enter_context(Control(control)).call("units").result["units"] if control else []
-    buses = list(dict.fromkeys(u.get("bus", FIRST) for u in units)) or [FIRST]
-    found: dict[str, str | None] = {}
-    for e in (e for e in endpoints if "can" in e):
-        # a socketcand without a bus of its own serves them all, by the name that a client opens
-        serves = [e["bus"]] if "bus" in e else buses if e["can"] == "socketcand" else buses[:1]
-        for bus in serves:
-            found.setdefault(bus, bus_spec(e, bus if len(buses) > 1 else None))
-    return found
-
-
-def bus_spec(endpoint: Mapping[str, str], bus: str | None = None) -> str:
-    """How python-can opens a CAN endpoint of an emulator; bus: its name there, for a server of several."""
-    kind = endpoint["can"]
-    if kind == "socketcand":
-        return f"socketcand:{endpoint['host']}:{endpoint['port']}" + (f",channel={bus}" if bus else "")
-    if kind == "slcan":
-        return f"slcan:{endpoint['pty']}"
-    if kind == "udp":
-        return f"udp:[{endpoint['group']}]:{endpoint['port']}"
-    return f"socketcan:{endpoint['channel']},fd=true,receive_own_messages=false"
-
-
-def scpi_addresses(endpoints: Sequence[Mapping[str, str]]) -> dict[str, str]:
-    """VISA addresses of an emulator's instruments, by name."""
-    return {e["scpi"]: visa_address(e) for e in endpoints if "scpi" in e}

@@ -16,7 +16,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from psabench.bench import scpi_addresses
 from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import runner
 from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
@@ -24,6 +23,7 @@ from psabench.conform.profile import variant
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.emulator import Emulator
 from psabench.errors import BenchError
+from psabench.link.endpoints import scpi_addresses
 from psabench.procedures.head_bench import Silent
 
 from tests.false_positives.design import Case

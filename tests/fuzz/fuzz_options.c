@@ -16,7 +16,7 @@ static void check(const struct options *o)
     assert(o->pace != PACE_STEP || o->control);
     assert(o->mavlink_count <= OPTIONS_MAVLINK_MAX);
     for (unsigned i = 0; i < o->mavlink_count; i++) {
-        const struct options_mavlink *m = &o->mavlink[i];
+        const struct mav_options *m = &o->mavlink[i];
         assert(m->kind <= MAV_PTY && m->sysid && m->compid && (m->kind != MAV_UDP_OUT || m->port));
         assert(m->imu_hz >= 0 && m->imu_hz <= 10000 && m->angles_hz >= 0 && m->hil_hz >= 0 && m->hil_hz <= 10000);
     }

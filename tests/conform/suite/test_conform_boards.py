@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from psabench.bench import scpi_addresses
 from psabench.boards.registry import BUS_BOARDS
 from psabench.conform import suite
 from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
@@ -19,6 +18,7 @@ from psabench.conform.profile import Variant, variant
 from psabench.conform.runner import run
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.emulator import Emulator
+from psabench.link.endpoints import scpi_addresses
 from psabench.procedures.head_bench import Silent
 
 pytestmark = pytest.mark.host

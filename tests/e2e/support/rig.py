@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import pytest
-from psabench.bench import bus_spec as bus_spec  # for the tests that take it from here
-from psabench.bench import scpi_addresses
 from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost
 from psabench.link.control import Control
+from psabench.link.endpoints import bus_spec as bus_spec  # for the tests that take it from here
+from psabench.link.endpoints import scpi_addresses
 from psabench.places import find_emulator
 
 HERE = Path(__file__).resolve().parent

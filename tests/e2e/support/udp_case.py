@@ -13,11 +13,11 @@ from typing import Any
 
 import can
 from can.interfaces.udp_multicast.utils import pack_message
-from psabench.bench import bus_spec
 from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, StepClock, open_bus
 from psabench.link.control import Control
+from psabench.link.endpoints import bus_spec
 from rig import BENCH, TIMEOUT_S
 
 IP_RECVTTL = 12  # linux/in.h

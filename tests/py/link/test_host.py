@@ -15,13 +15,13 @@ from typing import Any
 import can
 import pytest
 from psabench import emulator
-from psabench.bench import emulator_buses
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, BenchError, ControlError, DeviceError, LinkError
 from psabench.link import can_host
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.canopen_host import CanopenNode
 from psabench.link.control import Control
+from psabench.link.endpoints import emulator_buses
 from psabench.places import find_emulator, proto_file
 
 IDLE = {"clients": [{"taken": 3}], "gone": {"taken": 4}}

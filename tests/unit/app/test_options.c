@@ -144,7 +144,7 @@ static void a_mavlink_link_has_a_kind_and_keys(void **state)
     assert_true(parse("--mavlink udp --mavlink tcp:0,imu=1000,hil=250,unit=b,sysid=255,compid=200,autopilot=px4 "
                       "--mavlink pty:/tmp/m,angles=0 --mavlink udpin:7"));
     assert_int_equal(o.mavlink_count, 4);
-    const struct options_mavlink *m = o.mavlink;
+    const struct mav_options *m = o.mavlink;
     assert_true(m[0].kind == MAV_UDP_OUT && m[0].port == 14550 && m[0].sysid == 1 && m[0].compid == 1);
     assert_true(m[0].imu_hz == 50 && m[0].angles_hz == 10 && m[0].hil_hz == 0 && !m[0].unit[0] && m[0].autopilot == 0);
     assert_true(m[1].kind == MAV_TCP && m[1].port == 0 && m[1].imu_hz == 1000 && m[1].hil_hz == 250);

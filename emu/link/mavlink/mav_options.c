@@ -1,4 +1,4 @@
-#include "app/options.h"
+#include "link/mavlink/mav_options.h"
 
 #include "link/mavlink/mav_wire.h"
 
@@ -27,7 +27,7 @@ static bool parse_count(const char *text, unsigned min, unsigned max, unsigned *
     return true;
 }
 
-static bool set_unit(struct options_mavlink *o, const char *text)
+static bool set_unit(struct mav_options *o, const char *text)
 {
     return *text && copy_part(o->unit, sizeof o->unit, text, strlen(text));
 }
@@ -40,17 +40,17 @@ static bool set_id(uint8_t *id, const char *text)
     return true;
 }
 
-static bool set_sysid(struct options_mavlink *o, const char *text)
+static bool set_sysid(struct mav_options *o, const char *text)
 {
     return set_id(&o->sysid, text);
 }
 
-static bool set_compid(struct options_mavlink *o, const char *text)
+static bool set_compid(struct mav_options *o, const char *text)
 {
     return set_id(&o->compid, text);
 }
 
-static bool set_autopilot(struct options_mavlink *o, const char *text)
+static bool set_autopilot(struct mav_options *o, const char *text)
 {
     static const struct {
         const char *word;
@@ -73,24 +73,24 @@ static bool set_hz(double *hz, const char *text)
     return text[0] >= '0' && text[0] <= '9' && !*end && *hz <= 10000 && (*hz == 0 || *hz >= 0.01);
 }
 
-static bool set_imu(struct options_mavlink *o, const char *text)
+static bool set_imu(struct mav_options *o, const char *text)
 {
     return set_hz(&o->imu_hz, text);
 }
 
-static bool set_angles(struct options_mavlink *o, const char *text)
+static bool set_angles(struct mav_options *o, const char *text)
 {
     return set_hz(&o->angles_hz, text);
 }
 
-static bool set_hil(struct options_mavlink *o, const char *text)
+static bool set_hil(struct mav_options *o, const char *text)
 {
     return set_hz(&o->hil_hz, text);
 }
 
 static const struct {
     const char *key;
-    bool (*set)(struct options_mavlink *o, const char *text);
+    bool (*set)(struct mav_options *o, const char *text);
     const char *form;
 } keys[] = {
     {"unit", set_unit, "unit=NAME"},
@@ -102,7 +102,7 @@ static const struct {
     {"hil", set_hil, "hil=HZ, 0 (off) or from 0.01 to 10000"},
 };
 
-static bool set_key(struct options_mavlink *o, const char *part, size_t n, const char **form)
+static bool set_key(struct mav_options *o, const char *part, size_t n, const char **form)
 {
     char word[WORD_MAX + 1];
     *form = "KEY=VALUE after a comma; KEY: unit, sysid, compid, autopilot, imu, angles or hil";
@@ -118,14 +118,14 @@ static bool set_key(struct options_mavlink *o, const char *part, size_t n, const
     return false;
 }
 
-static bool set_kind(struct options_mavlink *o, const char *part, size_t n, const char **form)
+static bool set_kind(struct mav_options *o, const char *part, size_t n, const char **form)
 {
     static const struct {
         const char *word;
         enum mav_port_kind kind;
         uint16_t port;
-    } kinds[] = {{"udp", MAV_UDP_OUT, OPTIONS_MAVLINK_PORT},
-                 {"udpin", MAV_UDP_IN, OPTIONS_MAVLINK_PORT},
+    } kinds[] = {{"udp", MAV_UDP_OUT, MAV_OPTIONS_PORT},
+                 {"udpin", MAV_UDP_IN, MAV_OPTIONS_PORT},
                  {"tcp", MAV_TCP, TCP_PORT},
                  {"pty", MAV_PTY, 0}};
     char word[WORD_MAX + 1];
@@ -146,9 +146,9 @@ static bool set_kind(struct options_mavlink *o, const char *part, size_t n, cons
     return true;
 }
 
-bool options_mavlink(const char *arg, struct options_mavlink *o, const char **form)
+bool mav_options_parse(const char *arg, struct mav_options *o, const char **form)
 {
-    *o = (struct options_mavlink){
+    *o = (struct mav_options){
         .arg = arg, .sysid = 1, .compid = 1, .autopilot = MAV_AUTOPILOT_GENERIC, .imu_hz = 50, .angles_hz = 10};
     size_t n = strcspn(arg, ",");
     if (!set_kind(o, arg, n, form)) return false;
