@@ -134,11 +134,9 @@ static bool take_number(struct in *in, uint8_t first, struct value *v)
 {
     if (first == FLOAT_32 || first == FLOAT_64) return take_be(in, first == FLOAT_32 ? 4 : 8, &v->number);
     const bool sign = first >= INT_8;
-    const unsigned n = 1u << (first - (sign ? INT_8 : UINT_8));
-    if (!take_be(in, n, &v->number)) return false;
-    const bool negative = sign && v->number >> (8 * n - 1) & 1;
+    const bool negative = sign && in->p < in->end && *in->p & 0x80; /* the first byte has the sign */
     v->type = negative ? OTHER : UINT;
-    return true;
+    return take_be(in, 1u << (first - (sign ? INT_8 : UINT_8)), &v->number);
 }
 
 /* A scalar, a text or data; false: cut short, or an array, a map or an extension. */
