@@ -158,7 +158,9 @@ static void serve_polled(struct loop *l, struct link **polled, const struct poll
     for (unsigned i = 0; i < n; i++) {
         struct link *k = polled[i];
         const short input = POLLIN | POLLHUP | POLLERR;
-        if (!k->gone && k->fd >= 0 && k->want_read && p[i].revents & input) k->readable(k, t_ns);
+        const bool left = k->is_pty && k->want_read && (p[i].revents & (POLLIN | POLLHUP)) == POLLHUP;
+        if (left) k->idle = true;
+        else if (!k->gone && k->fd >= 0 && k->want_read && p[i].revents & input) k->readable(k, t_ns);
         if (!k->gone && k->fd >= 0 && p[i].revents & (POLLOUT | POLLERR) && k->flush) k->flush(k, t_ns);
     }
 }
@@ -189,7 +191,7 @@ static unsigned collect_fds(const struct loop *l, struct link **polled, struct p
         const short events = (short)((k->want_read ? POLLIN : 0) | (k->want_write ? POLLOUT : 0));
         polled[n] = k;
         /* An idle descriptor is left out: a hang-up would be reported without end. */
-        p[n++] = (struct pollfd){.fd = events && !k->gone ? k->fd : -1, .events = events};
+        p[n++] = (struct pollfd){.fd = events && !k->gone && !k->idle ? k->fd : -1, .events = events};
     }
     return n;
 }

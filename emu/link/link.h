@@ -18,6 +18,8 @@ struct link {
     bool want_write;   /* true while output waits */
     bool full;         /* output is above its high-water mark: in step and free pace time stands still meanwhile */
     bool linger;       /* at the end of a run the loop waits a while for the peer to hang up first */
+    bool is_pty;       /* hangs up while no program has it open: then the loop sets `idle` */
+    bool idle;         /* not polled; pty.c ends it when a program opens the port */
     bool gone;         /* to be reaped: release() is the last call */
     bool slow;         /* the loop's: said that time waits for it */
     size_t pending;    /* bytes of output not yet handed to the kernel */

@@ -12,21 +12,23 @@
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
-/* One row of /proc/locks, proc(5): "1: FLOCK  ADVISORY  WRITE 708 00:13:26 0 EOF": kind, pid, device and inode. */
+/* One row of /proc/locks, proc(5): "1: FLOCK  ADVISORY  WRITE 708 00:13:26 0 EOF": kind, pid, device, inode, first byte. */
 struct lock {
     char kind[8];
     long pid;
     unsigned major, minor;
     unsigned long inode;
+    long first;
 };
 
 static bool read_lock(const char *row, struct lock *l)
 {
-    return sscanf(row, "%*u: %7s %*s %*s %ld %x:%x:%lu", l->kind, &l->pid, &l->major, &l->minor, &l->inode) == 5;
+    return sscanf(row, "%*u: %7s %*s %*s %ld %x:%x:%lu %ld", l->kind, &l->pid, &l->major, &l->minor, &l->inode,
+                  &l->first) == 6;
 }
 
 /* Some file systems (btrfs, overlay) show another device than stat() does: then the inode alone must do, for a message. */
-static long owner_of(const struct stat *st, const char *kind, bool by_device)
+static long owner_of(const struct stat *st, const char *kind, long first, bool by_device)
 {
     char row[256];
     struct lock l;
@@ -34,22 +36,31 @@ static long owner_of(const struct stat *st, const char *kind, bool by_device)
     FILE *locks = fopen("/proc/locks", "re");
     while (locks && !found && fgets(row, sizeof row, locks)) {
         if (!read_lock(row, &l) || strcmp(l.kind, kind) != 0 || l.inode != st->st_ino || l.pid <= 0) continue;
+        if (l.first != first) continue;
         if (!by_device || (l.major == major(st->st_dev) && l.minor == minor(st->st_dev))) found = l.pid;
     }
     if (locks) fclose(locks);
     return found;
 }
 
-void own_port_lock(int fd)
+static bool port_number(const char *path, unsigned *number)
 {
-    struct flock whole = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    (void)fcntl(fd, F_SETLK, &whole);
+    return sscanf(path, "/dev/pts/%u", number) == 1;
+}
+
+void own_port_lock(int master, const char *path)
+{
+    unsigned number;
+    if (!port_number(path, &number)) return;
+    struct flock byte = {.l_type = F_WRLCK, .l_whence = SEEK_SET, .l_start = number, .l_len = 1};
+    (void)fcntl(master, F_SETLK, &byte);
 }
 
 long own_port_owner(const char *path)
 {
     struct stat st;
-    return stat(path, &st) == 0 ? owner_of(&st, "POSIX", true) : 0;
+    unsigned number;
+    return port_number(path, &number) && stat("/dev/ptmx", &st) == 0 ? owner_of(&st, "POSIX", number, true) : 0;
 }
 
 /* Where locks are not to be had (some network file systems), the file is written without. */
@@ -59,8 +70,8 @@ static int take_over(int fd, long *owner)
     if (fstat(fd, &st) < 0) return -errno;
     if (!S_ISREG(st.st_mode)) return 0;
     if (flock(fd, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK) {
-        *owner = owner_of(&st, "FLOCK", true);
-        if (!*owner) *owner = owner_of(&st, "FLOCK", false);
+        *owner = owner_of(&st, "FLOCK", 0, true);
+        if (!*owner) *owner = owner_of(&st, "FLOCK", 0, false);
         return -EBUSY;
     }
     return ftruncate(fd, 0) < 0 ? -errno : 0;

@@ -23,11 +23,11 @@ off_t own_file_cut(int fd);
 /* True when the file has no name any more; else it was moved, and what is in it can be found. */
 bool own_file_removed(int fd);
 
-/* A serial port is locked by fcntl's lock, which shows who serves it and leaves flock's to the port's users (pyserial's
- * exclusive=True). It ends with the first descriptor of the port that this process closes. */
-void own_port_lock(int fd);
+/* A pseudo-terminal is locked by fcntl's lock on /dev/ptmx, the byte of its number, which shows who serves it. It ends with
+ * the first master that this process closes. path: /dev/pts/N of the master. */
+void own_port_lock(int master, const char *path);
 
-/* Process that serves the port at a path; 0: none, or in another PID namespace. Does not open it: its owner would see that. */
+/* Process that serves /dev/pts/N; 0: none, or in another PID namespace. Does not open it: its owner would see that. */
 long own_port_owner(const char *path);
 
 /* Whether an error of a file lies with the machine (no space, descriptors or memory; a failing disk) or else with the path

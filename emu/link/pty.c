@@ -14,48 +14,31 @@
 #include <termios.h>
 #include <unistd.h>
 
-/* Wall time from a going to the question who is left. Whoever opens the port again at once comes meanwhile, and his coming
- * is seen: while the kernel is asked, no one's is. */
+/* Wall time from a going to the question whether a client is left: by then the kernel has taken note of it. */
 enum { ASK_MS = 37 };
 
-static int open_slave(const char *path)
-{
-    const int fd = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
-    if (fd >= 0) own_port_lock(fd);
-    return fd;
-}
-
-static int make_raw(int fd)
+/* Through the master, which changes the slave's settings: an own open of the slave would look like a client's. Flushes what
+ * the slave has not read. */
+static int set_raw(int master, bool defaults)
 {
     struct termios tio;
-    if (tcgetattr(fd, &tio) < 0) return -errno;
-    cfmakeraw(&tio);
-    return tcsetattr(fd, TCSANOW, &tio) < 0 ? -errno : 0;
+    if (tcgetattr(master, &tio) < 0) return -errno;
+    if (defaults) cfmakeraw(&tio);
+    tcflush(master, TCOFLUSH);
+    return tcsetattr(master, TCSAFLUSH, &tio) < 0 ? -errno : 0;
 }
 
-static void start_watch(struct pty *p)
-{
-    p->watch_id = inotify_add_watch(p->watch.fd, p->path, IN_OPEN | IN_CLOSE_WRITE | IN_CLOSE_NOWRITE);
-}
-
-/* Whether a program has the slave open. Without our own descriptor the kernel reports a hang-up when none has. */
-static bool in_use(struct pty *p)
+static bool in_use(const struct pty *p)
 {
     struct pollfd master = {.fd = p->line};
-    inotify_rm_watch(p->watch.fd, p->watch_id); /* our own open and close are not a client's */
-    close(p->slave);
-    const bool used = poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
-    p->slave = open_slave(p->path);
-    if (!used) make_raw(p->slave); /* the last one to close takes the settings along */
-    start_watch(p);
-    return used;
+    return poll(&master, 1, 0) < 1 || !(master.revents & POLLHUP);
 }
 
 static void set_openers(struct pty *p, int openers, int64_t t_ns)
 {
     const bool was = p->openers > 0;
     p->openers = openers;
-    if (openers == 0) pty_discard(p); /* what the last one has not read is not for the next */
+    if (openers == 0) set_raw(p->line, false); /* what the last one has not read is not for the next */
     if (was != (openers > 0)) p->opened(p->ctx, openers > 0, t_ns);
 }
 
@@ -66,22 +49,33 @@ static void on_watch(struct link *l, int64_t t_ns)
     struct pty *p = (struct pty *)l;
     _Alignas(struct inotify_event) char buf[4096];
     const ssize_t n = read(l->fd, buf, sizeof buf);
-    bool closed = false;
     for (ssize_t at = 0; at < n;) {
         const struct inotify_event *e = (const struct inotify_event *)(const void *)(buf + at);
         at += (ssize_t)(sizeof *e + e->len);
-        if (e->mask & IN_OPEN) set_openers(p, p->openers + 1, t_ns);
-        if (!(e->mask & (IN_CLOSE_WRITE | IN_CLOSE_NOWRITE))) continue;
-        closed = true;
-        if (p->openers > 0) set_openers(p, p->openers - 1, t_ns);
+        if (e->mask & IN_OPEN) {
+            if (p->port) p->port->idle = false;
+            set_openers(p, p->openers + 1, t_ns);
+        } else if (e->mask & (IN_CLOSE_WRITE | IN_CLOSE_NOWRITE)) {
+            l->timer_ms = ASK_MS;
+            if (p->openers > 0) set_openers(p, p->openers - 1, t_ns);
+        }
     }
-    if (closed) l->timer_ms = ASK_MS;
 }
 
+/* A client that the kernel knows and we do not has come this very moment, and its event is on the way; or it came together
+ * with another, as one event. The second question tells. */
 static void on_ask(struct link *l, int64_t t_ns)
 {
     struct pty *p = (struct pty *)l;
-    set_openers(p, !in_use(p) ? 0 : p->openers ? p->openers : 1, t_ns);
+    on_watch(l, t_ns);
+    const bool used = in_use(p), unknown = used && p->openers == 0;
+    if (!used) {
+        set_openers(p, 0, t_ns);
+        set_raw(p->line, true); /* the next client does not inherit the last one's settings */
+    }
+    if (unknown && p->doubted) set_openers(p, 1, t_ns);
+    else if (unknown) l->timer_ms = ASK_MS;
+    p->doubted = unknown && !p->doubted;
 }
 
 /* Where a symbolic link points, "" for anything else. */
@@ -112,22 +106,26 @@ static int open_pair(struct pty *p)
     p->line = p->master;
     const int err = ptsname_r(p->master, p->path, sizeof p->path);
     if (err) return -err;
-    p->slave = open_slave(p->path);
-    return p->slave < 0 ? -errno : make_raw(p->slave);
+    own_port_lock(p->master, p->path);
+    p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    return p->slave < 0 ? -errno : set_raw(p->master, true);
 }
 
-/* Watches who opens the slave; not fatal where inotify is not to be had. */
+/* Watches who opens the slave; not fatal where inotify is not to be had. Closing ours makes the master hang up. */
 static void watch_opens(struct pty *p)
 {
+    static const uint32_t events = IN_OPEN | IN_CLOSE_WRITE | IN_CLOSE_NOWRITE;
     p->watch = (struct link){
         .fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC), .want_read = true, .readable = on_watch, .timer = on_ask};
-    if (p->watch.fd >= 0) start_watch(p);
-    if (p->watch.fd >= 0 && p->watch_id < 0) {
+    snprintf(p->watch.who, sizeof p->watch.who, "pty %s", p->path);
+    if (p->watch.fd >= 0) {
+        close(p->slave);
+        p->slave = -1;
+        if (inotify_add_watch(p->watch.fd, p->path, events) >= 0) return;
         close(p->watch.fd);
         p->watch.fd = -1;
+        p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
     }
-    snprintf(p->watch.who, sizeof p->watch.who, "pty %s", p->path);
-    if (p->watch.fd >= 0) return;
     p->watch.notice = "no inotify instance is left (fs.inotify.max_user_instances): one client is assumed to be there";
     p->openers = 1;
 }
@@ -151,11 +149,6 @@ bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t
     static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
     if (err != -EBUSY) return why_fail(why, cap, "%s: %s", where, err == -EEXIST ? expected : strerror(-err));
     return why_fail(why, cap, "%s: expected a link that no other process serves, got one of pid %ld", where, p->owner);
-}
-
-void pty_discard(struct pty *p)
-{
-    tcflush(p->slave, TCIFLUSH);
 }
 
 void pty_close(struct pty *p)

@@ -1,8 +1,8 @@
 /* A pseudo-terminal that represents a serial port: raw, with a symbolic link to it; counts the programs that have it open.
- * The slave is locked (own_file.h): who wants the same link sees that the port is served, and by whom.
+ * The port is locked (own_file.h): who wants the same link sees that it is served, and by whom.
  *
- * Our own descriptor of the slave stays open, so that the port and its settings outlive each client and the master never
- * reads an error. Clients are counted by watching the slave's node; where that cannot be done one client is assumed. */
+ * We do not keep the slave open: the master's hang-up then says that no client has. A client that comes or goes is seen at
+ * the slave's node; where that cannot be watched, one client is assumed and the slave is kept open. */
 #ifndef PSABENCH_LINK_PTY_H
 #define PSABENCH_LINK_PTY_H
 
@@ -14,8 +14,10 @@ struct pty {
     struct link
         watch; /* first: inotify on the slave's node; served before the master, so that news of a client precede its
                           bytes */
-    int master, slave;
-    int line, watch_id; /* the master's descriptor, whoever owns it; inotify's number of the watch */
+    int master, slave;  /* slave: -1 while clients can be watched */
+    int line;           /* the master's descriptor, whoever owns it */
+    bool doubted;       /* asked once, and the kernel knows of a client that we do not */
+    struct link *port;  /* the link that reads the master; set by its owner */
     char path[64];      /* /dev/pts/N */
     const char *name;   /* symbolic link to it, or NULL */
     long owner;         /* after -EBUSY: process whose port the link leads to */
@@ -32,7 +34,6 @@ int pty_open(struct pty *p, const char *name);
 /* One line for -errno of pty_open(), which begins with `where` ("--line port"). False. */
 bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t cap);
 
-void pty_discard(struct pty *p); /* what the slave has not read yet is thrown away */
-void pty_close(struct pty *p);   /* and removes the link */
+void pty_close(struct pty *p); /* and removes the link */
 
 #endif

@@ -61,7 +61,7 @@ static void on_readable(struct link *l, int64_t t_ns)
     struct text_link *t = (struct text_link *)l;
     if (t->in_pos < t->in_len || t->eof) return;
     const ssize_t n = read(l->fd, t->in, sizeof t->in);
-    if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (n < 0 && (errno == EAGAIN || errno == EINTR || t->pty)) return; /* a pty that no program has open */
     if (t->ops->was_read) t->ops->was_read(l->fd);
     t->in_pos = 0;
     t->in_len = n > 0 ? (size_t)n : 0;
@@ -79,8 +79,8 @@ void text_link_flush(struct link *l, int64_t t_ns)
     if (t->in_pos < t->in_len) take_lines(t, t_ns);
     if (!t->hold && !t->stall && outbuf_pending(&t->out) && outbuf_flush(&t->out, l->fd) < 0) {
         outbuf_clear(&t->out); /* the peer is gone; its input is still processed */
-        t->eof = true;
-        if (t->in_pos == t->in_len) end_link(t, t_ns);
+        t->eof = !t->pty;
+        if (t->eof && t->in_pos == t->in_len) end_link(t, t_ns);
     }
     refresh_link(t);
 }
@@ -127,7 +127,6 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     t->in_pos = t->in_len = 0;
     outbuf_clear(&t->out);
     refresh_link(t);
-    pty_discard(t->pty);
 }
 
 int text_link_open_pty(struct text_link *t, struct pty *p, const struct text_link_cfg *cfg,
@@ -143,6 +142,8 @@ int text_link_open_pty(struct text_link *t, struct pty *p, const struct text_lin
     snprintf(t->link.who, sizeof t->link.who, "%s %s", cfg->who, p->path);
     t->link.fd = p->master;
     p->master = -1; /* the link's now */
+    t->link.is_pty = true;
+    p->port = &t->link;
     p->opened = on_opened;
     p->ctx = t;
     links_add_first(links, &t->link);

@@ -19,7 +19,7 @@ struct text_link_ops {
     void (*line)(struct text_link *t, enum lines_result r, const char *line, size_t len, int64_t t_ns);
     bool (*ready)(struct text_link *t); /* takes another line now; NULL: always */
     void (*was_read)(int fd);           /* after each read of the descriptor; may be NULL */
-    /* The peer has gone and all its lines were taken; called once. Not of a pty, whose slave we have open ourselves. */
+    /* The peer has gone and all its lines were taken; called once. Not of a pty: the next one may come. */
     void (*closed)(struct text_link *t, int64_t t_ns);
     /* Of a pty: the first program has opened it, the last has closed it; its last bytes may still be on their way. May be
      * NULL. */

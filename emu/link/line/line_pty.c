@@ -41,7 +41,6 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     struct line_pty *p = ctx;
     if (p->sampling) p->source.stop(p->source.ctx);
     p->pos = p->len = 0;
-    pty_discard(&p->pty);
     p->sampling = open && p->source.start(p->source.ctx, t_ns);
     refresh_link(p);
 }
@@ -53,8 +52,9 @@ int line_pty_open(struct line_pty *p, struct links *links, const struct line_sou
     p->source = *source;
     p->sampling = false;
     p->pos = p->len = 0;
-    p->link = (struct link){.fd = p->pty.master, .want_read = true, .readable = on_readable, .flush = on_flush};
+    p->link = (struct link){.fd = p->pty.master, .is_pty = true, .want_read = true, .readable = on_readable, .flush = on_flush};
     snprintf(p->link.who, sizeof p->link.who, "line port %s", p->pty.path);
+    p->pty.port = &p->link;
     p->pty.opened = on_opened;
     p->pty.ctx = p;
     links_add_first(links, &p->link);

@@ -174,7 +174,6 @@ static void on_opened(void *ctx, bool open, int64_t t_ns)
     outbuf_clear(&e->out);
     e->parser = (struct mav_parser){.received = e->parser.received, .malformed = e->parser.malformed};
     e->loss_told = false;
-    pty_discard(&e->port->pty);
     set_present(e, open);
     refresh_link(e);
 }
@@ -189,6 +188,8 @@ static int open_terminal(struct mav_port *p, const char *name)
         return -ENOMEM;
     }
     p->pty.master = -1; /* the link's now */
+    e->link.is_pty = true;
+    p->pty.port = &e->link;
     p->pty.opened = on_opened;
     p->pty.ctx = e;
     set_present(e, p->pty.openers > 0);

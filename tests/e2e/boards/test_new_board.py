@@ -22,6 +22,7 @@ SHARED_MAX = 2  # files that a board edits by hand
 GENERATED = {
     "proto/psabench.dbc",
     "scripts/psabench/boards/objects.py",
+    "scripts/psabench/boards/parameters.py",
     "proto/toy.eds",
     "docs/reference/protocol_toy.md",
 }

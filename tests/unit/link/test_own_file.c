@@ -83,22 +83,35 @@ static void a_file_has_one_owner_until_its_process_closes_it(void **state)
     assert_int_equal(st.st_size, 0);
 }
 
+/* Opens a master; path (64 bytes) is its slave's. */
+static int master(char *path)
+{
+    const int fd = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_true(fd >= 0);
+    assert_int_equal(grantpt(fd), 0);
+    assert_int_equal(unlockpt(fd), 0);
+    assert_int_equal(ptsname_r(fd, path, 64), 0);
+    return fd;
+}
+
 /* Whoever uses the port may lock it for himself with flock's lock. */
 static void a_port_shows_who_serves_it(void **state)
 {
-    const struct world *w = *state;
     int ends[2];
     long told = 0;
-    const int fd = open(w->path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    assert_int_equal(own_port_owner(w->path), 0);
-    own_port_lock(fd);
-    assert_int_equal(own_port_owner(w->path), getpid());
+    char path[64], other[64];
+    const int fd = master(path), second = master(other);
+    (void)state;
+    assert_int_equal(own_port_owner(path), 0);
+    own_port_lock(fd, path);
+    assert_int_equal(own_port_owner(path), getpid());
+    assert_int_equal(own_port_owner(other), 0);
     assert_int_equal(own_port_owner("/nowhere"), 0);
     assert_int_equal(pipe(ends), 0);
     const pid_t pid = fork();
     if (pid == 0) {
-        const int client = open(w->path, O_RDWR | O_CLOEXEC);
-        told = flock(client, LOCK_EX | LOCK_NB) == 0 ? own_port_owner(w->path) : -1;
+        const int client = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+        told = flock(client, LOCK_EX | LOCK_NB) == 0 ? own_port_owner(path) : -1;
         (void)!write(ends[1], &told, sizeof told);
         _exit(0);
     }
@@ -106,7 +119,8 @@ static void a_port_shows_who_serves_it(void **state)
     assert_int_equal(waitpid(pid, NULL, 0), pid);
     assert_int_equal(told, getpid());
     close(fd);
-    assert_int_equal(own_port_owner(w->path), 0);
+    assert_int_equal(own_port_owner(path), 0);
+    close(second);
     close(ends[0]);
     close(ends[1]);
 }

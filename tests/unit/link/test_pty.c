@@ -3,11 +3,15 @@
 
 #include "link/pty.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <termios.h>
 #include <unistd.h>
 
-enum { NEWS_MS = 10000 };
+enum { NEWS_MS = 10000, VISITS = 400 };
 
 struct client_rig {
     struct pty p;
@@ -102,6 +106,7 @@ static void of_two_who_came_at_once_one_is_left(void **state)
     close(a);
     news(&r);
     ask(&r);
+    ask(&r); /* once more: the event of one that has just come would be there by now */
     assert_int_equal(r.p.openers, 1);
     assert_int_equal(r.came, r.left + 1);
     close(b);
@@ -122,14 +127,110 @@ static void asking_makes_no_news(void **state)
     news(&r);
     ask(&r);
     struct pollfd watch = {.fd = r.p.watch.fd, .events = POLLIN};
-    while (poll(&watch, 1, 0) == 1) { /* IN_IGNORED of the watch that was taken off */
-        news(&r);
-        assert_int_equal(r.p.watch.timer_ms, 0);
-    }
+    assert_int_equal(poll(&watch, 1, 0), 0);
     assert_int_equal(r.came, r.left);
     const int fd = client(&r);
     news(&r);
     assert_int_equal(r.p.openers, 1);
+    close(fd);
+    pty_close(&r.p);
+}
+
+struct visitor {
+    const char *path;
+    atomic_int visits;
+    int fd; /* of the last visit, which goes on */
+};
+
+static void *visit(void *arg)
+{
+    struct visitor *v = arg;
+    for (int left = VISITS; left > 0; left--) {
+        v->fd = open(v->path, O_RDONLY | O_NOCTTY);
+        assert_true(v->fd >= 0);
+        atomic_fetch_add(&v->visits, 1);
+        if (left > 1) close(v->fd);
+    }
+    return NULL;
+}
+
+/* Takes all news, and asks as often as a timer is set, without its wait. */
+static void settle(struct client_rig *r)
+{
+    struct pollfd watch = {.fd = r->p.watch.fd, .events = POLLIN};
+    while (poll(&watch, 1, 0) == 1) news(r);
+    if (r->p.watch.timer_ms) ask(r);
+}
+
+/* A question that closed and opened the slave itself missed who came or went meanwhile. */
+static void who_comes_while_the_kernel_is_asked_is_seen(void **state)
+{
+    struct client_rig r;
+    (void)state;
+    start(&r);
+    for (int i = 0; i < 20; i++) {
+        struct visitor v = {.path = r.p.path};
+        pthread_t thread;
+        assert_int_equal(pthread_create(&thread, NULL, visit, &v), 0);
+        while (atomic_load(&v.visits) < VISITS) settle(&r);
+        assert_int_equal(pthread_join(thread, NULL), 0);
+        do settle(&r);
+        while (r.p.watch.timer_ms);
+        assert_true(r.p.openers > 0);
+        close(v.fd);
+        do settle(&r);
+        while (r.p.watch.timer_ms);
+        assert_int_equal(r.p.openers, 0);
+        assert_int_equal(r.came, r.left);
+    }
+    pty_close(&r.p);
+}
+
+static void settings_of(const char *path, struct termios *tio)
+{
+    const int fd = open(path, O_RDWR | O_NOCTTY);
+    assert_int_equal(tcgetattr(fd, tio), 0);
+    close(fd);
+}
+
+/* cat would echo what it reads, or take a VMIN of 0 for an end of the file. */
+static void nobody_inherits_the_settings_of_the_last_client(void **state)
+{
+    struct client_rig r;
+    struct termios first, tio;
+    (void)state;
+    start(&r);
+    settings_of(r.p.path, &first);
+    assert_int_equal(first.c_lflag & (ECHO | ICANON), 0);
+    const int fd = client(&r);
+    tio = first;
+    tio.c_lflag |= ECHO | ICANON;
+    tio.c_cc[VMIN] = 0;
+    assert_int_equal(tcsetattr(fd, TCSANOW, &tio), 0);
+    close(fd);
+    do settle(&r);
+    while (r.p.watch.timer_ms);
+    settings_of(r.p.path, &tio);
+    assert_int_equal(tio.c_lflag, first.c_lflag);
+    assert_int_equal(tio.c_cc[VMIN], 1);
+    pty_close(&r.p);
+}
+
+static void nobody_reads_what_the_last_client_left(void **state)
+{
+    struct client_rig r;
+    static const char text[8192];
+    char got[16];
+    (void)state;
+    start(&r);
+    int fd = client(&r);
+    news(&r);
+    assert_true(write(r.p.master, text, sizeof text) > 0);
+    close(fd);
+    news(&r);
+    fd = open(r.p.path, O_RDONLY | O_NOCTTY | O_NONBLOCK);
+    assert_int_equal(read(fd, got, sizeof got), -1);
+    assert_int_equal(errno, EAGAIN);
     close(fd);
     pty_close(&r.p);
 }
@@ -141,6 +242,9 @@ int main(void)
         cmocka_unit_test(two_who_close_at_once_have_both_left),
         cmocka_unit_test(of_two_who_came_at_once_one_is_left),
         cmocka_unit_test(asking_makes_no_news),
+        cmocka_unit_test(who_comes_while_the_kernel_is_asked_is_seen),
+        cmocka_unit_test(nobody_inherits_the_settings_of_the_last_client),
+        cmocka_unit_test(nobody_reads_what_the_last_client_left),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,145 @@
+/* The loop sleeps while there is nothing to do, also with a port that no program has open. */
+#include "rig.h"
+
+#include "app/loop.h"
+#include "link/text_link.h"
+
+#include <fcntl.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { WAIT_MS = 50, TURNS_MAX = 20 };
+
+struct loop_rig {
+    struct text_link io; /* first: a line is handed over with it */
+    struct pty pty;
+    struct sched sched;
+    struct pace pace;
+    struct links links;
+    struct loop loop;
+    struct link counter; /* counts turns; its timer ends the loop */
+    unsigned turns, lines;
+};
+
+static void on_line(struct text_link *t, enum lines_result result, const char *line, size_t len, int64_t t_ns)
+{
+    struct loop_rig *r = (struct loop_rig *)t;
+    (void)result;
+    (void)line;
+    (void)len;
+    (void)t_ns;
+    r->lines++;
+    text_link_put(t, "x\n", 2);
+}
+
+static void on_turn(struct link *l, int64_t t_ns)
+{
+    struct loop_rig *r = l->ctx;
+    (void)t_ns;
+    r->turns++;
+}
+
+static void on_timer(struct link *l, int64_t t_ns)
+{
+    struct loop_rig *r = l->ctx;
+    (void)t_ns;
+    r->loop.quit = true;
+}
+
+static void say(const char *text)
+{
+    (void)text;
+}
+
+static void start(struct loop_rig *r)
+{
+    static const struct text_link_cfg cfg = {
+        .who = "port", .end = '\n', .line_max = 80, .out_max = 4096, .out_high = 4096};
+    static const struct text_link_ops ops = {.line = on_line};
+    memset(r, 0, sizeof *r);
+    sched_init(&r->sched);
+    pace_init(&r->pace, PACE_STEP);
+    assert_int_equal(text_link_open_pty(&r->io, &r->pty, &cfg, &ops, &r->links, NULL), 0);
+    r->counter = (struct link){.fd = -1, .flush = on_turn, .timer = on_timer, .ctx = r};
+    links_add_last(&r->links, &r->counter);
+    r->loop = (struct loop){
+        .sched = &r->sched, .pace = &r->pace, .links = &r->links, .end_ns = SCHED_NEVER, .say = say, .ctx = r};
+}
+
+/* Turns of the loop within WAIT_MS. */
+static unsigned turns(struct loop_rig *r)
+{
+    static const volatile sig_atomic_t stop = 0;
+    r->turns = 0;
+    r->loop.quit = false;
+    r->counter.timer_ms = WAIT_MS;
+    loop_run(&r->loop, &stop);
+    return r->turns;
+}
+
+static int client(const struct loop_rig *r)
+{
+    const int fd = open(r->pty.path, O_RDWR | O_NOCTTY | O_NONBLOCK);
+    assert_true(fd >= 0);
+    return fd;
+}
+
+static void a_port_that_no_program_has_open_costs_nothing(void **state)
+{
+    static struct loop_rig r;
+    (void)state;
+    start(&r);
+    assert_in_range(turns(&r), 1, TURNS_MAX);
+    const int fd = client(&r);
+    assert_in_range(turns(&r), 1, TURNS_MAX);
+    close(fd);
+    assert_in_range(turns(&r), 1, TURNS_MAX);
+    text_link_free(&r.io);
+}
+
+static void each_client_is_heard_and_answered(void **state)
+{
+    static struct loop_rig r;
+    char got[16];
+    (void)state;
+    start(&r);
+    for (unsigned i = 1; i <= 3; i++) {
+        turns(&r);
+        const int fd = client(&r);
+        assert_int_equal(write(fd, "a\nb\n", 4), 4);
+        turns(&r);
+        assert_int_equal(r.lines, 2 * i);
+        assert_int_equal(read(fd, got, sizeof got), 4);
+        close(fd);
+    }
+    text_link_free(&r.io);
+}
+
+/* Its last bytes are read though it has gone, and no one is answered. */
+static void who_writes_and_closes_is_heard(void **state)
+{
+    static struct loop_rig r;
+    char got[16];
+    (void)state;
+    start(&r);
+    int fd = client(&r);
+    assert_int_equal(write(fd, "a\nb\n", 4), 4);
+    close(fd);
+    turns(&r);
+    assert_int_equal(r.lines, 2);
+    fd = client(&r);
+    turns(&r);
+    assert_int_equal(read(fd, got, sizeof got), -1);
+    close(fd);
+    text_link_free(&r.io);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_port_that_no_program_has_open_costs_nothing),
+        cmocka_unit_test(each_client_is_heard_and_answered),
+        cmocka_unit_test(who_writes_and_closes_is_heard),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
