@@ -14,14 +14,14 @@ struct pty {
     struct link
         watch; /* first: inotify on the slave's node; served before the master, so that news of a client precede its
                           bytes */
-    int master, slave;  /* slave: -1 while clients can be watched */
-    int line;           /* the master's descriptor, whoever owns it */
-    bool doubted;       /* asked once, and the kernel knows of a client that we do not */
-    struct link *port;  /* the link that reads the master; set by its owner */
-    char path[64];      /* /dev/pts/N */
-    const char *name;   /* symbolic link to it, or NULL */
-    long owner;         /* after -EBUSY: process whose port the link leads to */
-    int openers;        /* clients that have the slave open */
+    int master, slave; /* slave: -1 while clients can be watched */
+    int line;          /* the master's descriptor, whoever owns it */
+    bool doubted;      /* asked once, and the kernel knows of a client that we do not */
+    struct link *port; /* the link that reads the master; set by its owner */
+    char path[64];     /* /dev/pts/N */
+    const char *name;  /* symbolic link to it, or NULL */
+    long owner;        /* after -EBUSY: process whose port the link leads to */
+    int openers;       /* clients that have the slave open */
     void (*opened)(void *ctx, bool open, int64_t t_ns); /* first client came, last one left */
     void *ctx;
 };

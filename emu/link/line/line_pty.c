@@ -52,7 +52,8 @@ int line_pty_open(struct line_pty *p, struct links *links, const struct line_sou
     p->source = *source;
     p->sampling = false;
     p->pos = p->len = 0;
-    p->link = (struct link){.fd = p->pty.master, .is_pty = true, .want_read = true, .readable = on_readable, .flush = on_flush};
+    p->link = (struct link){
+        .fd = p->pty.master, .is_pty = true, .want_read = true, .readable = on_readable, .flush = on_flush};
     snprintf(p->link.who, sizeof p->link.who, "line port %s", p->pty.path);
     p->pty.port = &p->link;
     p->pty.opened = on_opened;
