@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 import socket
 import struct
@@ -10,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +135,36 @@ def test_mavsdk_reads_telemetry_and_parameters_and_is_told_who_calibrates(words:
         assert seen["int"]["ACCEL_UG_Y"] == pytest.approx(-2.5e6, abs=100)
     else:
         assert seen["error"].startswith("UNSUPPORTED")
+
+
+HIL_SCENARIO = """
+seed: 1
+start: true
+site: {latitude_deg: 55, longitude_deg: 37.5, height_m: 150}
+units: [{name: a, node: 5, axes: {x: {sensor: mems, u0_v: 2.5, kx_v_per_g: 1}}}]
+"""
+
+
+def test_an_autopilot_in_the_loop_hears_the_place_and_the_turning_earth(tmp_path: Path) -> None:
+    scenario = tmp_path / "hil.yaml"
+    scenario.write_text(HIL_SCENARIO, encoding="utf-8")
+    with emulator("tcp:0,hil=200", pace="step", scenario=str(scenario)) as emu, Control(emu.control_path) as control:  # type: ignore[arg-type]
+        gcs = mavutil_connection(emu)
+        until(lambda: gcs.port is not None, "the connection")
+        control.call("run", for_s=0)  # the connection is accepted in the turn that takes this command
+        control.call("run", for_s=1.0)
+        heard = [receive(gcs, "HIL_SENSOR", "HIL_GPS") for _ in range(150)]
+        gcs.close()
+    sensor = [m for m in heard if m.get_type() == "HIL_SENSOR"]
+    fixes = [m for m in heard if m.get_type() == "HIL_GPS"]
+    assert {b.time_usec - a.time_usec for a, b in pairwise(sensor)} == {5000}
+    assert {b.time_usec - a.time_usec for a, b in pairwise(fixes)} == {200000}
+    fix, last = fixes[-1], sensor[-1]
+    assert math.hypot(last.xgyro, last.ygyro, last.zgyro) == pytest.approx(7.292115e-5, rel=1e-6)  # WGS 84
+    assert last.abs_pressure == pytest.approx(1013.25 * (1 - 0.0065 * 150 / 288.15) ** 5.25588, abs=0.01)  # ISO 2533
+    assert (last.id, last.fields_updated, last.xmag) == (0, 0b1010_0011_1111, 0)
+    assert (fix.lat, fix.lon, fix.alt) == (550000000, 375000000, 150000)
+    assert (fix.fix_type, fix.vel, fix.cog) == (3, 0, 65535)
 
 
 def test_a_pseudo_terminal_and_udp_clients_at_once(tmp_path: Path) -> None:
