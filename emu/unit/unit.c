@@ -46,7 +46,7 @@ static void gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_m
 }
 
 /* Output of a sensor that feels a_mps2, and its faults. */
-static double felt_signal(struct unit *u, unsigned axis, const double a_mps2[3], int64_t t_ns)
+static inline double felt_signal(struct unit *u, unsigned axis, const double a_mps2[3], int64_t t_ns)
 {
     warm_sensor(u, axis, t_ns);
     const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
