@@ -28,6 +28,7 @@ from psabench.logs.ros2 import G0_MPS2, IMU, imu
 
 HOST = "127.0.0.1"
 SDK = "foxglove"  # its logger
+VIEW_TOPIC = "/view"
 BACKLOG = 4096  # messages for each reader
 IMU_BATCH = 32
 VIEW_SCHEMA = {
@@ -60,14 +61,16 @@ class Publisher:
         self._encode = serialize_dynamic("sensor_msgs/msg/Imu", IMU)["sensor_msgs/msg/Imu"]
         self._last_ns = 0
         self.counts = Viewed()
+        self._channel(RAW_TOPIC, lambda: Channel(RAW_TOPIC, schema=dict(RAW_SCHEMA), context=context))
+        self._channel(VIEW_TOPIC, lambda: Channel(VIEW_TOPIC, schema=VIEW_SCHEMA, context=context))
 
     def on_message(self, m: Message) -> None:
         self._last_ns = stamp_ns(m.timestamp)
-        self._log(RAW_TOPIC, raw_record(m), lambda: Channel(RAW_TOPIC, schema=dict(RAW_SCHEMA), context=self._context))
+        self._log(self._channels[RAW_TOPIC], raw_record(m))
         self.counts.frames += 1
         if decoded := self._decoder.decoded(m):
             topic, name, values = decoded
-            self._log(topic, values, lambda: self._decoded_channel(topic, name))
+            self._log(self._channel(topic, lambda: self._decoded_channel(topic, name)), values)
             self.counts.decoded += 1
         if self._reader is not None:
             self._reader.on_message(m)
@@ -78,13 +81,16 @@ class Publisher:
         """Each LOOK_S: what is collected, and the counters."""
         self._log_imu()
         counters = {"frames": self.counts.frames, "decoded": self.counts.decoded}
-        self._log("/view", counters, lambda: Channel("/view", schema=VIEW_SCHEMA, context=self._context))
+        self._log(self._channels[VIEW_TOPIC], counters)
 
-    def _log(self, topic: str, record: dict[str, Any], make: Callable[[], Channel]) -> None:
+    def _channel(self, topic: str, make: Callable[[], Channel]) -> Channel:
         if topic not in self._channels:
             self._channels[topic] = make()
+        return self._channels[topic]
+
+    def _log(self, channel: Channel, record: dict[str, Any]) -> None:
         text = json.dumps(record, separators=(",", ":"))
-        self._channels[topic].log(text.encode(), log_time=self._last_ns)
+        channel.log(text.encode(), log_time=self._last_ns)
 
     def _decoded_channel(self, topic: str, name: str) -> Channel:
         return Channel(topic, schema=schema(name), metadata=units(name), context=self._context)
@@ -93,14 +99,15 @@ class Publisher:
         if self._reader is None or not len(self._reader):
             return
         topic = f"/node{self._node}/imu"
-        if topic not in self._channels:
-            kind = Schema(name="sensor_msgs/msg/Imu", encoding="ros2msg", data=IMU.encode())
-            self._channels[topic] = Channel(topic, schema=kind, message_encoding="cdr", context=self._context)
+        kind = Schema(name="sensor_msgs/msg/Imu", encoding="ros2msg", data=IMU.encode())
+        channel = self._channel(
+            topic, lambda: Channel(topic, schema=kind, message_encoding="cdr", context=self._context)
+        )
         frames = self._reader.take()
         accel_mps2 = frames.u_v / self._v_per_g * G0_MPS2
         for t_s, axes in zip(frames.t_rx_s.tolist(), accel_mps2.tolist(), strict=True):
             data = self._encode(imu(t_s, axes, f"node{self._node}"))
-            self._channels[topic].log(data, log_time=stamp_ns(t_s))
+            channel.log(data, log_time=stamp_ns(t_s))
 
 
 def view(
@@ -117,13 +124,13 @@ def view(
     port: 0 takes a free one. ready: gets the address when clients can connect. Raises BadInput for a port in use.
     """
     context = foxglove.Context()
+    publisher = Publisher(context, node, board, v_per_g)  # its channels first: a client may subscribe at once
     with (
         _Warnings() as warnings,
         ctrl_c_noted() as pressed,
         CanHost(bus, WallClock()) as host,
         closing(_Server(context, port)) as server,
     ):
-        publisher = Publisher(context, node, board, v_per_g)
         host.listeners.append(publisher.on_message)
         ready(f"ws://{HOST}:{server.port}")
         try:
