@@ -80,7 +80,7 @@ static void end_file(struct service *s)
 static void begin_file(struct service *s)
 {
     struct capture_job *j = &s->capture;
-    char why[256];
+    char why[CAPTURE_PATH_MAX + 256];
     bool user;
     j->number++;
     struct capture_file *f = file_now(j);
@@ -88,7 +88,7 @@ static void begin_file(struct service *s)
     name_file(j, f->path);
     j->out = own_file_output("", f->path, &user, why, sizeof why);
     if (!j->out) {
-        fail_file(s, why);
+        fail_file(s, why + strlen(f->path) + strlen(": ")); /* the path is said beside it */
         disarm_job(s);
         return;
     }

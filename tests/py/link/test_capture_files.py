@@ -156,6 +156,20 @@ def test_a_full_disk_ends_the_file_and_not_the_run(tmp_path: Path) -> None:
     assert read_vcd(path).end_ns > 250 * MS
 
 
+def test_a_folder_that_has_gone_ends_the_capture_and_not_the_run(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    with bench() as (emu, control):
+        control.call("probe.arm", on="event:INT_FALL", path=str(folder / "c.vcd"))
+        folder.rmdir()
+        control.call("run", for_s=0.1)
+        (file,) = captures(control)
+        assert (file["path"], file["error"]) == (str(folder / "c.vcd"), "No such file or directory")
+        assert state(control) == "off"
+        assert f"capture {file['path']}: No such file or directory; the run continues\n" in emu.messages()
+        assert emu.stop() == 3
+
+
 def test_a_file_ends_at_its_limit(tmp_path: Path) -> None:
     path = tmp_path / "c.vcd"
     with bench() as (emu, control):
