@@ -88,7 +88,8 @@ static void begin_file(struct service *s)
     name_file(j, f->path);
     j->out = own_file_output("", f->path, &user, why, sizeof why);
     if (!j->out) {
-        fail_file(s, why + strlen(f->path) + strlen(": ")); /* the path is said beside it */
+        const size_t named = strncmp(why, f->path, strlen(f->path)) == 0 ? strlen(f->path) + strlen(": ") : 0;
+        fail_file(s, why + named); /* the path is said beside it */
         disarm_job(s);
         return;
     }
