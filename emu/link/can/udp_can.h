@@ -1,40 +1,24 @@
 /* Adapter: CAN frames in UDP multicast datagrams, as python-can's udp_multicast interface has them; classic, FD, remote and
  * error frames.
  *
- * The hop limit is 0: no datagram leaves this machine, and those of other machines are refused. The programs of a group are
- * one client of the simulated bus. A datagram comes back to each member of its group, the sender included: the adapter sends from
- * a port of its own and passes over what comes from there. Between programs that send to each other directly there is no
- * bit rate and no arbitration; UDP has no flow control, so that a program that reads too slowly loses frames in its own
- * socket, at every pace. */
+ * The hop limit is 0: no datagram leaves this machine, and those of other machines are refused. A datagram comes back to
+ * each member of its group, the sender included: the adapter sends from a port of its own and passes over what comes from
+ * there. Between programs that send to each other directly there is no bit rate and no arbitration. */
 #ifndef PSABENCH_LINK_CAN_UDP_CAN_H
 #define PSABENCH_LINK_CAN_UDP_CAN_H
 
-#include "link/can/can_hub.h"
+#include "link/can/dgram_can.h"
 
 #include <netinet/in.h>
-#include <sys/socket.h>
 
-#define UDP_CAN_QUEUE 4096u
 #define UDP_CAN_GROUP "239.74.163.2:43113" /* python-can's own IPv4 group */
 
-struct udp_can_stamped {
-    int64_t t_ns;
-    struct can_msg m;
-};
-
 struct udp_can {
-    struct link link; /* first; receives */
-    struct can_client can;
-    struct can_hub *hub;
+    struct dgram_can io; /* first */
     char group[INET6_ADDRSTRLEN];
     uint16_t port;
-    int out_fd;                                  /* sends */
-    struct sockaddr_storage self, asked;         /* where we send from; the last other address that was looked up */
-    bool asked_local;                            /* it is one of this machine */
-    struct udp_can_stamped queue[UDP_CAN_QUEUE]; /* waits for the kernel */
-    unsigned head, len;
-    uint32_t rxq_ovfl; /* the kernel's counter of datagrams it lost before we read them */
-    bool lost_reported, failed_reported, refused_reported;
+    struct sockaddr_storage self, asked; /* where we send from; the last other address that was looked up */
+    bool asked_local;                    /* it is one of this machine */
 };
 
 /* The address of "GROUP", "GROUP:PORT" or "[GROUP]:PORT"; without PORT it is 43113. False: not a group in 239.0.0.0/8 or
