@@ -71,16 +71,40 @@ static size_t bus_prefix(const char *arg)
     return arg[n] == '=' && n > 0 ? n + 1 : 0;
 }
 
+static const char *check_port(struct options_can *c)
+{
+    uint64_t port = SOCKETCAND_PORT;
+    if (c->arg && !parse_u64(c->arg, 65535, &port)) return "a port from 0 (any free port) to 65535";
+    c->port = (uint16_t)port;
+    return NULL;
+}
+
+static const char *check_group(struct options_can *c)
+{
+    struct sockaddr_storage group;
+    if (!c->arg) c->arg = UDP_CAN_GROUP;
+    if (udp_can_group(c->arg, &group)) return NULL;
+    return "udp:GROUP, udp:GROUP:PORT or udp:[GROUP]:PORT, GROUP 239.x.y.z or ff..::..";
+}
+
+static const char *check_tunnel(struct options_can *c)
+{
+    if (cannelloni_can_ports(c->arg ? c->arg : "", &c->tunnel)) return NULL;
+    return "cannelloni[:PORT[:PEER_PORT]], two ports from 1 to 65535, PORT 0: any free port";
+}
+
 static bool set_can(const struct target *t, const char *arg)
 {
     static const struct {
         const char *word;
-        bool named; /* has to say which interface or file */
-    } kinds[] = {{"socketcand", false},
-                 {"slcan", false},
-                 {"socketcan", true},
-                 {"udp", false},
-                 {"log", true}}; /* options_can_kind */
+        bool named;                                  /* has to say which interface or file */
+        const char *(*check)(struct options_can *c); /* NULL, or what is expected; may be NULL */
+    } kinds[] = {[OPTIONS_SOCKETCAND] = {"socketcand", false, check_port},
+                 [OPTIONS_SLCAN] = {"slcan", false, NULL},
+                 [OPTIONS_SOCKETCAN] = {"socketcan", true, NULL},
+                 [OPTIONS_UDP] = {"udp", false, check_group},
+                 [OPTIONS_CANNELLONI] = {"cannelloni", false, check_tunnel},
+                 [OPTIONS_CAN_LOG] = {"log", true, NULL}};
     enum { KINDS = sizeof kinds / sizeof *kinds };
     struct options *o = t->o;
     o->can_given = true;
@@ -88,25 +112,18 @@ static bool set_can(const struct target *t, const char *arg)
     if (o->can_count == OPTIONS_CAN_MAX) return expected(t, arg, "up to %u adapters", OPTIONS_CAN_MAX);
     struct options_can *c = &o->can[o->can_count];
     const char *kind = arg + bus_prefix(arg);
-    const char *colon = strchr(kind, ':');
     const size_t len = strcspn(kind, ":");
-    const char *rest = colon && colon[1] ? colon + 1 : NULL;
-    uint64_t port = SOCKETCAND_PORT;
-    *c = (struct options_can){.arg = rest};
+    *c = (struct options_can){.arg = kind[len] && kind[len + 1] ? kind + len + 1 : NULL};
     if (kind > arg) snprintf(c->bus, sizeof c->bus, "%.*s", (int)(kind - arg) - 1, arg);
     unsigned k = 0;
     while (k < KINDS && !(strlen(kinds[k].word) == len && memcmp(kinds[k].word, kind, len) == 0)) k++;
-    if (k == KINDS || (kinds[k].named && !rest))
+    if (k == KINDS || (kinds[k].named && !c->arg))
         return expected(t, arg,
-                        "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], log:FILE or none");
+                        "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], "
+                        "cannelloni[:PORT[:PEER_PORT]], log:FILE or none");
     c->kind = (enum options_can_kind)k;
-    if (c->kind == OPTIONS_SOCKETCAND && rest && !parse_u64(rest, 65535, &port))
-        return expected(t, arg, "a port from 0 (any free port) to 65535");
-    struct sockaddr_storage group;
-    if (c->kind == OPTIONS_UDP && !c->arg) c->arg = UDP_CAN_GROUP;
-    if (c->kind == OPTIONS_UDP && !udp_can_group(c->arg, &group))
-        return expected(t, arg, "udp:GROUP, udp:GROUP:PORT or udp:[GROUP]:PORT, GROUP 239.x.y.z or ff..::..");
-    c->port = (uint16_t)port;
+    const char *what = kinds[k].check ? kinds[k].check(c) : NULL;
+    if (what) return expected(t, arg, "%s", what);
     o->can_count++;
     return true;
 }
@@ -287,6 +304,9 @@ static const struct row rows[] = {
      "        slcan[:LINK]       slcan on a pseudo-terminal; LINK becomes a symbolic link to it\n"
      "        socketcan:IFACE    kernel interface such as vcan0 or can0\n"
      "        udp[:GROUP[:PORT]] UDP multicast as python-can has it, on this machine only (default 239.74.163.2:43113)\n"
+     "        cannelloni[:PORT[:PEER_PORT]]\n"
+     "                           cannelloni's UDP tunnel on 127.0.0.1 (default 20000:20001; PORT 0: any free port);\n"
+     "                           cannelloni itself is not in Debian 12 (docs/links.md)\n"
      "        log:FILE           record every frame to FILE (candump -L format)\n"
      "        none               no adapter"},
     {"--pace", " wall|step|free", set_pace, 0, "time: real (default), only by commands of the control\n"

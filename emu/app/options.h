@@ -3,6 +3,7 @@
 #define PSABENCH_APP_OPTIONS_H
 
 #include "app/pace.h"
+#include "link/can/cannelloni_can.h"
 #include "link/mavlink/mav_options.h"
 
 #include <stdbool.h>
@@ -17,13 +18,21 @@
 
 #define OPTIONS_MAVLINK_MAX 4u
 
-enum options_can_kind { OPTIONS_SOCKETCAND, OPTIONS_SLCAN, OPTIONS_SOCKETCAN, OPTIONS_UDP, OPTIONS_CAN_LOG };
+enum options_can_kind {
+    OPTIONS_SOCKETCAND,
+    OPTIONS_SLCAN,
+    OPTIONS_SOCKETCAN,
+    OPTIONS_UDP,
+    OPTIONS_CANNELLONI,
+    OPTIONS_CAN_LOG
+};
 
 struct options_can {
     enum options_can_kind kind;
     char bus[16];    /* "": socketcand every bus, by the name that a client opens; others the first */
     const char *arg; /* slcan: link or NULL; socketcan: interface; udp: group; log: file */
     uint16_t port;   /* socketcand; 0: a free one */
+    struct cannelloni_ports tunnel;
 };
 
 struct options_scpi {

@@ -26,16 +26,18 @@ _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) 
 
 /* ---- CAN */
 
+static bool fail_busy(char *why, size_t cap, const char *kind, unsigned port)
+{
+    return why_fail(why, cap, "--can %s:%u: expected a free port of 127.0.0.1 or 0 (any free port), got one in use",
+                    kind, port);
+}
+
 static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
                             size_t cap)
 {
     const int err = socketcand_listen(&c->socketcand, hub, c->hubs, o->port);
     if (!err) return true;
-    if (err == -EADDRINUSE) {
-        return why_fail(why, cap,
-                        "--can socketcand:%u: expected a free port of 127.0.0.1 or 0 (any free port), got one in use",
-                        o->port);
-    }
+    if (err == -EADDRINUSE) return fail_busy(why, cap, "socketcand", o->port);
     return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
 }
 
@@ -88,6 +90,15 @@ static bool open_udp(struct can_hub *hub, struct ports_can *c, const struct opti
     return why_fail(why, cap, "--can udp:%s: %s", o->arg, strerror(-err));
 }
 
+static bool open_cannelloni(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
+                            size_t cap)
+{
+    const int err = cannelloni_can_open(&c->cannelloni, hub, o->tunnel);
+    if (!err) return true;
+    if (err == -EADDRINUSE) return fail_busy(why, cap, "cannelloni", o->tunnel.own);
+    return why_fail(why, cap, "--can cannelloni:%u: %s", o->tunnel.own, strerror(-err));
+}
+
 static bool open_log(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     long owner = 0;
@@ -113,11 +124,9 @@ static bool fail_bus(const struct ports *p, const char *bus, char *why, size_t c
 static bool open_can(struct ports *p, const struct options *o, char *why, size_t cap)
 {
     typedef bool open_fn(struct can_hub *, struct ports_can *, const struct options_can *, char *, size_t);
-    static open_fn *const open[] = {[OPTIONS_SOCKETCAND] = open_socketcand,
-                                    [OPTIONS_SLCAN] = open_slcan,
-                                    [OPTIONS_SOCKETCAN] = open_socketcan,
-                                    [OPTIONS_UDP] = open_udp,
-                                    [OPTIONS_CAN_LOG] = open_log};
+    static open_fn *const open[] = {[OPTIONS_SOCKETCAND] = open_socketcand, [OPTIONS_SLCAN] = open_slcan,
+                                    [OPTIONS_SOCKETCAN] = open_socketcan,   [OPTIONS_UDP] = open_udp,
+                                    [OPTIONS_CANNELLONI] = open_cannelloni, [OPTIONS_CAN_LOG] = open_log};
     for (unsigned i = 0; i < o->can_count; i++) {
         struct ports_can *c = calloc(1, sizeof *c);
         if (!c) return why_fail(why, cap, "--can: out of memory");
@@ -351,6 +360,7 @@ static void close_can(struct ports_can *c)
     if (c->kind == OPTIONS_SLCAN) slcan_pty_close(&c->slcan);
     if (c->kind == OPTIONS_SOCKETCAN) socketcan_close(&c->socketcan);
     if (c->kind == OPTIONS_UDP) udp_can_close(&c->udp);
+    if (c->kind == OPTIONS_CANNELLONI) cannelloni_can_close(&c->cannelloni);
     if (c->kind == OPTIONS_CAN_LOG) can_log_close(&c->log);
 }
 

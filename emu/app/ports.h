@@ -30,6 +30,7 @@ struct ports_can {
         struct slcan_pty slcan;
         struct socketcan socketcan;
         struct udp_can udp;
+        struct cannelloni_can cannelloni;
         struct can_log log;
     };
 };

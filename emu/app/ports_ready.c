@@ -43,7 +43,8 @@ static void add_can(const struct ports_can *c, cJSON *all)
     static const char *const kinds[] = {[OPTIONS_SOCKETCAND] = "socketcand",
                                         [OPTIONS_SLCAN] = "slcan",
                                         [OPTIONS_SOCKETCAN] = "socketcan",
-                                        [OPTIONS_UDP] = "udp"};
+                                        [OPTIONS_UDP] = "udp",
+                                        [OPTIONS_CANNELLONI] = "cannelloni"};
     const bool log = c->kind == OPTIONS_CAN_LOG;
     cJSON *e = add_endpoint(all, log ? "log" : "can", log ? c->log.path : kinds[c->kind]);
     if (c->kind == OPTIONS_SOCKETCAND) add_port(e, c->socketcand.port);
@@ -55,6 +56,10 @@ static void add_can(const struct ports_can *c, cJSON *all)
     if (c->kind == OPTIONS_UDP) {
         add_key(e, "group", c->udp.group);
         add_number(e, "port", c->udp.port);
+    }
+    if (c->kind == OPTIONS_CANNELLONI) {
+        add_port(e, c->cannelloni.ports.own);
+        add_number(e, "peer_port", c->cannelloni.ports.peer);
     }
     add_key(e, "bus", c->bus);
 }

@@ -57,4 +57,17 @@ static inline uint64_t bits_get_le(const uint8_t *p, size_t n)
     return v;
 }
 
+/* Big-endian. */
+static inline void bits_put_be(uint8_t *p, uint64_t v, size_t n)
+{
+    for (size_t i = 0; i < n; i++) p[i] = (uint8_t)(v >> (8 * (n - 1 - i)));
+}
+
+static inline uint64_t bits_get_be(const uint8_t *p, size_t n)
+{
+    uint64_t v = 0;
+    for (size_t i = 0; i < n; i++) v = v << 8 | p[i];
+    return v;
+}
+
 #endif

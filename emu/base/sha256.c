@@ -1,5 +1,7 @@
 #include "base/sha256.h"
 
+#include "base/bits.h"
+
 #include <string.h>
 
 /* FIPS 180-4, 4.2.2: the first 32 bits of the fractional parts of the cube roots of the first 64 primes. */
@@ -20,15 +22,10 @@ static uint32_t ror(uint32_t x, unsigned n)
     return x >> n | x << (32 - n);
 }
 
-static uint32_t get_be(const uint8_t *p)
-{
-    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
-}
-
 /* 6.2.2, step 1. */
 static void expand_schedule(const uint8_t *block, uint32_t w[64])
 {
-    for (unsigned i = 0; i < 16; i++) w[i] = get_be(block + (size_t)4 * i);
+    for (unsigned i = 0; i < 16; i++) w[i] = (uint32_t)bits_get_be(block + (size_t)4 * i, 4);
     for (unsigned i = 16; i < 64; i++) {
         const uint32_t s0 = ror(w[i - 15], 7) ^ ror(w[i - 15], 18) ^ w[i - 15] >> 3;
         const uint32_t s1 = ror(w[i - 2], 17) ^ ror(w[i - 2], 19) ^ w[i - 2] >> 10;

@@ -17,7 +17,7 @@ struct can_client {
     uint32_t number;     /* connection number on this hub, from 1 */
     uint32_t connection; /* connection number on all hubs of the bench */
     uint32_t slot;       /* position on the bus: connection number of the first client there */
-    const char *adapter; /* socketcand, slcan, socketcan */
+    const char *adapter; /* socketcand, slcan, socketcan, udp, cannelloni */
     char name[32];       /* channel that the client opened, or interface */
     struct can_node node;
     bool up;                             /* on the bus */
@@ -30,7 +30,7 @@ struct can_client {
     uint64_t delivered;                  /* frames put into its output since it joined: the barrier of step pace */
     uint64_t taken;                      /* frames of its that were queued for the bus */
     uint64_t dropped;                    /* frames lost because it read too slowly (wall pace, or stalled) */
-    uint64_t overrun;                    /* frames of its that the kernel lost before we read them (SocketCAN) */
+    uint64_t overrun;                    /* frames or datagrams of its that were lost before we read them */
     uint64_t refused;                    /* malformed messages, and frames that the bus or the link cannot carry */
     struct can_client *next;             /* in the order of slots */
 };

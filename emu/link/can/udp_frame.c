@@ -1,6 +1,8 @@
 #define _POSIX_C_SOURCE 200809L /* strnlen */
 #include "link/can/udp_frame.h"
 
+#include "base/bits.h"
+
 #include <string.h>
 
 /* First bytes of msgpack values. */
@@ -29,7 +31,7 @@ static const char *const names[KEYS] = {
 
 static uint8_t *put_be(uint8_t *p, uint64_t v, unsigned n)
 {
-    for (unsigned i = 0; i < n; i++) p[i] = (uint8_t)(v >> 8 * (n - 1 - i));
+    bits_put_be(p, v, n);
     return p + n;
 }
 
