@@ -118,7 +118,7 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
         (
             "--can serial",
             2,
-            "socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], log:FILE or none, got",
+            "udp[:GROUP[:PORT]], cannelloni[:PORT[:PEER_PORT]], log:FILE or none, got",
         ),
         ("--can socketcand:70000", 2, "a port from 0 (any free port) to 65535"),
         ("--can socketcan", 2, "socketcan:IFACE"),

@@ -87,8 +87,10 @@ static const struct {
     {"--for nan", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"nan\""},
     {"--for 1e7s", "--for: expected a time such as 300ms, 10s or 2min, up to 1e6 s, got \"1e7s\""},
     {"--can", "--can: expected an argument, got none"},
-    {"--can can0", "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], log:FILE or "
-                   "none, got \"can0\""},
+    {"--can can0", "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], "
+                   "cannelloni[:PORT[:PEER_PORT]], log:FILE or none, got \"can0\""},
+    {"--can cannelloni:1:1", "--can: expected cannelloni[:PORT[:PEER_PORT]], two ports from 1 to 65535, PORT 0: any free "
+                             "port, got \"cannelloni:1:1\""},
     {"--can socketcan", "--can: expected socketcand[:PORT]"},
     {"--can socketcan:", "--can: expected socketcand[:PORT]"},
     {"--can socketcand:65536", "--can: expected a port from 0 (any free port) to 65535, got \"socketcand:65536\""},
