@@ -34,7 +34,9 @@ HOSTLESS_SETUP_S = 0.3  # of a board that is not read: nothing tells that it is 
 # At the inputs of an emulator of ours: none is another's, one is negative, none is a round code.
 INPUTS_V: Mapping[str, float] = {"x": 2.0101, "y": -1.3007, "z": 0.7003}
 # Links of python-can whose time stamps are this machine's: they say when it looked, not when the frame passed.
-BY_THE_HOST_S_CLOCK = ("slcanBus", "SocketcanBus", "UdpMulticastBus", "VirtualBus", "SerialBus")
+BY_THE_HOST_S_CLOCK = tuple(
+    "slcanBus SocketcanBus UdpMulticastBus LocalUdpBus CannelloniBus VirtualBus SerialBus".split()
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,7 @@ import can
 from can.interfaces.socketcan import SocketcanBus
 
 from psabench.errors import BadInput, LinkError, expected
+from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
 from psabench.link.udp_bus import LocalUdpBus, group_of
 
@@ -200,7 +201,8 @@ def open_bus(spec: str | None) -> can.BusABC:
     """Open `INTERFACE:CHANNEL[,key=value...]` of python-can, or python-can's own configuration when spec is None.
 
     socketcand takes HOST:PORT as its channel: "socketcand:127.0.0.1:29536"; others the device, and options after
-    commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true"; "udp:239.74.163.2:43113".
+    commas: "slcan:/dev/pts/7"; "socketcan:vcan0,fd=true"; "udp:239.74.163.2:43113";
+    "cannelloni:20000".
     Raises BadInput for a spec no one can use, LinkError when the link is not there.
     """
     arguments = _bus_arguments(spec)
@@ -220,8 +222,9 @@ def open_bus(spec: str | None) -> can.BusABC:
 
 
 def _open_interface(arguments: dict[str, Any]) -> can.BusABC:
-    if arguments.get("interface") == "udp":
-        return LocalUdpBus(**{k: v for k, v in arguments.items() if k != "interface"})
+    own: dict[Any, type[can.BusABC]] = {"udp": LocalUdpBus, "cannelloni": CannelloniBus}
+    if bus := own.get(arguments.get("interface")):
+        return bus(**{k: v for k, v in arguments.items() if k != "interface"})
     return can.Bus(**arguments)
 
 

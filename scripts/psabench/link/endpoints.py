@@ -19,8 +19,8 @@ def emulator_endpoints(control: Path) -> list[dict[str, str]]:
 
 
 def opening_order(endpoint: Mapping[str, str]) -> int:
-    """Adapters that more than one program may open come first: a pseudo-terminal has room for one."""
-    return ("socketcand", "socketcan", "udp", "slcan").index(endpoint["can"]) if "can" in endpoint else -1
+    """Adapters that more than one program may open come first: a pseudo-terminal and a tunnel have room for one."""
+    return ("socketcand", "socketcan", "udp", "slcan", "cannelloni").index(endpoint["can"]) if "can" in endpoint else -1
 
 
 def emulator_buses(endpoints: Sequence[Mapping[str, str]], control: Path | None) -> dict[str, str | None]:
@@ -44,6 +44,8 @@ def bus_spec(endpoint: Mapping[str, str], bus: str | None = None) -> str:
         return f"socketcand:{endpoint['host']}:{endpoint['port']}" + (f",channel={bus}" if bus else "")
     if kind == "slcan":
         return f"slcan:{endpoint['pty']}"
+    if kind == "cannelloni":
+        return f"cannelloni:{endpoint['port']}:{endpoint['peer_port']}"
     if kind == "udp":
         return f"udp:[{endpoint['group']}]:{endpoint['port']}"
     return f"socketcan:{endpoint['channel']},fd=true,receive_own_messages=false"

@@ -13,8 +13,13 @@ from typing import Any
 
 import pytest
 from cannelloni_peer import BRS, EFF, ERR, ESI, RTR, Frame, Peer, pack
+from psabench.boards.psa2.device import Psa2
+from psabench.boards.psa2.frames import Form
 from psabench.emulator import Emulator
+from psabench.errors import BadInput, LinkError
+from psabench.link.can_host import CanHost, StepClock, open_bus
 from psabench.link.control import Control, Reply
+from psabench.link.endpoints import bus_spec
 from rig import BENCH, HOST, TIMEOUT_S, one_line, psa_emu, until
 
 pytestmark = [HOST, pytest.mark.timeout(2 * TIMEOUT_S)]
@@ -260,3 +265,30 @@ def test_a_port_in_use_is_told() -> None:
     assert done.returncode == 3
     expected = f"--can cannelloni:{peer.port}: expected a free port of 127.0.0.1 or 0 (any free port), got one in use"
     assert expected in one_line(done.stderr, "psa-emu")
+
+
+def test_our_host_takes_the_other_end(tmp_path: Path) -> None:
+    with Peer() as free:
+        port = free.port
+    with Emulator(BENCH, cans=[f"cannelloni:0:{port}"], pace="step") as emulator:
+        assert emulator.control_path
+        spec = bus_spec(emulator.endpoint(can="cannelloni"))
+        with Control(emulator.control_path) as control, CanHost(open_bus(spec), StepClock(control)) as host:
+            unit = Psa2(host)
+            unit.wait_ready()
+            unit.form = Form.FRAME
+            unit.start()
+            frames = unit.stream(100)
+            (client,) = control.call("frames").result["clients"]
+            assert len(frames.t_sample_s) == 100
+            assert (client["taken"], client["delivered"]) == (host.sent, host.received)
+            emulator.stop()
+            host.send(0x700, b"")
+            with pytest.raises(LinkError, match="gone away"):
+                host.receive(TIMEOUT_S)
+
+
+@pytest.mark.parametrize("channel", ["", "0", "65536", "1:1", "20001", "1:2:3", "host:1"])
+def test_our_host_refuses_ports_that_cannot_be(channel: str) -> None:
+    with pytest.raises(BadInput, match="INTERFACE:CHANNEL" if not channel else "cannelloni:PORT:OWN_PORT"):
+        open_bus(f"cannelloni:{channel}")
