@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import Form
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, LinkError
-from psabench.link.can_host import CanHost, StepClock, open_bus
+from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control, Reply
 from psabench.link.endpoints import bus_spec
 from rig import BENCH, HOST, TIMEOUT_S, one_line, psa_emu, until
@@ -240,6 +240,24 @@ def test_what_is_no_datagram_or_no_frame_is_counted_and_disturbs_nothing(tmp_pat
         assert f"refused {refused}" in t.emulator.messages()
 
 
+def test_error_frames_of_the_bus_are_not_sent() -> None:
+    with Peer() as peer, Emulator("stream", cans=[f"cannelloni:0:{peer.port}", "socketcand:0"]) as emulator:
+        peer.to = int(emulator.endpoint(can="cannelloni")["port"])
+        assert emulator.control_path
+        with (
+            Control(emulator.control_path) as control,
+            CanHost(open_bus(bus_spec(emulator.endpoint(can="socketcand"))), WallClock()) as other,
+        ):
+            errors: list[bool] = []
+            other.listeners.append(lambda m: errors.append(m.is_error_frame))
+            control.call("fault.add", kind="link.error_frame", point="bus.can0", probability=0.2)
+            reply = control.call("run", for_s=0.3)
+            until(lambda: other.receive(1.0) and any(errors), "an error frame at another adapter")
+            got = peer.take()
+            assert not any(f.can_id & ERR for f in got)
+            assert len(got) == reply.can_rx > 0
+
+
 def test_without_a_peer_nothing_is_held_up(tmp_path: Path) -> None:
     with tunnel(tmp_path, "stream") as t:
         t.peer.socket.close()
@@ -255,8 +273,13 @@ def test_in_wall_pace_frames_go_both_ways() -> None:
         peer.to = int(emulator.endpoint(can="cannelloni")["port"])
         peer.send(Frame(REQUEST, struct.pack("<BHBI", 0x40, 0x1000, 0, 0)))
         got: list[Frame] = []
-        until(lambda: got.extend(peer.take()) or any(f.can_id == ANSWER for f in got), "the answer")
-        until(lambda: got.extend(peer.take()) or len(got) > 100, "the stream")
+
+        def come(done: Callable[[], bool]) -> bool:
+            got.extend(peer.take())
+            return done()
+
+        until(lambda: come(lambda: any(f.can_id == ANSWER for f in got)), "the answer")
+        until(lambda: come(lambda: len(got) > 100), "the stream")
 
 
 def test_a_port_in_use_is_told() -> None:
