@@ -18,6 +18,7 @@ from psabench.boards.psa2.frames import Form
 from psabench.emulator import Emulator
 from psabench.errors import BadInput, LinkError
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
+from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
 from psabench.link.endpoints import bus_spec
 from rig import BENCH, HOST, TIMEOUT_S, one_line, psa_emu, until
@@ -198,7 +199,7 @@ GOOD = pack([Frame(0x123, b"123"), Frame(0x124, bytes(12), BRS)], 0)
 JUNK = {
     "nothing": b"",
     "zeros": bytes(100),
-    "too long": pack([Frame(1)] * 294, 0),
+    "a byte too long": pack([*[Frame(1)] * 292, Frame(1, b"123")], 0),
     "a whole datagram of the loopback": b"\2\0\0\xff\xff" + bytes(60_000),
     "version 1": b"\1" + GOOD[1:],
     "version 3": b"\3" + GOOD[1:],
@@ -288,6 +289,28 @@ def test_a_port_in_use_is_told() -> None:
     assert done.returncode == 3
     expected = f"--can cannelloni:{peer.port}: expected a free port of 127.0.0.1 or 0 (any free port), got one in use"
     assert expected in one_line(done.stderr, "psa-emu")
+
+
+def test_our_host_speaks_the_format_with_every_kind_of_frame() -> None:
+    frames = [
+        Frame(0x123, b"\1\2"),
+        Frame(EFF | 0x1ABCDEF0, bytes(8)),
+        Frame(RTR | 0x124, dlc=4),
+        Frame(ERR | 4, bytes(8)),
+        *(Frame(0x200 + n, bytes(range(n)), n & 3) for n in (0, 1, 2, 3, 64)),
+    ]
+    with Peer() as peer, Peer() as free:
+        free.socket.close()
+        bus = CannelloniBus(f"{peer.port}:{free.port}")
+        peer.to = free.port
+        peer.send(*frames)
+        messages = [bus.recv(TIMEOUT_S) for _ in frames]
+        for m in messages:
+            assert m is not None
+            bus.send(m)
+        assert peer.take() == frames
+        assert [(d.seq_no, len(d.frames)) for d in peer.received] == [(i, 1) for i in range(len(frames))]
+        bus.shutdown()
 
 
 def test_our_host_takes_the_other_end(tmp_path: Path) -> None:
