@@ -15,6 +15,7 @@ from can.io.player import MESSAGE_READERS
 from psabench.errors import BadInput, expected
 
 READERS: Mapping[str, str] = {  # our own: module and function
+    ".db": "psabench.logs.sqlite_log:read_db",
     ".lcmlog": "psabench.lcm.frames:read_frames",
     ".mcap": "psabench.logs.mcap_log:read_mcap",
     ".mf4": "psabench.logs.formats:read_mf4",
@@ -27,20 +28,21 @@ ALL_S, ALL_FRAMES = 1e12, 1 << 40
 
 def read_frames(path: Path) -> Iterator[can.Message]:
     """Frames of a log, in the order of the file. Raises BadInput at a damage, after the frames before it."""
-    if path.suffix not in READABLE:
+    if path.suffix.lower() not in READABLE:
         raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
     if not path.exists() or path.is_dir():
         raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
     try:
-        yield from _reader_of(path)(path)
+        yield from reader_of(path)(path)
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
 
 
-def _reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:
-    if path.suffix not in READERS:
+def reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:
+    """Of a log with an ending of READABLE. Raises BadInput where a package is missing."""
+    if path.suffix.lower() not in READERS:
         return read_python_can
-    module, _, name = READERS[path.suffix].partition(":")
+    module, _, name = READERS[path.suffix.lower()].partition(":")
     try:
         function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
     except ImportError as e:

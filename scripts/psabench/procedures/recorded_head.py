@@ -1,6 +1,6 @@
 """A run of a calibration as a recording, and procedures on it: the CAN log, and what was asked of the instruments.
 
-The log is of any of python-can's formats. A recording has no reaction: the calls of the procedure (head, readings) lie
+The log is of any format that psabench reads. A recording has no reaction: the calls of the procedure (head, readings) lie
 beside it in FILE.calls.csv, each with its argument, the answer, the bench's time and the number of frames received by
 then. On replay the procedure makes the same calls and is refused at the first other one. Readings are decoded again
 from the frames of the log, by number, so that what a format does to time stamps does not matter.
@@ -30,6 +30,7 @@ from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
+from psabench.logs.formats import READABLE
 from psabench.procedures.head_bench import HeadBench
 
 COLUMNS = ("call", "argument", "answer", "t_s", "frames")
@@ -52,6 +53,8 @@ class HeadRecorder(AbstractContextManager["HeadRecorder"]):
         self.g_mps2 = bench.g_mps2
         self._bench, self._host, self._frames = bench, host, 0
         self._t_s = bench.t_s
+        if path.suffix.lower() not in READABLE:
+            raise BadInput(expected(f"an ending of {' '.join(READABLE)}, which --replay reads", path.suffix, path))
         with ExitStack() as stack:
             self._log = LogFile(path)
             stack.callback(self._log.close)
@@ -233,12 +236,12 @@ def _is_good(call: Mapping[str, str]) -> bool:
 
 def _read_frames(path: Path) -> tuple[CanFrame, ...]:
     """Raises BadInput for a log that cannot be read to its end."""
+    if path.suffix.lower() not in READABLE:
+        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
     try:
         take = read_can(path, Bounds(max_s=LONGEST_S))
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror or e}") from e
-    except KeyError as e:
-        raise BadInput(expected("a CAN log by its ending", path.suffix or "none", path)) from e
     if take.note:
         raise BadInput(f"{path}: {take.note}")
     return tuple(f for f in take.frames if not f.error)

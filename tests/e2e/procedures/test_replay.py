@@ -7,7 +7,12 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from psabench import cli
+from psabench.conform.sources import mf4
 from psabench.emulator import Emulator
+from psabench.link.log_file import FORMATS, LogFile
+from psabench.logs.formats import READABLE, read_frames
+from psabench.procedures.recorded_head import calls_path
 from rig import PSABENCH
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]
@@ -29,20 +34,32 @@ def recorded(folder: Path, ending: str, procedure: str, *params: str) -> Path:
     return log
 
 
+WITH_MF4 = pytest.mark.skipif(not mf4.asammdf_is_there(), reason="asammdf is not there: make setup")
+REPLAYED = [e for e in FORMATS if e in READABLE]  # both are tables of all formats: a new one is tested, or fails here
+
+
+def test_every_format_is_replayed_or_refused_before_the_run(tmp_path: Path) -> None:
+    assert [e for e in FORMATS if e not in REPLAYED] == [".txt"]
+    assert [e for e in READABLE if e not in REPLAYED] == []
+    log = tmp_path / "run.txt"
+    done = run("turns", "--condition", "quiet", "--record", log, "--out", tmp_path)
+    assert done.returncode == 2
+    assert f"{log}: expected an ending of .asc" in done.stderr
+    assert not log.exists()
+    done = run("turns", "--replay", log, "--out", tmp_path)
+    assert done.returncode == 2
+
+
 @pytest.mark.parametrize(
-    ("procedure", "ending", "average"),
+    ("procedure", "ending"),
     [
-        ("turns", ".log", "4"),
-        ("turns", ".blf", "4"),
-        ("turns", ".asc", "4"),
-        ("turns", ".csv", "4"),
-        ("turns", ".trc", "4"),
-        ("fourier", ".log", "4"),
-        ("reversal", ".blf", "4"),
+        *(("turns", e) for e in (".log", ".blf", ".asc", ".csv", ".trc", ".mcap")),
+        ("fourier", ".log"),
+        ("reversal", ".blf"),
     ],
 )
-def test_a_replay_gives_the_live_results(procedure: str, ending: str, average: str, tmp_path: Path) -> None:
-    log = recorded(tmp_path, ending, procedure, "--average", average, "--realisations", "2")
+def test_a_replay_gives_the_live_results(procedure: str, ending: str, tmp_path: Path) -> None:
+    log = recorded(tmp_path, ending, procedure, "--average", "4", "--realisations", "2")
     done = run(procedure, "--replay", log, "--realisations", "2", "--out", tmp_path / "again")
     assert done.returncode in (0, 1), done.stderr
     for name in (*RESULTS, f"{procedure}.csv"):
@@ -67,6 +84,19 @@ def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def turns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp("turns"), ".log", "turns", "--average", "1", "--realisations", "2")
+
+
+@pytest.mark.parametrize("ending", [pytest.param(e, marks=[WITH_MF4] if e == ".mf4" else []) for e in REPLAYED])
+def test_a_recording_in_every_format_gives_the_live_results(ending: str, turns: Path, tmp_path: Path) -> None:
+    """The frames of one run, written by the writer of each format."""
+    log = tmp_path / f"run{ending}"
+    out = LogFile(log)
+    assert all(out(m) for m in read_frames(turns))
+    assert out.close() == len(turns.read_text().splitlines())
+    shutil.copy(calls_path(turns), calls_path(log))
+    assert cli.main(["run", "turns", "--replay", str(log), "--realisations", "2", "--out", str(tmp_path)]) in (0, 1)
+    for name in (*RESULTS, "turns.csv"):
+        assert (tmp_path / name).read_bytes() == (turns.parent / "live" / name).read_bytes(), name
 
 
 def edited(turns: Path, folder: Path, old: str, new: str) -> Path:

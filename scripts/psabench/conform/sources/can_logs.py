@@ -1,4 +1,7 @@
-"""Logs of a CAN bus by python-can's readers: candump, BLF, ASC, MF4, TRC, CSV."""
+"""Logs of a CAN bus, every format that psabench.logs.formats lists: by python-can's readers, and our own.
+
+Readers of our own are bounded themselves. What python-can reads is made safe first.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,10 @@ from psabench.conform.sources.blf import safe_blf
 from psabench.conform.sources.mf4 import candump_of
 from psabench.conform.sources.taken import BLOCK, MOST_FRAMES, Bounds, CanTake
 from psabench.errors import BadInput, expected
+from psabench.logs.formats import READABLE, READERS, reader_of
 
 TEXT = (".log", ".asc", ".trc", ".csv")
-BINARY = (".blf", ".mf4")
+ENDINGS = tuple(READABLE)
 MOST_LINE = 1 << 16  # characters of a line of a text log
 EPOCH_S = 1e6  # stamps beyond are of a calendar: they are reported from the first one on
 MOST_S = 1e11  # of a stamp
@@ -26,11 +30,11 @@ MOST_S = 1e11  # of a stamp
 
 def read_can(path: Path, bounds: Bounds) -> CanTake:
     """Raises BadInput for a log without a frame, OSError."""
-    source, trouble = _source(path, bounds)
+    messages, trouble = _messages(path, bounds)
     frames: list[CanFrame] = []
     note = ""
     try:
-        for m in _messages(path, source):
+        for m in messages:
             if not math.isfinite(m.timestamp) or abs(m.timestamp) > MOST_S:
                 note = f"message {len(frames) + 1} has the time stamp {m.timestamp}"
                 break
@@ -43,6 +47,8 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
             frames.append(CanFrame.of(m, float(m.timestamp)))
     except OSError:
         raise
+    except BadInput as e:  # a reader of our own
+        note = str(e).removeprefix(f"{path}: ")
     except Exception as e:  # python-can's readers raise whatever their parsing comes to; no byte of a file may end us
         note = (
             f"message {len(frames) + 1} cannot be read ({type(e).__name__}: {str(e)[:80]}); those before it are judged"
@@ -62,6 +68,15 @@ def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
     if not zero_s:
         return tuple(frames)
     return tuple(f._replace(t_s=f.t_s - zero_s) for f in frames)
+
+
+def _messages(path: Path, bounds: Bounds) -> tuple[Iterator[can.Message], str]:
+    """What the reader of this ending finds, and what is known to be wrong with the file."""
+    ending = path.suffix.lower()
+    if ending in READERS and ending != ".mf4":
+        return reader_of(path)(path), ""
+    source, trouble = _source(path, bounds)
+    return _by_python_can(".log" if ending == ".mf4" else ending, source), trouble
 
 
 def _source(path: Path, bounds: Bounds) -> tuple[Any, str]:
@@ -101,10 +116,9 @@ def _check_lines(path: Path) -> None:
             begin = where - len(data) + last + 1 if last >= 0 else begin
 
 
-def _messages(path: Path, source: Any) -> Iterator[can.Message]:
+def _by_python_can(ending: str, source: Any) -> Iterator[can.Message]:
     readers: Mapping[str, Callable[..., Any]] = MESSAGE_READERS
-    ending = path.suffix.lower()
     try:
-        yield from readers[".log" if ending == ".mf4" else ending](source)
+        yield from readers[ending](source)
     finally:
         source.close()

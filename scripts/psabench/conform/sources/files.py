@@ -17,7 +17,7 @@ from psabench.conform.sources.taken import BLOCK, NS, Bounds, CanTake, LineTake
 from psabench.conform.sources.vcd_file import read_vcd_file
 from psabench.errors import BadInput, expected
 
-CAN_ENDINGS = (*can_logs.TEXT, *can_logs.BINARY)
+CAN_ENDINGS = can_logs.ENDINGS
 LINE_ENDINGS = (".vcd", ".sr", ".bin")
 
 
