@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import struct
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -14,15 +13,16 @@ from can.io.player import MESSAGE_READERS
 
 from psabench.errors import BadInput, expected
 
-READERS: Mapping[str, str] = {  # our own: module and function
+READERS: Mapping[str, str] = {  # module and function; text logs: read_text
+    ".blf": "psabench.logs.python_can:read_blf",
     ".db": "psabench.logs.sqlite_log:read_db",
     ".lcmlog": "psabench.lcm.frames:read_frames",
     ".mcap": "psabench.logs.mcap_log:read_mcap",
     ".mf4": "psabench.logs.formats:read_mf4",
     ".pcap": "psabench.logs.pcap:read_pcap",
 }
+TEXT_READER = "psabench.logs.python_can:read_text"
 READABLE = sorted({*MESSAGE_READERS, *READERS})
-DAMAGE = (ValueError, IndexError, KeyError, EOFError, struct.error)  # what python-can's readers raise
 ALL_S, ALL_FRAMES = 1e12, 1 << 40
 
 
@@ -40,26 +40,12 @@ def read_frames(path: Path) -> Iterator[can.Message]:
 
 def reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:
     """Of a log with an ending of READABLE. Raises BadInput where a package is missing."""
-    if path.suffix.lower() not in READERS:
-        return read_python_can
-    module, _, name = READERS[path.suffix.lower()].partition(":")
+    module, _, name = READERS.get(path.suffix.lower(), TEXT_READER).partition(":")
     try:
         function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
     except ImportError as e:
         raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
     return function
-
-
-def read_python_can(path: Path) -> Iterator[can.Message]:
-    """Raises BadInput for a damaged file."""
-    read = 0
-    try:
-        with can.LogReader(str(path)) as log:
-            for m in log:
-                yield m
-                read += 1
-    except DAMAGE as e:
-        raise BadInput(f"{path}: message {read + 1} is damaged ({e}); the {read} messages before it are decoded") from e
 
 
 def read_mf4(path: Path) -> Iterator[can.Message]:

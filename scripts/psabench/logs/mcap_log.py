@@ -7,18 +7,20 @@ mcap.dev/spec.
 
 from __future__ import annotations
 
+import io
 import json
 import struct
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+import zlib
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import can
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, McapRecord, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk
 from mcap.writer import Writer
 
 from psabench.errors import BadInput, expected
@@ -39,7 +41,12 @@ from psabench.logs.segments import SegmentFile
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK = 1 << 18  # bytes before compression
 MOST_CHUNK = 1 << 27  # bytes that a reader takes
+MOST_CHANNEL = 1 << 20  # bytes of a channel, whose metadata become a dictionary
+MOST_RECORD = 4096  # bytes of a frame as JSON
+RECORD = struct.Struct("<BQ")  # opcode and length
+MESSAGE_HEAD = 22  # bytes of a message before its data; the first two: its channel
 WINDOW = 1 << 27  # of zstandard, bytes
+PART = 1 << 18  # bytes unpacked together
 CLOSING = struct.pack("<BQI", 0x0F, 4, 0) + struct.pack("<BQQQI", 0x02, 20, 0, 0, 0) + MAGIC  # no summary
 
 
@@ -149,12 +156,14 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
     n = 0
     with path.open("rb") as file:
         try:
-            for r in _read_records(StreamReader(file, emit_chunks=True, record_size_limit=MOST_CHUNK)):
-                if isinstance(r, Channel) and r.topic == RAW_TOPIC and r.message_encoding == "json":
-                    channels.add(r.id)
-                elif isinstance(r, Message) and r.channel_id in channels:
+            for opcode, data in _all_records(file):
+                if opcode == Opcode.CHANNEL:
+                    c = Channel.read(ReadDataStream(io.BytesIO(data)))
+                    if c.topic == RAW_TOPIC and c.message_encoding == "json":
+                        channels.add(c.id)
+                elif int.from_bytes(data[:2], "little") in channels:
                     n += 1
-                    yield frame_of(json.loads(r.data))
+                    yield frame_of(_parsed(data[MESSAGE_HEAD:]))
         except DAMAGE as e:
             said = " ".join(str(e).split())[:120] or type(e).__name__
             raise BadInput(expected("a whole log", f"damage behind message {n} ({said})", path)) from e
@@ -164,23 +173,75 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
 DAMAGE = (McapError, ValueError, struct.error, EOFError, IndexError, zstandard.ZstdError, MemoryError, OverflowError)
 
 
-def _read_records(reader: StreamReader) -> Iterator[McapRecord]:
-    """Those in chunks as well."""
-    for r in reader.records:
-        if isinstance(r, Chunk):
-            yield from breakup_chunk(replace(r, compression="", data=_decompressed_chunk(r)), validate_crc=True)
+def _parsed(data: bytes) -> object:
+    """Raises ValueError."""
+    if len(data) > MOST_RECORD:  # no frame takes as much; JSON nested so deep would end the parser
+        raise ValueError(expected(f"records of {MOST_RECORD} bytes at most", len(data)))
+    try:
+        return json.loads(data)
+    except RecursionError as e:
+        raise ValueError("JSON nested too deep") from e
+
+
+# mcap's StreamReader makes an object of every record, and a list of all in a chunk: a gigabyte for 128 MiB of
+# messages without data, which compress to some kilobytes. Here a record that is not needed is passed over.
+
+
+def _all_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Channels and messages by their opcodes, those in chunks as well. Raises one of DAMAGE."""
+    if file.read(len(MAGIC)) != MAGIC:
+        raise ValueError(expected("MCAP0 at the beginning", "another file"))
+    for opcode, data in _records_of(file, (Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.FOOTER)):
+        if opcode == Opcode.CHUNK:
+            unpacked = _decompressed_chunk(Chunk.read(ReadDataStream(io.BytesIO(data))))
+            yield from _records_of(io.BytesIO(unpacked), (Opcode.CHANNEL, Opcode.MESSAGE))
+        elif opcode == Opcode.FOOTER:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise EOFError("the file ends")
+            return
         else:
-            yield r
+            yield opcode, data
+    raise EOFError("the file ends without a footer")
+
+
+def _records_of(file: BinaryIO, wanted: Container[int]) -> Iterator[tuple[int, bytes]]:
+    """Raises ValueError, EOFError."""
+    begin = file.tell()
+    left = file.seek(0, io.SEEK_END) - begin
+    file.seek(begin)
+    while left > 0:
+        head = file.read(RECORD.size)
+        opcode, length = RECORD.unpack(head.ljust(RECORD.size, b"\xff"))
+        left -= RECORD.size + length
+        if left < 0:
+            raise EOFError("a record is cut")
+        if opcode not in wanted:
+            file.seek(length, io.SEEK_CUR)
+            continue
+        most = MOST_CHANNEL if opcode == Opcode.CHANNEL else MOST_CHUNK
+        if length > most:
+            raise ValueError(expected(f"records of {most} bytes at most", length))
+        yield opcode, file.read(length)
 
 
 def _decompressed_chunk(chunk: Chunk) -> bytes:
     """Never more than MOST_CHUNK, whatever the chunk says. Raises ValueError."""
-    if chunk.compression == "":
-        return chunk.data
-    if chunk.compression != "zstd":
+    if chunk.compression not in ("", "zstd"):
         raise ValueError(expected("compression zstd or none", repr(chunk.compression[:20])))
-    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(chunk.data) as stream:
-        data = stream.read(MOST_CHUNK + 1)
-    if len(data) > MOST_CHUNK:
-        raise ValueError(expected(f"chunks of {MOST_CHUNK} bytes at most", "more"))
+    data = chunk.data
+    if chunk.compression:
+        data = b"".join(_unpacked(data))
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError(expected(f"a chunk with the checksum {chunk.uncompressed_crc:08x}", f"{zlib.crc32(data):08x}"))
     return data
+
+
+def _unpacked(data: bytes) -> Iterator[bytes]:
+    """Raises ValueError beyond MOST_CHUNK bytes."""
+    size = 0
+    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(data) as stream:
+        while part := stream.read(PART):
+            size += len(part)
+            if size > MOST_CHUNK:
+                raise ValueError(expected(f"chunks of {MOST_CHUNK} bytes at most", "more"))
+            yield part

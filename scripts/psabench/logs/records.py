@@ -75,11 +75,14 @@ def frame_of(record: object) -> can.Message:
     bits: dict[str, Any] = {attribute: record.get(name) for name, attribute in BITS.items()}
     if any(type(b) is not bool for b in bits.values()):
         raise ValueError(expected(f"true or false for {', '.join(BITS)}", str(list(bits.values()))[:60]))
+    channel: Any = record.get("channel_index", record.get("channel"))
+    if channel is not None and type(channel) not in (int, str):
+        raise ValueError(expected("a channel, a name or a number", repr(channel)[:40]))
     m = can.Message(
         arbitration_id=numbers[0],
         dlc=numbers[1],
         data=bytes.fromhex(data),
-        channel=record.get("channel_index", record.get("channel")),
+        channel=channel,
         check=True,
         **bits,
     )

@@ -1,8 +1,8 @@
 """A run of a calibration as a recording, and procedures on it: the CAN log, and what was asked of the instruments.
 
-The log is of any format that psabench reads. A recording has no reaction: the calls of the procedure (head, readings) lie
-beside it in FILE.calls.csv, each with its argument, the answer, the bench's time and the number of frames received by
-then. On replay the procedure makes the same calls and is refused at the first other one. Readings are decoded again
+The log is of any format that psabench reads. A recording has no reaction: the calls of the procedure (head, readings)
+lie beside it in FILE.calls.csv, each with its argument, the answer, the bench's time and the number of frames received
+by then. On replay the procedure makes the same calls and is refused at the first other one. Readings are decoded again
 from the frames of the log, by number, so that what a format does to time stamps does not matter.
 """
 

@@ -11,10 +11,12 @@ from typing import Any
 
 import can
 import numpy as np
+from can.io.logger import MESSAGE_WRITERS
 from psabench.boards.psa2.conform.capture_line import Transfers
 from psabench.cli import main
 from psabench.conform.dut import scenario
 from psabench.conform.profile import variant
+from psabench.link.log_file import LogFile
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, Wire, read_vcd
 from psabench.places import find_emulator
@@ -89,11 +91,13 @@ def judge(folder: Path, *words: str | Path, board: str = "psa2") -> Judged:
 
 
 def converted(log: Path, ending: str) -> Path:
-    """The same log in another of python-can's formats."""
+    """The same log in another format: by python-can's writer, where it has one."""
     path = log.with_suffix(ending)
-    with can.LogReader(str(log)) as frames, can.Logger(str(path)) as out:
+    out: Any = can.Logger(str(path)) if ending in MESSAGE_WRITERS else LogFile(path)
+    with can.LogReader(str(log)) as frames:
         for m in frames:
             out(m)
+    (out.close if isinstance(out, LogFile) else out.stop)()
     return path
 
 

@@ -1,4 +1,4 @@
-"""BLF logs, made safe: every length is checked and every container unpacked within bounds before python-can reads them.
+"""BLF logs, made safe: every length is checked and each container unpacked within bounds before python-can reads it.
 
 Format: as python-can writes and reads it (Vector's "binary logging format"; objects begin with LOBJ).
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from psabench.errors import expected
@@ -18,11 +19,14 @@ CONTAINER = struct.Struct("<H6xL4x")  # method, unpacked size
 LEAST_OBJECT = 32  # bytes of an object with its header
 CONTAINER_TYPE, PLAIN, DEFLATE = 10, 0, 2
 VERSIONS = (1, 2)
-MOST_UNPACKED = 256 << 20  # bytes of all objects of a file
+MOST_UNPACKED = 64 << 20  # bytes of a container's objects
 
 
-def safe_blf(path: Path) -> tuple[io.BytesIO, str]:
-    """The same log with one plain container, and where it is damaged ("": nowhere). Raises ValueError, OSError."""
+def safe_blf(path: Path) -> Iterator[tuple[io.BytesIO, str]]:
+    """The same log in pieces, each a log with one plain container, and where it is damaged from there on ("": nowhere).
+
+    Raises ValueError for what is no BLF, OSError.
+    """
     with path.open("rb") as file:
         header = file.read(HEADER_BYTES)
         if len(header) < HEADER_BYTES or header[:4] != b"LOGG":
@@ -31,10 +35,26 @@ def safe_blf(path: Path) -> tuple[io.BytesIO, str]:
         if not HEADER_BYTES <= size <= 1 << 16:
             raise ValueError(expected(f"a header of {HEADER_BYTES} to {1 << 16} bytes", size))
         file.seek(size)
-        objects, trouble = _unpacked(file)
-    end, odd = _sound(objects)
-    plain = header[:4] + struct.pack("<L", HEADER_BYTES) + header[8:] + _container(objects[:end])
-    return io.BytesIO(plain), odd or trouble
+        plain = header[:4] + struct.pack("<L", HEADER_BYTES) + header[8:]
+        for objects, trouble in _whole_objects(file):
+            yield io.BytesIO(plain + _container(objects)), trouble
+
+
+def _whole_objects(file: io.BufferedReader) -> Iterator[tuple[bytes, str]]:
+    """Objects of one container after the other; one that goes on in the next container comes with that."""
+    rest, before = b"", 0  # unpacked bytes before the rest
+    for part, trouble in _unpacked(file):
+        objects = rest + part
+        end, odd = _sound(objects, before)
+        yield objects[:end], odd or trouble
+        if odd or trouble:
+            return
+        rest, before = objects[end:], before + end
+        if len(rest) > MOST_UNPACKED:
+            yield b"", f"an object of more than {MOST_UNPACKED} bytes at unpacked byte {before}"
+            return
+    if len(rest) >= BASE.size:
+        yield b"", f"the last object, at unpacked byte {before}, is cut"
 
 
 def _container(objects: bytes) -> bytes:
@@ -43,28 +63,28 @@ def _container(objects: bytes) -> bytes:
     return head + objects + b"\0" * (size % 4)
 
 
-def _unpacked(file: io.BufferedReader) -> tuple[bytes, str]:
-    """The objects of all containers, and what is wrong with the file from there on."""
-    parts: list[bytes] = []
-    left = MOST_UNPACKED
+def _unpacked(file: io.BufferedReader) -> Iterator[tuple[bytes, str]]:
+    """The objects of each container, and what is wrong with the file from there on."""
     while True:
         where = file.tell()
         base = file.read(BASE.size)
         if not base:
-            return b"".join(parts), ""
+            return
         if len(base) < BASE.size or base[:4] != b"LOBJ":
-            return b"".join(parts), f"no object at byte {where}"
+            yield b"", f"no object at byte {where}"
+            return
         size, kind = BASE.unpack(base)[3:]
         if size < BASE.size + CONTAINER.size or size > MOST_UNPACKED:
-            return b"".join(parts), f"an object of {size} bytes at byte {where}"
+            yield b"", f"an object of {size} bytes at byte {where}"
+            return
         data = file.read(size - BASE.size)
         file.read(size % 4)
         if kind == CONTAINER_TYPE:
-            part, trouble = _container_data(data, left)
-            parts.append(part)
-            left -= len(part)
+            part, trouble = _container_data(data, MOST_UNPACKED)
             if trouble or len(data) < size - BASE.size:
-                return b"".join(parts), f"{trouble or 'the file ends'} in the container at byte {where}"
+                yield part, f"{trouble or 'the file ends'} in the container at byte {where}"
+                return
+            yield part, ""
 
 
 def _container_data(data: bytes, most: int) -> tuple[bytes, str]:
@@ -85,19 +105,22 @@ def _container_data(data: bytes, most: int) -> tuple[bytes, str]:
     return found, "" if unpack.eof else "packed data end"
 
 
-def _sound(objects: bytes) -> tuple[int, str]:
-    """How far the objects follow one another as they should, and what is wrong there. Padding is up to 4 bytes."""
+def _sound(objects: bytes, before: int) -> tuple[int, str]:
+    """How far the objects follow one another as they should and are whole, and what is wrong there.
+
+    before: unpacked bytes before them. Padding is up to 4 bytes.
+    """
     at = 0
     while at + BASE.size <= len(objects):
         found = objects.find(b"LOBJ", at, at + 8)
         if found < 0:
-            return at, f"no object at unpacked byte {at}"
+            return at, f"no object at unpacked byte {before + at}"
         if found + BASE.size > len(objects):
             break
         _, _, version, size, _ = BASE.unpack_from(objects, found)
         if size < LEAST_OBJECT or version not in VERSIONS:
-            return at, f"an object of {size} bytes, version {version}, at unpacked byte {found}"
+            return at, f"an object of {size} bytes, version {version}, at unpacked byte {before + found}"
         if found + size > len(objects):
-            return at, f"the last object, at unpacked byte {found}, is cut"
+            break
         at = found + size
     return at, ""
