@@ -60,8 +60,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     for library in ("can", "canopen"):  # what goes wrong there is raised as well, and told in one line
         logging.getLogger(library).setLevel(logging.CRITICAL)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: files are closed, the emulator ended
+    kept = ""  # what the command leaves behind when it is interrupted
     try:
         args = parse(words)
+        kept = getattr(args, "kept", "")
         handler: Callable[[argparse.Namespace], int] = args.handler
         status = handler(args)
         sys.stdout.flush()
@@ -77,12 +79,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"psabench: {error}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print("psabench: interrupted; what was measured is kept", file=sys.stderr)
+        print("; ".join(filter(None, ("psabench: interrupted", kept))), file=sys.stderr)
         return 130
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
-    """Reads the command line; `handler` of the result carries it out. Raises BadInput."""
+    """Reads the command line; `handler` of the result carries it out; `kept`: see options.KEPT. Raises BadInput."""
     if words[0] not in COMMANDS:  # an option, or no command: the parser says so
         return parser().parse_args(words)
     module, _ = COMMANDS[words[0]]

@@ -14,6 +14,7 @@ from psabench.errors import BadInput, expected
 
 Options = TypeVar("Options")
 
+KEPT = "what was measured is kept"  # default `kept` of a command that stores as it measures; Ctrl-C ends it with that
 LISTED = 12  # options that an error lists
 LINE_HZ = 8_000_000.0  # psabench.link.lineport.SAMPLE_HZ, without loading NumPy
 BUS_HELP = """\

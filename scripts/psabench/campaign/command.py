@@ -17,7 +17,7 @@ from psabench.campaign.setup import Setup
 from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural, of_fields
+from psabench.options import KEPT, Parser, natural, of_fields
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
 
@@ -82,7 +82,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         description=ABOUT,
         epilog=EPILOG.format(studies="\n".join(studies), settings="\n".join(settings.lines())),
     )
-    p.set_defaults(handler=_main)
+    p.set_defaults(handler=_main, kept=KEPT)
     p.add_argument("procedure", choices=["gyrocompass"], help="procedure")
     p.add_argument("--list", action="store_true", help="list the studies, their cases and the settings")
     p.add_argument("--study", action="append", default=[], help="study; may be repeated (all but own; emulated: wire)")

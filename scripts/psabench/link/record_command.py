@@ -37,7 +37,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         description="Record all frames of a CAN bus and count the frames that one node lost.",
         epilog=EPILOG,
     )
-    p.set_defaults(handler=_record)
+    p.set_defaults(handler=_record, kept="what was recorded is kept")
     p.add_argument("file", type=Path, help=f"log file; its extension selects the format: {FORMATS}")
     source = p.add_mutually_exclusive_group()
     source.add_argument("--can", help=CAN_HELP)

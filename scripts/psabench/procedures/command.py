@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
-from psabench.options import Parser, natural, node_id, of_fields, positive, yes_no
+from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
 from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
 from psabench.progress import Bar
 from psabench.shell import command_line
@@ -122,6 +122,7 @@ class Command:
     load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
     examples: str
     notes: str = ""
+    kept: str = ""  # when it is interrupted
 
     @cached_property
     def parameters(self) -> Parameters:
@@ -181,7 +182,7 @@ def _parser_of(command: Command) -> Parser:
         description=f"{command.summary[0].upper()}{command.summary[1:]}.",
         epilog=f"examples:\n{command.examples}{command.notes}",
     )
-    p.set_defaults(handler=command.handler, procedure=command.name)
+    p.set_defaults(handler=command.handler, procedure=command.name, kept=command.kept)
     taken = command.parameters
     if taken.fields:
         group = p.add_argument_group(f"parameters of {command.name}")
@@ -396,6 +397,7 @@ def _commands() -> Iterator[Command]:
             load=_of_all if name == ALL else partial(_of_the_head, name),
             examples=_EXAMPLES[name],
             notes=NOTES_HEAD,
+            kept=KEPT,
         )
     name, summary = COMPARE
     yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])

@@ -58,7 +58,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], bytes]:
     return of
 
 
-def read(path: Path, data: bytes) -> tuple[int, str]:
+def read(path: Path, data: bytes, most_peak: float = MOST_PEAK) -> tuple[int, str]:
     """How many frames came, and the error behind them; within bounds of memory."""
     path.write_bytes(data)
     frames, error = 0, ""
@@ -71,7 +71,7 @@ def read(path: Path, data: bytes) -> tuple[int, str]:
     finally:
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-    assert peak < MOST_PEAK
+    assert peak < most_peak
     assert not error or (str(path) in error and "\n" not in error)
     return frames, error
 
@@ -133,11 +133,11 @@ def chunk(data: bytes) -> Chunk:
 
 
 def test_a_small_mcap_of_many_empty_messages_takes_little_memory(tmp_path: Path) -> None:
-    """Were each an object: 100 MB here, a gigabyte for the largest chunk."""
+    """Were each an object: 20 MB here, more than a gigabyte for the largest chunk."""
     other = packed(Message(channel_id=7, log_time=0, data=b"", publish_time=0, sequence=0))
-    data = mcap(raw_channel(), chunk(other * 250_000))
+    data = mcap(raw_channel(), chunk(other * 50_000))
     assert len(data) < 10_000
-    assert read(tmp_path / "x.mcap", data)[1].endswith("(the file ends without a footer)")
+    assert read(tmp_path / "x.mcap", data, 8e6)[1].endswith("(the file ends without a footer)")
 
 
 @pytest.mark.parametrize(

@@ -371,3 +371,30 @@ def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
     assert list(run_table.ON_THE_HEAD) == list(PROCEDURES)
     assert list(run_table.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
     assert run_table.COMPARE[0] == compare_converters.NAME
+
+
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("run turns", "; what was measured is kept"),
+        ("run all", "; what was measured is kept"),
+        ("campaign gyrocompass", "; what was measured is kept"),
+        ("record run.log", "; what was recorded is kept"),
+        ("run gyrocompass", ""),
+        ("run compare-converters", ""),
+        ("view", ""),
+        ("convert run.log run.blf", ""),
+        ("decode run.log", ""),
+    ],
+)
+def test_ctrl_c_says_what_is_kept(
+    line: str, kept: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def pressed(_: argparse.Namespace) -> int:
+        raise KeyboardInterrupt
+
+    args = cli.parse(line.split())
+    args.handler = pressed
+    monkeypatch.setattr(cli, "parse", lambda words: args)
+    assert cli.main(line.split()) == 130
+    assert capsys.readouterr().err == f"psabench: interrupted{kept}\n"
