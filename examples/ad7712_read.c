@@ -1,5 +1,6 @@
 /* An AD7712 on three frame lines, as a microcontroller without SPI drives it: +-10 V at AIN2, 60 Hz, 24 bits,
- * self-calibrated. cc examples/ad7712_read.c $(pkg-config --cflags --libs psabench) -o build/ad7712_read */
+ * self-calibrated. cc examples/ad7712_read.c $(pkg-config --cflags --libs psabench) -o build/ad7712_read
+ * An argument is a VCD file for the pins. */
 #include <psabench.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,13 +51,14 @@ static unsigned long frame(const char *select, int a0, unsigned long out)
     return in;
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     static const double volts[] = {-7.5, 0.125, 9.0};
     bench = psabench_new(1);
     if (!bench) return 1;
     adc = psabench_part_new(bench, "ad7712", "adc", "offset_v=0.02 gain_error=-0.01");
     if (!adc) check(-1);
+    if (argc > 1) check(psabench_vcd(bench, argv[1]));
     frame("TFS", 0, 0x228146); /* MD 001, CH 1, WL 1, code 326 */
     await_drdy(1);
     await_drdy(0); /* nine output periods later */

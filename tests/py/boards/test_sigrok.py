@@ -6,6 +6,7 @@ Then the shipped decoders on lines written here bit by bit, right and wrong.
 from __future__ import annotations
 
 import os
+import random
 import re
 import shutil
 import subprocess
@@ -33,6 +34,9 @@ SPI_IDLE = {"SClk": 0, "DIn": 0, "DOutX": 0, "CST": 1, "DInT": 0, "DOutT": 0}
 ACCEL = "spi:clk=SClk:mosi=DIn:miso=DOutX:cs=CST:cs_polarity=active-high"
 TEMP = "spi:clk=SClk:mosi=DInT:miso=DOutT:cs=CST:cpha=1"
 LINES = "psa2frame:int=Int:data=Data:clk=CLK"
+PSD1 = "psd1cycle:a0=A0:rfx=RFX:rfy=RFY:rfz=RFZ:sclk=SCLK:sdat=SDAT:fl2=FL2:cs=CS:rw=RW"
+AD7712_ALONE = "ad7712:sclk=SCLK:sdata=SDATA:rfs=RFS"
+AD7712 = f"{AD7712_ALONE}:tfs=TFS:a0=A0:drdy=DRDY:mode=MODE"
 XY, ZT = 0x185, 0x285  # CAN identifiers of node 5
 
 pytestmark = pytest.mark.skipif(not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed")
@@ -297,7 +301,7 @@ def test_temperature_converter_commands_and_words(tmp_path: Path) -> None:
 
 def test_sigrok_finds_every_decoder_whichever_it_loads_first(tmp_path: Path) -> None:
     shipped = {p.parent.name for p in ROOT.glob("decoders/*/pd.py")}
-    assert shipped == {"ads1256", "ads128x", "psa2frame", "psd1cycle"}
+    assert shipped == {"ad7712", "ads1256", "ads128x", "psa2frame", "psd1cycle"}
     assert not [p for p in (ROOT / "decoders").rglob("*") if p.is_symlink()], "a link does not survive every copy"
     shutil.copytree(ROOT / "decoders", tmp_path / "copy")
     run = subprocess.run(
@@ -310,6 +314,33 @@ def test_sigrok_finds_every_decoder_whichever_it_loads_first(tmp_path: Path) -> 
     )
     assert (run.returncode, run.stderr) == (0, "")
     assert shipped <= {line.split()[0] for line in run.stdout.splitlines() if line.startswith("  ")}
+
+
+GARBAGE: dict[str, tuple[str, dict[str, int]]] = {  # a decoder, its lines and how often each is drawn
+    "psa2frame": (LINES, {"CLK": 3, "Int": 1, "Data": 1}),
+    "psa2frame, 16 bits": (f"{LINES}:word_bits=16:words=T:format=hex", {"CLK": 9, "Int": 1, "Data": 1}),
+    "ads128x": (f"{ACCEL},ads128x", {"SClk": 300, "DIn": 100, "DOutX": 100, "CST": 1}),
+    "ads1256, continuous": (f"{TEMP},ads1256", {"SClk": 300, "DInT": 100, "DOutT": 100, "CST": 1}),
+    "psd1cycle": (PSD1, {"SCLK": 3} | dict.fromkeys("A0 RFX RFY RFZ SDAT FL2 CS RW".split(), 1)),
+    "psd1cycle, long": (PSD1, {"SCLK": 300, "SDAT": 100, "A0": 1} | dict.fromkeys("RFX RFY RFZ FL2 CS RW".split(), 5)),
+    "ad7712": (AD7712, {"SCLK": 3} | dict.fromkeys("SDATA RFS TFS A0 DRDY MODE".split(), 1)),
+    "ad7712, alone": (f"{AD7712_ALONE}:clock_hz=-1", {"SCLK": 40, "SDATA": 40, "RFS": 1}),
+    "ad7712, long": (AD7712, {"SCLK": 200, "SDATA": 40} | dict.fromkeys("RFS TFS A0 DRDY MODE".split(), 1)),
+    "ad7712, 16 bits": (
+        f"{AD7712}:clock_hz=0:word_bits=16:format=hex",
+        {"SCLK": 99, "SDATA": 40} | dict.fromkeys("RFS TFS A0 DRDY MODE".split(), 1),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GARBAGE)
+def test_arbitrary_levels_are_decoded_without_an_error(name: str, tmp_path: Path) -> None:
+    decoder, lines = GARBAGE[name]
+    draw = random.Random(name)
+    drawn = draw.choices(list(lines), list(lines.values()), k=25_000)
+    edges = [(10 * n, line, draw.randrange(2)) for n, line in enumerate(drawn)]
+    vcd = write(tmp_path / "g.vcd", dict.fromkeys(lines, 0), edges, 300_000)
+    assert len(sigrok(vcd, decoder, decoder.split(",")[-1].split(":")[0])) > 20  # and nothing on stderr
 
 
 def test_the_shipped_sessions_name_lines_that_exist() -> None:

@@ -47,7 +47,7 @@ def test_sigrok_finds_the_decoders_that_were_installed(tmp_path: Path, monkeypat
         assert cli.main(["waveform", "--decoders"]) == 0
     done = subprocess.run(["sigrok-cli", "-L"], capture_output=True, text=True, check=True, env=dict(os.environ))
     names = {line.split()[0] for line in done.stdout.splitlines() if line.strip()}
-    assert {"psa2frame", "psd1cycle", "ads128x", "ads1256"} <= names
+    assert {"psa2frame", "psd1cycle", "ads128x", "ads1256", "ad7712"} <= names
 
 
 @pytest.mark.parametrize(
