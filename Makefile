@@ -182,7 +182,7 @@ format: ## rewrite C and Python in the project's format
 	find emu tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp' | xargs clang-format -i
 	$(PY) -m ruff format .
 docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, requirements, tables of the pages, FIDELITY.md
-	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua
+	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua && $(PY) -m psabench.logs.sessions
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions under $(DESTDIR)$(PREFIX)

@@ -17,7 +17,7 @@ from psabench.places import BUNDLE, CHECKOUT
 
 EPILOG = """\
 examples:
-  psabench waveform run.vcd              writes run.gtkw and, for a PSA-2 or PSD-1, run.pvs beside it
+  psabench waveform run.vcd              writes run.gtkw and run.pvs beside it
   psabench waveform --decoders           installs the sigrok decoders for this user
 
 PulseView loads the .pvs file by itself; GTKWave: gtkwave run.vcd run.gtkw.

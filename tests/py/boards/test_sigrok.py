@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from psabench.boards.board import PARALLEL_BUS
 from psabench.emulator import Emulator
 from psabench.link.can_host import CanHost, Message, StepClock, open_bus
 from psabench.link.control import Control
@@ -35,6 +36,7 @@ ACCEL = "spi:clk=SClk:mosi=DIn:miso=DOutX:cs=CST:cs_polarity=active-high"
 TEMP = "spi:clk=SClk:mosi=DInT:miso=DOutT:cs=CST:cpha=1"
 LINES = "psa2frame:int=Int:data=Data:clk=CLK"
 PSD1 = "psd1cycle:a0=A0:rfx=RFX:rfy=RFY:rfz=RFZ:sclk=SCLK:sdat=SDAT:fl2=FL2:cs=CS:rw=RW"
+PSABUS = ":".join(["psabus", *(f"{line.lower()}={line}" for line in PARALLEL_BUS)])
 AD7712_ALONE = "ad7712:sclk=SCLK:sdata=SDATA:rfs=RFS"
 AD7712 = f"{AD7712_ALONE}:tfs=TFS:a0=A0:drdy=DRDY:mode=MODE"
 XY, ZT = 0x185, 0x285  # CAN identifiers of node 5
@@ -301,7 +303,7 @@ def test_temperature_converter_commands_and_words(tmp_path: Path) -> None:
 
 def test_sigrok_finds_every_decoder_whichever_it_loads_first(tmp_path: Path) -> None:
     shipped = {p.parent.name for p in ROOT.glob("decoders/*/pd.py")}
-    assert shipped == {"ad7712", "ads1256", "ads128x", "psa2frame", "psd1cycle"}
+    assert shipped == {"ad7712", "ads1256", "ads128x", "psa2frame", "psabus", "psd1cycle"}
     assert not [p for p in (ROOT / "decoders").rglob("*") if p.is_symlink()], "a link does not survive every copy"
     shutil.copytree(ROOT / "decoders", tmp_path / "copy")
     run = subprocess.run(
@@ -323,6 +325,7 @@ GARBAGE: dict[str, tuple[str, dict[str, int]]] = {  # a decoder, its lines and h
     "ads1256, continuous": (f"{TEMP},ads1256", {"SClk": 300, "DInT": 100, "DOutT": 100, "CST": 1}),
     "psd1cycle": (PSD1, {"SCLK": 3} | dict.fromkeys("A0 RFX RFY RFZ SDAT FL2 CS RW".split(), 1)),
     "psd1cycle, long": (PSD1, {"SCLK": 300, "SDAT": 100, "A0": 1} | dict.fromkeys("RFX RFY RFZ FL2 CS RW".split(), 5)),
+    "psabus": (PSABUS, dict.fromkeys(PARALLEL_BUS, 1)),
     "ad7712": (AD7712, {"SCLK": 3} | dict.fromkeys("SDATA RFS TFS A0 DRDY MODE".split(), 1)),
     "ad7712, alone": (f"{AD7712_ALONE}:clock_hz=-1", {"SCLK": 40, "SDATA": 40, "RFS": 1}),
     "ad7712, long": (AD7712, {"SCLK": 200, "SDATA": 40} | dict.fromkeys("RFS TFS A0 DRDY MODE".split(), 1)),
