@@ -10,8 +10,37 @@ from xml.etree import ElementTree
 import pytest
 from psabench.boards.psd1.waveform import cycle_picture, handover_picture
 from psabench.link.vcd import Vcd, read_vcd
+from psabench.report.wavedrom import Window, window_picture
 from psabench.report.waveform import frame_picture, setup_picture
 
+MS = 1_000_000
+
+
+def shows(title: str, *windows: tuple[str, float, float, str]) -> Callable[[Vcd], str]:
+    """A picture of windows: lines, from and to in ms, title."""
+    cut = [Window(lines.split(), round(a * MS), round(b * MS), title=text) for lines, a, b, text in windows]
+    return lambda vcd: window_picture(vcd, cut, title)
+
+
+PMKA = shows(
+    "PMKA in operation: a sample of each integrator every 4.8 ms, a precision reset of Z",
+    (
+        "SH CONV MUX0 MUX1",
+        9.95,
+        10.45,
+        "one period: X, Y, Z and K are held and converted; MUX is the integrator that is next",
+    ),
+    ("SH RP3 TAU0", 9.8, 60, "ten periods: the reset begins with the sample of Z that is beyond Uc, and lasts Ts/2"),
+)
+PIK = shows(
+    "PIK: Z at 1 g",
+    ("CLK FZP", 4, 12, "a reset balances the input for one period of CLK"),
+    ("FZP LATCH", 0, 24, "LATCH falls every 10 ms and takes the counters"),
+)
+GYRO = shows(
+    "Gyro unit after power-on: READY at 200 ms, a step every 10 ms, FAULT until 570 ms",
+    ("STEP READY FAULT", 190, 640, ""),
+)
 HERE = Path(__file__).resolve().parent
 IMG = HERE.parents[1] / "docs" / "img"
 
@@ -28,6 +57,9 @@ IMG = HERE.parents[1] / "docs" / "img"
             "psd1_handover.svg",
             "100 ns to DR|500 ns to the next|1 000 ns the host's|700 ns",
         ),
+        ("pmka_samples", PMKA, "pmka_samples.svg", "SH|MUX1|RP3|one period|ten periods"),
+        ("pik_latch", PIK, "pik_latch.svg", "CLK|FZP|LATCH"),
+        ("gyro_steps", GYRO, "gyro_steps.svg", "STEP|READY|FAULT"),
     ],
 )
 def test_pictures_in_the_docs_show_the_golden_traces(

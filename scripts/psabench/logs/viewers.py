@@ -14,14 +14,18 @@ from psabench.errors import BadInput, expected, output_error
 from psabench.link.own import replace_file
 from psabench.options import Parser
 from psabench.places import BUNDLE, CHECKOUT
+from psabench.shell.units import number
 
 EPILOG = """\
 examples:
   psabench waveform run.vcd              writes run.gtkw and run.pvs beside it
+  psabench waveform run.vcd --from 9.878ms --to 9.9ms --lines A0,RFX,SCLK,SDAT,D --wavedrom cycle.json --svg cycle.svg
+                                         a window as a WaveDrom timing picture and as a picture of our own
   psabench waveform --decoders           installs the sigrok decoders for this user
 
 PulseView loads the .pvs file by itself; GTKWave: gtkwave run.vcd run.gtkw.
 """
+NS_PER_S = 10**9
 MOST_HEAD = 1 << 20  # bytes of a VCD in which its lines are declared
 SCOPE = re.compile(rb"\$scope\s+module\s+(\w+)\s+\$end")
 LINE = re.compile(rb"\$var\s+wire\s+1\s+\S+\s+(\w+)\s+\$end")
@@ -35,7 +39,24 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--decoders", action="store_true", help="copy the sigrok decoders into FOLDER")
     folder = user_decoders()
     p.add_argument("--dir", type=Path, metavar="FOLDER", default=folder, help="folder of decoders (%(default)s)")
+    window = p.add_argument_group("a window of FILE, as a picture")
+    window.add_argument("--wavedrom", type=Path, metavar="OUT", help="WaveDrom JSON, a column a tick")
+    window.add_argument("--svg", type=Path, metavar="OUT", help="SVG")
+    window.add_argument("--from", dest="from_ns", type=_ns, metavar="TIME", help="such as 9.878ms (the first instant)")
+    window.add_argument("--to", dest="to_ns", type=_ns, metavar="TIME", help="(the last instant)")
+    window.add_argument("--lines", metavar="NAMES", help="such as Int,Data,CLK; D for D0, D1 ... as a number (all)")
+    tick = "length of a column (the longest that shows every edge)"
+    window.add_argument("--tick", dest="tick_ns", type=_ns, default=0, metavar="TIME", help=tick)
+    window.add_argument("--title", default="", help="(name of FILE)")
     return p.parse_args(words)
+
+
+def _ns(text: str) -> int:
+    """Nanoseconds of a time such as 5ms."""
+    try:
+        return round(number(text, "s") * NS_PER_S)
+    except (ValueError, OverflowError) as e:
+        raise argparse.ArgumentTypeError(str(e)) from e
 
 
 def user_decoders() -> Path:
@@ -45,9 +66,10 @@ def user_decoders() -> Path:
 
 
 def _run_waveform(args: argparse.Namespace) -> int:
-    if args.file is None and not args.decoders:
-        raise BadInput(expected("a VCD file or --decoders", "none", "waveform"))
-    written = write_sessions(args.file) if args.file else []
+    pictures = args.wavedrom or args.svg
+    if args.file is None and (pictures or not args.decoders):
+        raise BadInput(expected("a VCD file" if pictures else "a VCD file or --decoders", "none", "waveform"))
+    written = write_pictures(args) if pictures else write_sessions(args.file) if args.file else []
     written += install_decoders(args.dir) if args.decoders else []
     for path in written:
         print(path)
@@ -84,6 +106,32 @@ def write_sessions(vcd: Path) -> list[Path]:
             replace_file(vcd.with_suffix(ending), text)
             written.append(vcd.with_suffix(ending))
     return written
+
+
+def write_pictures(args: argparse.Namespace) -> list[Path]:
+    """The window of a recording, as asked for. Raises BadInput, OutputError."""
+    from psabench.link.vcd import read_vcd  # NumPy: session files do without
+    from psabench.report.wavedrom import Window, wavedrom_text, window_picture
+
+    try:
+        vcd = read_vcd(args.file)
+        window = Window(
+            lines=args.lines.split(",") if args.lines is not None else list(vcd.wires),
+            start_ns=vcd.start_ns if args.from_ns is None else args.from_ns,
+            end_ns=vcd.end_ns if args.to_ns is None else args.to_ns,
+            tick_ns=args.tick_ns,
+        )
+        title = args.title or args.file.name
+        made: dict[Path, str] = {}
+        if args.wavedrom:
+            made[args.wavedrom] = wavedrom_text(vcd, window, title)
+        if args.svg:
+            made[args.svg] = window_picture(vcd, [window], title)
+    except ValueError as e:
+        raise BadInput(f"{args.file}: {e}") from e
+    for path, text in made.items():
+        replace_file(path, text)
+    return list(made)
 
 
 def gtkw_text(scope: str, lines: Sequence[str]) -> str:
