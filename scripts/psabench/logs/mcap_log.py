@@ -180,7 +180,7 @@ def _parsed(data: bytes) -> object:
     try:
         return json.loads(data)
     except RecursionError as e:
-        raise ValueError("JSON nested too deep") from e
+        raise ValueError(expected("JSON nested less deep", "more levels than the parser takes")) from e
 
 
 # mcap's StreamReader makes an object of every record, and a list of all in a chunk: a gigabyte for 128 MiB of

@@ -27,7 +27,7 @@ IDLE = {"SCLK": 0, "SDATA": 0, "RFS": 1, "TFS": 1, "A0": 0, "DRDY": 0, "MODE": 0
 
 
 def chip(path: Path, **options: float | str) -> Ad7712:
-    return Ad7712(path, seed=1, noise_scale=0, **options)
+    return Ad7712(path, seed=1, noise_scale=0, **options)  # type: ignore[arg-type]
 
 
 def decoded(s: Ad7712, path: Path, decoder: str = PINS, show: str = TEXTS) -> list[str]:

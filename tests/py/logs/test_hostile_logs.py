@@ -16,8 +16,8 @@ import can
 import numpy as np
 import pytest
 import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Message
-from mcap.writer import RecordBuilder
 from psabench import cli
 from psabench.conform.sources import blf, mf4
 from psabench.errors import BadInput
@@ -110,7 +110,7 @@ def packed(*records: Channel | Chunk | Message) -> bytes:
     builder = RecordBuilder()
     for r in records:
         r.write(builder)
-    return bytes(builder.end())
+    return bytes(builder.end())  # type: ignore[no-untyped-call]
 
 
 def raw_channel(metadata: dict[str, str] | None = None) -> Channel:

@@ -89,8 +89,9 @@ static const struct {
     {"--can", "--can: expected an argument, got none"},
     {"--can can0", "--can: expected socketcand[:PORT], slcan[:LINK], socketcan:IFACE, udp[:GROUP[:PORT]], "
                    "cannelloni[:PORT[:PEER_PORT]], log:FILE or none, got \"can0\""},
-    {"--can cannelloni:1:1", "--can: expected cannelloni[:PORT[:PEER_PORT]], two ports from 1 to 65535, PORT 0: any free "
-                             "port, got \"cannelloni:1:1\""},
+    {"--can cannelloni:1:1",
+     "--can: expected cannelloni[:PORT[:PEER_PORT]], two ports from 1 to 65535, PORT 0: any free "
+     "port, got \"cannelloni:1:1\""},
     {"--can socketcan", "--can: expected socketcand[:PORT]"},
     {"--can socketcan:", "--can: expected socketcand[:PORT]"},
     {"--can socketcand:65536", "--can: expected a port from 0 (any free port) to 65535, got \"socketcand:65536\""},
