@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from psabench.boards.session import Session
+
 PARALLEL_BUS = ("CS", "RW", *(f"AB{k}" for k in range(4)), *(f"D{k}" for k in range(16)))
 
 
@@ -90,6 +92,7 @@ class Board:
     has_inputs: bool = True  # volts can be put on its inputs
     has_thermometer: bool = False  # its temperatures are compared with a chamber's
     on_table: bool = False  # it has gyros
+    session: Session | None = None  # what PulseView and GTKWave show of its lines at first; None: no such files
     overdrive_v_per_g: float = 0.0  # of the accelerometer X, which a dividing head turns beyond full scale
 
     @property

@@ -9,163 +9,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from psabench.boards.board import PARALLEL_BUS
 from psabench.boards.registry import BOARDS
+from psabench.boards.session import Session, Stack
 from psabench.link.own import replace_file
 from psabench.places import CHECKOUT
 
-GREEN, PURPLE, ORANGE = 0xFF32AA32, 0xFF8232AA, 0xFF8F5202  # alpha, red, green, blue
 NO_MARKERS = " ".join(26 * ["-1"])  # A to Z of GTKWave
-
-
-@dataclass(frozen=True, slots=True)
-class Decoder:
-    """A decoder of sigrok with what differs from its defaults; hidden: rows that are not shown."""
-
-    id: str
-    options: Mapping[str, str | int] = field(default_factory=dict)
-    hidden: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Decoders on top of each other, and the lines of the lowest one's channels, by their names."""
-
-    name: str
-    color: int
-    decoders: tuple[Decoder, ...]
-    channels: Mapping[str, str]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Session:
-    """What the viewers of a board's recording show at first."""
-
-    stacks: tuple[Stack, ...]
-    from_ns: int  # where PulseView's window begins: a multiple of 10 ns
-    scale: str  # seconds a pixel of it
-    trace_height: int = 18
-    comment: str  # of GTKWave, in two lines
-    gtk_from_ns: int
-    gtk_cursor_ns: int
-    gtk_height: int = 760
-    groups: Mapping[str, str]  # lines under a heading; "*": those of the parallel bus
-
-
-def spi(*, miso: str, mosi: str, above: Decoder, options: Mapping[str, str | int], name: str, color: int) -> Stack:
-    """A converter of PSA-2. SClk is for the accelerometer converters while CST is high."""
-    lowest = Decoder("spi", options, hidden=(0, 2, 3, 5, 6))
-    return Stack(name, color, (lowest, above), {"CLK": "SClk", "MISO": miso, "MOSI": mosi, "CS#": "CST"})
-
-
-def period(name: str, color: int, line: str) -> Stack:
-    """The time from each rise of a line to the next."""
-    return Stack(name, color, (Decoder("timing", {"edge": "rising"}, hidden=(1, 2)),), {"Data": line})
-
-
-BUS = Stack("Bus", PURPLE, (Decoder("psabus"),), {line: line for line in PARALLEL_BUS})
-PULSES = ("FXP", "FXN", "FYP", "FYN", "FZP", "FZN")
-CYCLE_LINES = ("A0", "RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", *PARALLEL_BUS)
-
-SESSIONS: Mapping[str, Session] = {
-    "psa2": Session(
-        stacks=(
-            Stack("Frame", GREEN, (Decoder("psa2frame", hidden=(0,)),), {"INT": "Int", "DATA": "Data", "CLK": "CLK"}),
-            spi(
-                name="Accelerometers",
-                color=PURPLE,
-                miso="DOutX",
-                mosi="DIn",
-                options={"cs_polarity": "active-high"},
-                above=Decoder("ads128x"),
-            ),
-            spi(
-                name="Temperature",
-                color=ORANGE,
-                miso="DOutT",
-                mosi="DInT",
-                options={"cpha": 1},
-                above=Decoder("ads1256"),
-            ),
-        ),
-        from_ns=63_090_000,
-        scale="1.5e-07",
-        comment="Opens on the set-up after Res; the lines carry the\nnames of the article's table.",
-        gtk_from_ns=63_100_000,
-        gtk_cursor_ns=63_106_440,
-        groups={
-            "Reset and synchronisation": "Res SYNC_A SYNC_T",
-            "Serial ports of the converters": "DRD_A DRD_T SClk DIn DOutX DOutY DOutZ CST DInT DOutT",
-            "To the navigation computer": "Int Data CLK",
-        },
-    ),
-    "psd1": Session(
-        stacks=(Stack("Cycle", GREEN, (Decoder("psd1cycle", hidden=(0,)),), {line: line for line in CYCLE_LINES}),),
-        from_ns=9_880_000,
-        scale="5e-08",
-        trace_height=14,
-        comment="Opens on the second cycle of reading; the lines carry\nthe names of the article.",
-        gtk_from_ns=9_880_000,
-        gtk_cursor_ns=9_882_400,
-        gtk_height=860,
-        groups={
-            "Conditions of a cycle": "CLK_1M25 INT0 FL1 DR",
-            "Converters": "A0 RFX RFY RFZ TFS SCLK SDAT",
-            "To the navigation computer": "FL2 *",
-        },
-    ),
-    "pmka": Session(
-        stacks=(period("Samples", GREEN, "SH"), BUS),
-        from_ns=9_500_000,
-        scale="2e-05",
-        trace_height=14,
-        comment="Opens on the first periods; the lines carry\nthe names of docs/boards/pmka.md.",
-        gtk_from_ns=9_500_000,
-        gtk_cursor_ns=10_000_000,
-        gtk_height=1000,
-        groups={
-            "Keys and beat": "KL1 KL2 KL3 KL4 TAU0 TAU1 TAU2",
-            "Precision resets": "RP1 RN1 RP2 RN2 RP3 RN3 RP4 RN4",
-            "Sample and conversion": "SH CONV MUX0 MUX1",
-            "Parallel bus": "*",
-        },
-    ),
-    "pik": Session(
-        stacks=(
-            *(
-                Stack(
-                    f"Count {line}",
-                    GREEN,
-                    (Decoder("counter", {"data_edge": "rising"}, hidden=(1, 2)),),
-                    {"Data": line, "Reset": "LATCH"},
-                )
-                for line in PULSES
-            ),
-            period("Latch", ORANGE, "LATCH"),
-            BUS,
-        ),
-        from_ns=9_500_000,
-        scale="2e-05",
-        trace_height=14,
-        comment="Opens on the first latch of the counters; the lines\ncarry the names of docs/boards/pik.md.",
-        gtk_from_ns=9_500_000,
-        gtk_cursor_ns=10_000_000,
-        gtk_height=860,
-        groups={"Resets": f"CLK {' '.join(PULSES)}", "Counters": "LATCH", "Parallel bus": "*"},
-    ),
-    "gyro": Session(
-        stacks=(period("Steps", GREEN, "STEP"),),
-        from_ns=195_000_000,
-        scale="2e-04",
-        comment="Opens on the first steps; the lines carry\nthe names of docs/boards/gyro.md.",
-        gtk_from_ns=195_000_000,
-        gtk_cursor_ns=200_000_000,
-        groups={"Control loops": "STEP READY FAULT", "Gyrocompassing": "SLEW SETTLE WINDOW"},
-    ),
-}
+SESSIONS: Mapping[str, Session] = {b.name: b.session for b in BOARDS.values() if b.session is not None}
 
 
 def pulseview_text(board: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import PARALLEL_BUS, Board, Bus, Fields, bits
+from psabench.boards.session import GREEN, ORANGE, Decoder, Session, Stack, bus_stack, period
 
 _AXES = ("X", "Y", "Z")
 
@@ -14,6 +15,32 @@ FIELDS: Fields = {
     ),
 }
 
+_PULSES = ("FXP", "FXN", "FYP", "FYN", "FZP", "FZN")
+
+SESSION = Session(
+    stacks=(
+        *(
+            Stack(
+                f"Count {line}",
+                GREEN,
+                (Decoder("counter", {"data_edge": "rising"}, hidden=(1, 2)),),
+                {"Data": line, "Reset": "LATCH"},
+            )
+            for line in _PULSES
+        ),
+        period("Latch", ORANGE, "LATCH"),
+        bus_stack(PARALLEL_BUS),
+    ),
+    from_ns=9_500_000,
+    scale="2e-05",
+    trace_height=14,
+    comment="Opens on the first latch of the counters; the lines\ncarry the names of docs/boards/pik.md.",
+    gtk_from_ns=9_500_000,
+    gtk_cursor_ns=10_000_000,
+    gtk_height=860,
+    groups={"Resets": f"CLK {' '.join(_PULSES)}", "Counters": "LATCH", "Parallel bus": "*"},
+)
+
 BOARD = Board(
     name="pik",
     device="Pik",
@@ -24,4 +51,5 @@ BOARD = Board(
     crystal="clock_tol_ppm",  # its clock is whole Hz: a profile cannot say an error of it
     overdrive_v_per_g=9.0,
     fields=FIELDS,
+    session=SESSION,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import PARALLEL_BUS, Beat, Bits, Board, Bus, Fields, bits
+from psabench.boards.session import GREEN, Session, bus_stack, period
 
 _AXES = ("X", "Y", "Z")
 _INTEGRATORS = ("X", "Y", "Z", "K")
@@ -27,6 +28,23 @@ FIELDS: Fields = {
     ("pmka", "MODE"): (bits(0x01, "MODE", "program of the computer", "autonomous"),),
 }
 
+SESSION = Session(
+    stacks=(period("Samples", GREEN, "SH"), bus_stack(PARALLEL_BUS)),
+    from_ns=9_500_000,
+    scale="2e-05",
+    trace_height=14,
+    comment="Opens on the first periods; the lines carry\nthe names of docs/boards/pmka.md.",
+    gtk_from_ns=9_500_000,
+    gtk_cursor_ns=10_000_000,
+    gtk_height=1000,
+    groups={
+        "Keys and beat": "KL1 KL2 KL3 KL4 TAU0 TAU1 TAU2",
+        "Precision resets": "RP1 RN1 RP2 RN2 RP3 RN3 RP4 RN4",
+        "Sample and conversion": "SH CONV MUX0 MUX1",
+        "Parallel bus": "*",
+    },
+)
+
 BOARD = Board(
     name="pmka",
     device="Pmka",
@@ -40,4 +58,5 @@ BOARD = Board(
     clocks=("ts_ns",),  # a period
     has_thermometer=True,
     fields=FIELDS,
+    session=SESSION,
 )

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from psabench.boards.board import Beat, Bits, Board, Fields, Setting, bits
 from psabench.boards.objects import Psa2Objects
+from psabench.boards.session import GREEN, ORANGE, PURPLE, Decoder, Session, Stack
 
 _INPUTS = {**{n: f"AIN{n}" for n in range(8)}, **dict.fromkeys(range(8, 16), "AINCOM")}
 _RATES = {
@@ -43,6 +46,45 @@ FIELDS: Fields = {
     ("temp", "IO"): (bits(0xF0, "DIR"), bits(0x0F, "DIO")),
 }
 
+
+def _spi(*, miso: str, mosi: str, above: Decoder, options: Mapping[str, str | int], name: str, color: int) -> Stack:
+    """A converter of PSA-2. SClk is for the accelerometer converters while CST is high."""
+    lowest = Decoder("spi", options, hidden=(0, 2, 3, 5, 6))
+    return Stack(name, color, (lowest, above), {"CLK": "SClk", "MISO": miso, "MOSI": mosi, "CS#": "CST"})
+
+
+SESSION = Session(
+    stacks=(
+        Stack("Frame", GREEN, (Decoder("psa2frame", hidden=(0,)),), {"INT": "Int", "DATA": "Data", "CLK": "CLK"}),
+        _spi(
+            name="Accelerometers",
+            color=PURPLE,
+            miso="DOutX",
+            mosi="DIn",
+            options={"cs_polarity": "active-high"},
+            above=Decoder("ads128x"),
+        ),
+        _spi(
+            name="Temperature",
+            color=ORANGE,
+            miso="DOutT",
+            mosi="DInT",
+            options={"cpha": 1},
+            above=Decoder("ads1256"),
+        ),
+    ),
+    from_ns=63_090_000,
+    scale="1.5e-07",
+    comment="Opens on the set-up after Res; the lines carry the\nnames of the article's table.",
+    gtk_from_ns=63_100_000,
+    gtk_cursor_ns=63_106_440,
+    groups={
+        "Reset and synchronisation": "Res SYNC_A SYNC_T",
+        "Serial ports of the converters": "DRD_A DRD_T SClk DIn DOutX DOutY DOutZ CST DInT DOutT",
+        "To the navigation computer": "Int Data CLK",
+    },
+)
+
 BOARD = Board(
     name="psa2",
     device="Psa2",
@@ -62,4 +104,5 @@ BOARD = Board(
     has_thermometer=True,
     setting=Setting(index=Psa2Objects.SAMPLE_NTH, sub=0, value=bytes([3, 0])),
     fields=FIELDS,
+    session=SESSION,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import PARALLEL_BUS, Beat, Bits, Board, Bus, Fields, bits
+from psabench.boards.session import GREEN, Decoder, Session, Stack
 
 _AXES = ("X", "Y", "Z")
 _COMMANDS = {
@@ -47,6 +48,24 @@ FIELDS: Fields = {
     ("psd1", "FLAGS"): (bits(0x0001, "INT0", "inactive", "active"), bits(0x0002, "FL1", "inactive", "active")),
 }
 
+_CYCLE_LINES = ("A0", "RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", *PARALLEL_BUS)
+
+SESSION = Session(
+    stacks=(Stack("Cycle", GREEN, (Decoder("psd1cycle", hidden=(0,)),), {line: line for line in _CYCLE_LINES}),),
+    from_ns=9_880_000,
+    scale="5e-08",
+    trace_height=14,
+    comment="Opens on the second cycle of reading; the lines carry\nthe names of the article.",
+    gtk_from_ns=9_880_000,
+    gtk_cursor_ns=9_882_400,
+    gtk_height=860,
+    groups={
+        "Conditions of a cycle": "CLK_1M25 INT0 FL1 DR",
+        "Converters": "A0 RFX RFY RFZ TFS SCLK SDAT",
+        "To the navigation computer": "FL2 *",
+    },
+)
+
 BOARD = Board(
     name="psd1",
     device="Psd1",
@@ -64,4 +83,5 @@ BOARD = Board(
     clock_at_limit=True,
     on_table=True,
     fields=FIELDS,
+    session=SESSION,
 )
