@@ -3,13 +3,13 @@
 
 Usage:
     gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py and parameters.py, an EDS
-                            and a page a device
+                            and a page a device, the tables of docs/uds.md
     gen_proto.py --check    exit 1 and name the ones that are out of date
     gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools), an <device>_od.[ch] each,
-                            parameter_names.[ch]
+                            parameter_names.[ch], uds_dids.[ch]
 
 psabench.yaml is PSA-2 and what all devices have in common: network management, services, communication objects.
-unit.yaml has the objects that the others share, and its head the grammar of their files.
+unit.yaml has the objects that the others share, and its head the grammar of their files. uds.yaml has data identifiers.
 """
 
 import argparse
@@ -24,6 +24,8 @@ from protogen.objects import objects_module
 from protogen.page import page
 from protogen.parameters import parameter_files, parameters_module
 from protogen.source import load_all
+from protogen.uds import PAGE as UDS_PAGE
+from protogen.uds import uds_files, uds_page
 
 
 def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
@@ -32,6 +34,7 @@ def kept_files(protocols: list[Protocol]) -> dict[Path, str]:
         ROOT / "proto/psabench.dbc": dbc(protocols),
         ROOT / "scripts/psabench/boards/objects.py": objects_module(protocols),
         ROOT / "scripts/psabench/boards/parameters.py": parameters_module(protocols),
+        UDS_PAGE: uds_page(protocols),
     }
     for p in protocols:
         files[ROOT / f"proto/{p.key}.eds"] = eds(p)
@@ -60,7 +63,7 @@ def main(argv: list[str] | None = None) -> int:
         if old:
             print(f"out of date: {', '.join(old)}; run tools/gen_proto.py", file=sys.stderr)
         return 1 if old else 0
-    compiled = c_files(protocols) | parameter_files(protocols)
+    compiled = c_files(protocols) | parameter_files(protocols) | uds_files(protocols)
     files = {args.out / name: text for name, text in compiled.items()} if args.out else kept_files(protocols)
     for path, text in files.items():
         write(path, text)

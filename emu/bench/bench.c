@@ -1,5 +1,7 @@
 #include "bench/bench.h"
 
+#include "gen/uds_dids.h"
+
 #include <string.h>
 
 enum { START_NS = 1000000, NMT_START = 1, SDO_WRITE_U8 = 0x2F, OBJECT_FRAME_FORM = 0x2020 };
@@ -48,6 +50,7 @@ static void init_unit(struct bench *b, unsigned i)
     unit_init(&b->unit[i], &u->cfg, &b->lab, &b->sched);
     const struct board_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
     unit_connect(&b->unit[i], &cfg, &b->bus[u->bus], &b->sched);
+    if (u->uds_ecu) uds_door_init(&b->uds[u->bus][u->uds_ecu - 1], u->uds_ecu, &uds_dids, unit_co(&b->unit[i]));
 }
 
 static void init_bus(struct bench *b, unsigned i)

@@ -2,6 +2,7 @@
 #ifndef PSABENCH_BENCH_BENCH_H
 #define PSABENCH_BENCH_BENCH_H
 
+#include "canopen/uds_door.h"
 #include "command/view.h"
 #include "scenario/scenario.h"
 #include "trace/sampler.h"
@@ -47,6 +48,7 @@ struct bench {
     /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
     struct unit unit[SCENARIO_UNITS_MAX];
     struct bench_cycle cycle[SCENARIO_UNITS_MAX];
+    struct uds_door uds[SCENARIO_BUSES_MAX][UDS_ECU_MAX]; /* those that the scenario has */
 };
 
 /* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */

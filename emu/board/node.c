@@ -65,7 +65,7 @@ static void cycle_done(void *ctx, struct board_cycle *c, enum board_cycle_result
     else record_rejection(n, c, r);
     const uint32_t abort = r == BOARD_CYCLE_OFF ? CO_AB_TRANSFER : board_node_abort_of(r);
     const struct co_value v = {.number = c->data};
-    co_sdo_answer(&n->node.sdo, n->ticket, abort, &v, t_ns);
+    co_node_answer(&n->node, n->ticket, abort, &v, t_ns);
 }
 
 static uint32_t submit_cycle(struct board_node *n, bool write, uint8_t address, uint16_t data, int64_t t_ns)

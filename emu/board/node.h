@@ -29,7 +29,7 @@
 struct board_node;
 
 /* Which functions answer for an object, all its sub-indices; NULL: cannot. Rights, type and limits of the entry have been
- * checked. CO_OK, an abort code, or CO_PENDING: then co_sdo_answer() with the ticket node.sdo.ticket had. */
+ * checked. CO_OK, an abort code, or CO_PENDING: then co_node_answer() with the ticket node.sdo.ticket had. */
 struct board_object {
     uint16_t index;
     double (*value)(const struct board_node *n, const struct co_entry *e); /* a number that is there */

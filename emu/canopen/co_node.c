@@ -19,11 +19,16 @@ enum { ERROR_REGISTER = 0x1001, ERROR_HISTORY = 0x1003, HEARTBEAT_TIME = 0x1017 
 enum { EMCY_PASSIVE = 0x8120, EMCY_RECOVERED = 0x8140, EMCY_CAN_REGISTER = 0x11 /* generic, communication */ };
 enum { TPDO_FIRST = 0x1800, TPDO_LAST = TPDO_FIRST + (int)CO_TPDO_MAX - 1, NS_PER_MS = 1000000, NS_PER_US = 1000 };
 
-static void send_frame(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
+bool co_node_send(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
 {
     struct can_msg m = {.id = id, .len = len};
     memcpy(m.data, data, len);
-    (void)can_send(n->bus, &n->services, &m, t_ns); /* a full queue is counted there */
+    return can_send(n->bus, &n->services, &m, t_ns) == CAN_OK;
+}
+
+static void send_frame(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns)
+{
+    (void)co_node_send(n, id, data, len, t_ns); /* a full queue is counted there */
 }
 
 /* ---- heartbeat ---- */
@@ -169,12 +174,24 @@ static void send_sdo(void *ctx, const uint8_t frame[8], int64_t t_ns)
     send_frame(n, (uint32_t)ID_SDO_ANSWER + n->cfg.id, frame, 8, t_ns);
 }
 
+void co_node_answer(struct co_node *n, uint32_t ticket, uint32_t abort, const struct co_value *v, int64_t t_ns)
+{
+    if (n->guest && n->guest->answer(n->guest->ctx, ticket, abort, v, t_ns)) return;
+    co_sdo_answer(&n->sdo, ticket, abort, v, t_ns);
+}
+
 /* ---- network management ---- */
+
+static void reset_servers(struct co_node *n)
+{
+    co_sdo_reset(&n->sdo);
+    if (n->guest) n->guest->reset(n->guest->ctx);
+}
 
 static void enter_state(struct co_node *n, enum co_state state, int64_t t_ns)
 {
     if (n->state == state) return;
-    if (state == CO_STOPPED) co_sdo_reset(&n->sdo);
+    if (state == CO_STOPPED) reset_servers(n);
     if (state != CO_OPERATIONAL) can_flush(&n->stream);
     n->state = state;
     n->io.event(n->io.ctx, CO_EV_STATE, t_ns);
@@ -185,7 +202,7 @@ static void reset_communication(struct co_node *n)
     n->heartbeat_ms = (uint16_t)co_default_number(n->cfg.od, HEARTBEAT_TIME, 0, n->cfg.id);
     n->history_count = 0;
     memset(n->error, 0, sizeof n->error);
-    co_sdo_reset(&n->sdo);
+    reset_servers(n);
     can_flush(&n->services);
     can_flush(&n->stream);
     co_pdo_reset(n);
@@ -200,6 +217,11 @@ static void reset_node(struct co_node *n, enum co_event what, int64_t t_ns)
     send_heartbeat(n, CO_INITIALISING, t_ns); /* boot-up */
     arm_heartbeat(n, t_ns);
     enter_state(n, CO_PRE_OPERATIONAL, t_ns);
+}
+
+void co_node_reset(struct co_node *n, int64_t t_ns)
+{
+    reset_node(n, CO_EV_RESET_NODE, t_ns);
 }
 
 static void on_nmt(struct co_node *n, const struct can_msg *m, int64_t t_ns)
@@ -248,6 +270,28 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     else if (talks) on_sync(n, m, t_ns);
 }
 
+/* ---- guest ---- */
+
+static void on_frame_with_guest(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct co_node *n = ctx;
+    if (!(m->flags & CAN_EXT) && n->guest->rx(n->guest->ctx, m, t_ns)) return;
+    on_frame(n, m, t_ns);
+}
+
+static void on_sent_with_guest(void *ctx, const struct can_msg *m, int64_t t_ns)
+{
+    struct co_node *n = ctx;
+    n->guest->sent(n->guest->ctx, m, t_ns);
+}
+
+void co_node_add_guest(struct co_node *n, const struct co_guest *g)
+{
+    n->guest = g;
+    n->services.rx = on_frame_with_guest;
+    n->services.sent = on_sent_with_guest;
+}
+
 /* ---- life ---- */
 
 void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct co_node_io *io, struct can_bus *bus,
@@ -277,7 +321,7 @@ void co_node_power_up(struct co_node *n, int64_t t_ns)
 
 void co_node_power_down(struct co_node *n)
 {
-    co_sdo_reset(&n->sdo);
+    reset_servers(n);
     sched_cancel(n->sched, &n->heartbeat);
     can_unplug(n->bus, &n->services, n->sched->now_ns);
     can_detach(n->bus, &n->stream); /* of the same controller */

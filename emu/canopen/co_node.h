@@ -48,6 +48,16 @@ struct co_node_io {
     void (*rx_other)(void *ctx, const struct can_msg *m, int64_t t_ns);
 };
 
+/* A second protocol on the node's controller (uds_door.h). The functions may not be NULL. */
+struct co_guest {
+    void *ctx;
+    bool (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns); /* base frames; true: its own, not the node's */
+    void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns); /* a frame of the services has been on the bus */
+    void (*reset)(void *ctx); /* as the SDO server's: reset, stopped, unpowered */
+    /* Result of an access, as co_sdo_answer(); true: its own ticket. */
+    bool (*answer)(void *ctx, uint32_t ticket, uint32_t abort, const struct co_value *v, int64_t t_ns);
+};
+
 struct co_error {
     uint16_t code; /* 0: free */
     uint8_t reg;   /* bits of 1001h */
@@ -62,6 +72,7 @@ struct co_node {
     struct can_node services, stream;
     enum co_state state;
     struct co_sdo sdo;
+    const struct co_guest *guest; /* NULL: none */
     struct co_pdo pdo[CO_TPDO_MAX];
     uint16_t heartbeat_ms;
     struct sched_ev heartbeat;
@@ -79,6 +90,18 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
 /* Attaches to the bus, sends boot-up, enters pre-operational. */
 void co_node_power_up(struct co_node *n, int64_t t_ns);
 void co_node_power_down(struct co_node *n);
+
+/* Before power-up; kept by pointer. Without one nothing is asked at a frame. */
+void co_node_add_guest(struct co_node *n, const struct co_guest *g);
+
+/* A classic frame among the services. False: counted by the bus as not sent. */
+bool co_node_send(struct co_node *n, uint32_t id, const uint8_t *data, uint8_t len, int64_t t_ns);
+
+/* As the NMT command reset node. */
+void co_node_reset(struct co_node *n, int64_t t_ns);
+
+/* Result of an access that took time, with the ticket sdo.ticket had when it began: to the SDO server or the guest. */
+void co_node_answer(struct co_node *n, uint32_t ticket, uint32_t abort, const struct co_value *v, int64_t t_ns);
 
 /* An error begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. An active error is not
  * reported again. */

@@ -71,6 +71,17 @@ struct co_value {
 #define CO_AB_TRANSFER   0x08000020u /* could not be transferred to the application */
 #define CO_AB_STATE      0x08000022u /* not in the present device state */
 
+/* Whether an access may be tried: CO_OK, CO_AB_WRITE_ONLY or CO_AB_READ_ONLY. */
+static inline uint32_t co_may_read(const struct co_entry *e)
+{
+    return e->access == CO_WO ? CO_AB_WRITE_ONLY : CO_OK;
+}
+
+static inline uint32_t co_may_write(const struct co_entry *e)
+{
+    return e->access == CO_RO || e->access == CO_CONST ? CO_AB_READ_ONLY : CO_OK;
+}
+
 /* The entry, or NULL with *abort: no such object, or no such sub-index. */
 const struct co_entry *co_find(const struct co_od *od, uint16_t index, uint8_t sub, uint32_t *abort);
 

@@ -84,7 +84,7 @@ static void send_value(struct co_sdo *s, const struct co_value *v, int64_t t_ns)
 
 static void begin_upload(struct co_sdo *s, int64_t t_ns)
 {
-    if (s->entry->access == CO_WO) {
+    if (co_may_read(s->entry) != CO_OK) {
         send_abort(s, CO_AB_WRITE_ONLY, t_ns);
         return;
     }
@@ -159,7 +159,7 @@ static void download_expedited(struct co_sdo *s, const uint8_t *data, int64_t t_
 
 static void begin_download(struct co_sdo *s, const uint8_t *data, int64_t t_ns)
 {
-    if (s->entry->access == CO_RO || s->entry->access == CO_CONST) {
+    if (co_may_write(s->entry) != CO_OK) {
         send_abort(s, CO_AB_READ_ONLY, t_ns);
         return;
     }

@@ -62,6 +62,7 @@ struct scenario_unit {
     char level[32];     /* of a gyro unit: the unit that reads its level sensors; "": none */
     unsigned bus;       /* index into the buses */
     uint8_t frame_form; /* written to object 2020h at the start; 0 pair, 1 fast, 2 FD frame, 3 FD block */
+    uint8_t uds_ecu;    /* its UDS door; 0: none */
     bool spread;        /* parameters of its own, drawn from the production spread */
 };
 

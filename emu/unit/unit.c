@@ -253,9 +253,14 @@ struct trace *unit_trace(const struct unit *u)
     return &u->board->trace;
 }
 
+struct co_node *unit_co(const struct unit *u)
+{
+    return u->can ? u->type->can->node(u->can) : NULL;
+}
+
 struct can_node *unit_node(const struct unit *u)
 {
-    return u->can ? &u->type->can->node(u->can)->stream : NULL;
+    return u->can ? &unit_co(u)->stream : NULL;
 }
 
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)

@@ -83,6 +83,7 @@ void unit_power_down(struct unit *u, int64_t t_ns);
 void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics change abruptly */
 struct trace *unit_trace(const struct unit *u);
 struct can_node *unit_node(const struct unit *u); /* NULL: on no bus */
+struct co_node *unit_co(const struct unit *u);    /* the same */
 
 /* From the next event on, after the observers there are; the board computes events only while there is an observer. A frame
  * that is about to begin may begin untold. */

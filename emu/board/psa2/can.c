@@ -89,7 +89,7 @@ static void request_done(void *ctx, struct psa2_request *r, enum psa2_result res
     if (!given_up && (result == PSA2_OK || result == PSA2_TIMEOUT))
         port_fault(c, r->group, result == PSA2_TIMEOUT, t_ns);
     const struct co_value v = {.number = r->answer[c->request_axis]};
-    co_sdo_answer(&c->node.node.sdo, c->ticket, aborts[result], &v, t_ns);
+    co_node_answer(&c->node.node, c->ticket, aborts[result], &v, t_ns);
     if (result == PSA2_OK && r->op != PSA2_READ_REG) recheck_stream(c, t_ns);
 }
 

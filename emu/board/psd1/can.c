@@ -93,7 +93,7 @@ static void request_done(void *ctx, struct psd1_request *r, enum board_cycle_res
     const struct co_value v = {.number = r->word};
     const bool read = r->command >= PSD1_CMD_CONTROL;
     can->busy = false;
-    co_sdo_answer(&can->node.node.sdo, can->ticket, result == BOARD_CYCLE_OK ? CO_OK : CO_AB_TRANSFER, read ? &v : NULL,
+    co_node_answer(&can->node.node, can->ticket, result == BOARD_CYCLE_OK ? CO_OK : CO_AB_TRANSFER, read ? &v : NULL,
                   t_ns);
 }
 
