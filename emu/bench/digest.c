@@ -11,6 +11,13 @@ static void add_bus(struct sha256 *s, const struct can_bus *b, uint64_t traffic)
     board_digest_u64(s, traffic);
 }
 
+static void add_uds(struct sha256 *s, const struct uds_door *d)
+{
+    board_digest_u64(s, (uint64_t)d->server.session << 32 | (uint64_t)d->server.state);
+    board_digest_u64(s, (uint64_t)d->transport.tx.state << 32 | (uint64_t)d->transport.rx.state);
+    board_digest_u64(s, (uint64_t)d->server.requests << 32 | d->server.negatives);
+}
+
 static void add_unit(struct sha256 *s, const struct bench *b, unsigned i)
 {
     struct unit *u = (struct unit *)&b->unit[i]; /* truth changes nothing */
@@ -23,6 +30,8 @@ static void add_unit(struct sha256 *s, const struct bench *b, unsigned i)
     }
     board_digest_u64(s, (uint64_t)n->tx_frames << 32 | n->rx_frames);
     board_digest_u64(s, (uint64_t)n->tx_overflow << 32 | n->queued);
+    const struct scenario_unit *cfg = &b->scenario.units[i];
+    if (cfg->uds_ecu) add_uds(s, &b->uds[cfg->bus][cfg->uds_ecu - 1]);
 }
 
 /* Nothing where nothing pushes. */
