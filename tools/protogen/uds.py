@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -99,13 +100,14 @@ def span(did: int, entries: tuple[Entry, ...]) -> str:
 
 
 def object_table(windows: list[Window], protocols: list[Protocol]) -> list[str]:
-    """A row an object and name; boards with the same one share it."""
+    """A row an object and name; boards with the same one share it, and TPDOs whatever their message is."""
     rows: dict[tuple[int, str], tuple[Object, list[str]]] = {}
     for p in protocols:
         for o in p.objects:
-            longest, boards = rows.setdefault((o.index, o.name), (o, []))
-            if len(o.entries) > len(longest.entries):
-                rows[o.index, o.name] = (o, boards)
+            name = re.sub(r"^\w+: (?=TPDO)", "", o.name)
+            longest, boards = rows.setdefault((o.index, name), (o, []))
+            if o.entries[-1].sub > longest.entries[-1].sub:
+                rows[o.index, name] = (o, boards)
             boards.append(p.device["name"])
     out = ["| DIDs | object | name | boards |", "|---|---|---|---|"]
     for (index, name), (o, boards) in sorted(rows.items()):
