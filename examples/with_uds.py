@@ -1,6 +1,7 @@
-"""udsoncan over can-isotp, both unmodified, against a unit with a UDS door (docs/uds.md): start psa-emu first."""
+"""udsoncan over can-isotp, both unmodified, against a unit with a UDS door (docs/tools/uds.md): start psa-emu first."""
 
 import time
+from typing import Any
 
 import can
 import isotp
@@ -17,10 +18,9 @@ bus = can.Bus(interface="socketcand", channel="can0", host="127.0.0.1", port=295
 notifier = can.Notifier(bus, [])
 address = isotp.Address(isotp.AddressingMode.Normal_11bits, txid=0x7E0, rxid=0x7E8)
 stack = isotp.NotifierBasedCanStack(bus, notifier, address=address, params={"tx_padding": 0xCC})
-config = {"data_identifiers": CODECS, "p2_timeout": 2, "request_timeout": 5}
 
 
-def read(client: Client, did: int) -> object:
+def read(client: Client, did: int) -> Any:
     """The value; again while the unit is being set up."""
     while True:
         try:
@@ -31,7 +31,8 @@ def read(client: Client, did: int) -> object:
             time.sleep(0.05)
 
 
-with Client(PythonIsoTpV2Connection(stack), config=config) as client:
+with Client(PythonIsoTpV2Connection(stack), request_timeout=5) as client:
+    client.set_configs({"data_identifiers": CODECS, "p2_timeout": 2})
     client.logger.disabled = True
     print("name     ", read(client, NAME))
     print("serial   ", read(client, SERIAL)[0])

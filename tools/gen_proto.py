@@ -3,7 +3,7 @@
 
 Usage:
     gen_proto.py            write what is kept in git: proto/psabench.dbc, boards/objects.py and parameters.py, an EDS
-                            and a page a device, the tables of docs/uds.md
+                            and a page a device, the tables of docs/tools/uds.md
     gen_proto.py --check    exit 1 and name the ones that are out of date
     gen_proto.py --out DIR  write the C tables: psabench_can.[ch] (cantools), an <device>_od.[ch] each,
                             parameter_names.[ch], uds_dids.[ch]

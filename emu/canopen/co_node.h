@@ -51,9 +51,9 @@ struct co_node_io {
 /* A second protocol on the node's controller (uds_door.h). The functions may not be NULL. */
 struct co_guest {
     void *ctx;
-    bool (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns); /* base frames; true: its own, not the node's */
+    bool (*rx)(void *ctx, const struct can_msg *m, int64_t t_ns);   /* base frames; true: its own, not the node's */
     void (*sent)(void *ctx, const struct can_msg *m, int64_t t_ns); /* a frame of the services has been on the bus */
-    void (*reset)(void *ctx); /* as the SDO server's: reset, stopped, unpowered */
+    void (*reset)(void *ctx);                                       /* as the SDO server's: reset, stopped, unpowered */
     /* Result of an access, as co_sdo_answer(); true: its own ticket. */
     bool (*answer)(void *ctx, uint32_t ticket, uint32_t abort, const struct co_value *v, int64_t t_ns);
 };

@@ -17,7 +17,7 @@ static int64_t separation_ns(uint8_t st_min)
     return (int64_t)(st_min <= MS_MAX ? st_min : MS_MAX) * NS_PER_MS;
 }
 
-static void pad(uint8_t frame[FRAME], size_t from)
+static void pad_frame(uint8_t frame[FRAME], size_t from)
 {
     memset(&frame[from], ISOTP_PADDING, FRAME - from);
 }
@@ -42,7 +42,7 @@ static void wait_tx(struct isotp *p, enum isotp_tx state, int64_t span_ns, int64
 static void put_tx(struct isotp *p, enum isotp_tx state, size_t head, size_t n, int64_t t_ns)
 {
     memcpy(&p->tx.frame[head], &p->tx.data[p->tx.at], n);
-    pad(p->tx.frame, head + n);
+    pad_frame(p->tx.frame, head + n);
     p->tx.at += n;
     wait_tx(p, state, ISOTP_TIMEOUT_NS, t_ns);
     p->io.send(p->io.ctx, p->tx.frame, t_ns);
@@ -142,7 +142,7 @@ static void rx_due(void *ctx, int64_t t_ns)
 static void send_flow(struct isotp *p, uint8_t status, int64_t t_ns)
 {
     uint8_t frame[FRAME] = {(uint8_t)(PCI_FLOW << 4 | status), p->cfg.block_size, p->cfg.st_min};
-    pad(frame, FLOW_MIN);
+    pad_frame(frame, FLOW_MIN);
     p->io.send(p->io.ctx, frame, t_ns);
 }
 

@@ -29,8 +29,8 @@ enum isotp_result { /* N_Result */
 };
 
 struct isotp_cfg {
-    uint8_t *buffer; /* of incoming messages */
-    size_t size;     /* up to ISOTP_MAX; a longer message gets FC.OVFLW */
+    uint8_t *buffer;            /* of incoming messages */
+    size_t size;                /* up to ISOTP_MAX; a longer message gets FC.OVFLW */
     uint8_t block_size, st_min; /* as our flow control has them */
 };
 
@@ -40,7 +40,8 @@ struct isotp_io {
     void (*begun)(void *ctx, int64_t t_ns); /* a first frame has been accepted */
     /* A message, or why the one that had begun ends (data NULL). The data last until the next frame. */
     void (*received)(void *ctx, enum isotp_result r, const uint8_t *data, size_t len, int64_t t_ns);
-    void (*done)(void *ctx, enum isotp_result r, int64_t t_ns); /* with the message of isotp_send(); the last thing done */
+    void (*done)(void *ctx, enum isotp_result r,
+                 int64_t t_ns); /* with the message of isotp_send(); the last thing done */
 };
 
 enum isotp_tx { ISOTP_TX_IDLE, ISOTP_TX_SINGLE, ISOTP_TX_FIRST, ISOTP_TX_FLOW, ISOTP_TX_GAP, ISOTP_TX_CONSECUTIVE };
@@ -67,7 +68,7 @@ struct isotp {
         uint8_t sn, block_left;
         struct sched_ev timer;
     } rx;
-    uint32_t ignored;                /* frames of no form, or out of place */
+    uint32_t ignored;               /* frames of no form, or out of place */
     uint32_t failed[ISOTP_RESULTS]; /* messages in either direction, by reason */
 };
 

@@ -39,7 +39,7 @@ static void put_be16(struct uds *u, unsigned v)
 
 /* ---- responses ---- */
 
-static void complete(struct uds *u, int64_t t_ns)
+static void complete_request(struct uds *u, int64_t t_ns)
 {
     const bool reset = u->reset_due;
     u->state = UDS_IDLE;
@@ -48,7 +48,7 @@ static void complete(struct uds *u, int64_t t_ns)
     else if (u->session != UDS_SESSION_DEFAULT) sched_at(u->sched, &u->s3, t_ns + UDS_S3_NS);
 }
 
-static void transmit(struct uds *u, int64_t t_ns)
+static void transmit_response(struct uds *u, int64_t t_ns)
 {
     u->state = UDS_ANSWERING;
     u->waiting = !u->io.send(u->io.ctx, u->response, u->size, t_ns);
@@ -63,7 +63,7 @@ static bool is_silent(const struct uds *u, unsigned result)
                              result == UDS_NRC_OUT_OF_RANGE || result == UDS_NRC_NOT_IN_SESSION);
 }
 
-static void finish(struct uds *u, unsigned result, int64_t t_ns)
+static void finish_request(struct uds *u, unsigned result, int64_t t_ns)
 {
     if (result == LATER) return;
     sched_cancel(u->sched, &u->p2);
@@ -75,12 +75,12 @@ static void finish(struct uds *u, unsigned result, int64_t t_ns)
         put_byte(u, u->request[0]);
         put_byte(u, result);
     }
-    if (is_silent(u, result)) complete(u, t_ns);
-    else transmit(u, t_ns);
+    if (is_silent(u, result)) complete_request(u, t_ns);
+    else transmit_response(u, t_ns);
 }
 
 /* A negative response beside the one that will come; lost while the transport is busy. */
-static void notify(struct uds *u, uint8_t service, uint8_t nrc, int64_t t_ns)
+static void send_notice(struct uds *u, uint8_t service, uint8_t nrc, int64_t t_ns)
 {
     u->notice[0] = NEGATIVE;
     u->notice[1] = service;
@@ -92,11 +92,11 @@ static void p2_due(void *ctx, int64_t t_ns)
 {
     struct uds *u = ctx;
     if (u->pending_sent) {
-        finish(u, UDS_NRC_GENERAL, t_ns);
+        finish_request(u, UDS_NRC_GENERAL, t_ns);
         return;
     }
     u->pending_sent = true;
-    notify(u, u->request[0], UDS_NRC_PENDING, t_ns);
+    send_notice(u, u->request[0], UDS_NRC_PENDING, t_ns);
     sched_at(u->sched, &u->p2, t_ns + UDS_ACCESS_NS - UDS_P2_NS);
 }
 
@@ -111,8 +111,8 @@ static void s3_due(void *ctx, int64_t t_ns)
 void uds_done(struct uds *u, int64_t t_ns)
 {
     if (u->state != UDS_ANSWERING) return; /* that was a notice */
-    if (u->waiting) transmit(u, t_ns);
-    else complete(u, t_ns);
+    if (u->waiting) transmit_response(u, t_ns);
+    else complete_request(u, t_ns);
 }
 
 /* ---- objects ---- */
@@ -186,27 +186,27 @@ static unsigned read_rest(struct uds *u, int64_t t_ns)
     return u->size > 1 ? OK : UDS_NRC_OUT_OF_RANGE;
 }
 
-static unsigned written(struct uds *u)
+static unsigned put_written_did(struct uds *u)
 {
     put_be16(u, u->did);
     return OK;
 }
 
-static void go_on(struct uds *u, uint32_t abort, const struct co_value *v, int64_t t_ns)
+static void resume_request(struct uds *u, uint32_t abort, const struct co_value *v, int64_t t_ns)
 {
     unsigned r = nrc_of(abort);
     if (u->request[0] == WRITE_DID) {
-        if (r == OK) (void)written(u);
+        if (r == OK) (void)put_written_did(u);
     } else {
         if (r == OK) put_value(u, v);
         if (r == OK || r == UDS_NRC_OUT_OF_RANGE) r = read_rest(u, t_ns);
     }
-    finish(u, r, t_ns);
+    finish_request(u, r, t_ns);
 }
 
 void uds_answer(struct uds *u, uint32_t abort, const struct co_value *v, int64_t t_ns)
 {
-    if (u->state == UDS_WORKING && u->entry) go_on(u, abort, v, t_ns);
+    if (u->state == UDS_WORKING && u->entry) resume_request(u, abort, v, t_ns);
 }
 
 /* ---- services ---- */
@@ -287,7 +287,7 @@ static unsigned write_did(struct uds *u, int64_t t_ns)
     uint32_t abort = co_may_write(u->entry);
     if (abort == CO_OK) abort = co_decode(u->entry, &u->request[HEAD], u->len - HEAD, &u->value);
     if (abort == CO_OK) abort = u->io.write(u->io.ctx, u->entry, &u->value, t_ns);
-    return abort == CO_OK ? written(u) : nrc_of(abort);
+    return abort == CO_OK ? put_written_did(u) : nrc_of(abort);
 }
 
 enum { IN_DEFAULT = 1 << UDS_SESSION_DEFAULT, IN_EXTENDED = 1 << UDS_SESSION_EXTENDED };
@@ -295,8 +295,8 @@ enum { IN_DEFAULT = 1 << UDS_SESSION_DEFAULT, IN_EXTENDED = 1 << UDS_SESSION_EXT
 struct service {
     uint8_t sid;
     uint8_t sessions;
-    uint16_t min, max;  /* bytes of the request */
-    const char *subs;   /* sub-functions, each a character; NULL: the service has none */
+    uint16_t min, max; /* bytes of the request */
+    const char *subs;  /* sub-functions, each a character; NULL: the service has none */
     uint8_t sub_count;
     unsigned (*run)(struct uds *u, int64_t t_ns); /* OK, LATER or a negative response code */
 };
@@ -319,7 +319,7 @@ static const struct service *find_service(uint8_t sid)
 }
 
 /* Order of the checks: server response rules. */
-static unsigned serve(struct uds *u, int64_t t_ns)
+static unsigned dispatch_request(struct uds *u, int64_t t_ns)
 {
     const struct service *s = find_service(u->request[0]);
     if (!s) return UDS_NRC_NO_SERVICE;
@@ -338,7 +338,7 @@ static void reject_busy(struct uds *u, const uint8_t *data, size_t len, bool fun
 {
     if (len == 2 && data[0] == TESTER_PRESENT && data[1] == SUPPRESS) return;
     u->busy++;
-    if (!functional && u->state == UDS_WORKING) notify(u, data[0], UDS_NRC_BUSY, t_ns);
+    if (!functional && u->state == UDS_WORKING) send_notice(u, data[0], UDS_NRC_BUSY, t_ns);
 }
 
 void uds_request(struct uds *u, const uint8_t *data, size_t len, bool functional, int64_t t_ns)
@@ -356,7 +356,7 @@ void uds_request(struct uds *u, const uint8_t *data, size_t len, bool functional
     u->suppress = u->pending_sent = false;
     u->state = UDS_WORKING;
     sched_at(u->sched, &u->p2, t_ns + UDS_P2_NS);
-    finish(u, serve(u, t_ns), t_ns);
+    finish_request(u, dispatch_request(u, t_ns), t_ns);
 }
 
 void uds_begun(struct uds *u)

@@ -48,7 +48,7 @@ struct uds_io {
     uint32_t (*read)(void *ctx, const struct co_entry *e, struct co_value *v, int64_t t_ns);
     uint32_t (*write)(void *ctx, const struct co_entry *e, const struct co_value *v, int64_t t_ns);
     bool (*send)(void *ctx, const uint8_t *data, size_t len, int64_t t_ns); /* false: busy; else uds_done() follows */
-    void (*reset)(void *ctx, int64_t t_ns); /* of the node, which calls uds_reset() */
+    void (*reset)(void *ctx, int64_t t_ns);                                 /* of the node, which calls uds_reset() */
     unsigned (*dtcs)(void *ctx, struct uds_dtc out[UDS_DTCS_MAX]);
     void (*losses)(void *ctx, uint32_t *failed, uint32_t *ignored); /* of the transport: messages, frames */
 };
@@ -84,10 +84,11 @@ void uds_init(struct uds *u, const struct co_od *od, const struct uds_dids *dids
 /* To the default session; drops the request under way without a response. Counters stay. */
 void uds_reset(struct uds *u);
 
-void uds_begun(struct uds *u);                                                          /* a request has begun to come */
-void uds_broken(struct uds *u, int64_t t_ns);                                           /* and will not be complete */
-void uds_request(struct uds *u, const uint8_t *data, size_t len, bool functional, int64_t t_ns); /* 1..UDS_REQUEST_MAX */
-void uds_done(struct uds *u, int64_t t_ns);                                             /* what was sent is out or lost */
+void uds_begun(struct uds *u);                /* a request has begun to come */
+void uds_broken(struct uds *u, int64_t t_ns); /* and will not be complete */
+void uds_request(struct uds *u, const uint8_t *data, size_t len, bool functional,
+                 int64_t t_ns);             /* 1..UDS_REQUEST_MAX */
+void uds_done(struct uds *u, int64_t t_ns); /* what was sent is out or lost */
 
 /* Result of the pending access: CO_OK or an abort code; v (of a read) is copied. */
 void uds_answer(struct uds *u, uint32_t abort, const struct co_value *v, int64_t t_ns);

@@ -20,8 +20,8 @@ struct uds_door {
     uint8_t ecu;
     struct isotp transport;
     struct uds server;
-    bool pending;    /* an access is under way */
-    uint32_t ticket; /* its own */
+    bool pending;     /* an access is under way */
+    uint32_t ticket;  /* its own */
     uint32_t refused; /* frames to the door that are no classic data frames, or no single frames to all */
     uint8_t request[UDS_REQUEST_MAX];
 };

@@ -140,7 +140,7 @@ static const struct field unit_rows[] = {
     {.key = "profile_set", .type = FIELD_CUSTOM, .load = load_profile_set, .dump = dump_profile_set, .what = "fields of the profile that differ"},
     {.key = "bus",    .type = FIELD_TEXT, .offset = UNIT(bus_name), .max = 16, .what = "name of the unit's bus (the first)"},
     {.key = "node",   .type = FIELD_U8, .offset = UNIT(cfg.node), .min = 1, .max = 127, .what = "CANopen node id, unique on a bus (the board's default, or the next free one)"},
-    {.key = "uds_ecu", .type = FIELD_U8, .offset = UNIT(uds_ecu), .max = UDS_ECU_MAX, .what = "number of the unit's [UDS](uds.md) server, unique on a bus: requests 7DFh + number, responses 7E7h + number; 0: none"},
+    {.key = "uds_ecu", .type = FIELD_U8, .offset = UNIT(uds_ecu), .max = UDS_ECU_MAX, .what = "number of the unit's [UDS](tools/uds.md) server, unique on a bus: requests 7DFh + number, responses 7E7h + number; 0: none"},
     {.key = "serial", .type = FIELD_U32, .offset = UNIT(cfg.board.serial), .min = 1, .max = 4294967295.0, .what = "serial number, unique; noise and spread are drawn from it"},
     {.key = "frame_form", .type = FIELD_U8, .offset = UNIT(frame_form), .max = 3, .what = "0 pair, 1 fast, 2 FD frame, 3 FD block; written to object 2020h at the start"},
     {.key = "spread", .type = FIELD_BOOL, .offset = UNIT(spread), .what = "draw parameters from the scenario's `spread`"},

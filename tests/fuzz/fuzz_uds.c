@@ -143,7 +143,8 @@ static void op_single(struct world *w, struct script *s)
 {
     static const uint8_t sid[] = {0x10, 0x11, 0x14, 0x19, 0x22, 0x2E, 0x3E, 0x27};
     const uint8_t b = script_byte(s);
-    struct can_msg m = {.id = b & 0x80 ? TO_ALL : REQUEST, .len = 8, .data = {(uint8_t)(1 + (b >> 3 & 7) % 7), sid[b & 7]}};
+    struct can_msg m = {
+        .id = b & 0x80 ? TO_ALL : REQUEST, .len = 8, .data = {(uint8_t)(1 + (b >> 3 & 7) % 7), sid[b & 7]}};
     for (unsigned i = 2; i <= m.data[0]; i++) m.data[i] = script_byte(s);
     mark_asked(w, &m);
     put(w, &m);
@@ -154,9 +155,10 @@ static void op_object(struct world *w, struct script *s)
 {
     const struct co_entry *e = &psa2_od.entry[script_uint(s, 2) % psa2_od.count];
     const uint8_t b = script_byte(s);
-    const unsigned did = e->index >= 0x2000 && e->index < 0x2080 ? 0x2000 + 0x40 * (e->index - 0x2000u) + e->sub
-                                                                 : 0xF187 + (b >> 4);
-    struct can_msg m = {.id = REQUEST, .len = 8, .data = {(b & 3) == 3 ? 7 : 3, 0x22, (uint8_t)(did >> 8), (uint8_t)did}};
+    const unsigned did =
+        e->index >= 0x2000 && e->index < 0x2080 ? 0x2000 + 0x40 * (e->index - 0x2000u) + e->sub : 0xF187 + (b >> 4);
+    struct can_msg m = {
+        .id = REQUEST, .len = 8, .data = {(b & 3) == 3 ? 7 : 3, 0x22, (uint8_t)(did >> 8), (uint8_t)did}};
     for (unsigned i = 4; i < 8; i++) m.data[i] = (b & 3) == 3 ? m.data[i - 2] : 0xCC;
     if ((b & 3) == 2) {
         const size_t n = co_type_size(e->type);
@@ -279,8 +281,8 @@ static void power_up(struct world *w, uint8_t choice)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static void (*const ops[])(struct world * w, struct script * s) = {
-        op_single, op_object, op_object, op_frame, op_segments, op_flow, op_flow_through,
-        op_sdo,    op_owner,  op_owner,  op_wait,  op_nmt,
+        op_single,       op_object, op_object, op_frame, op_segments, op_flow,
+        op_flow_through, op_sdo,    op_owner,  op_owner, op_wait,     op_nmt,
     };
     static struct world w;
     struct script s = script_of(data, size);

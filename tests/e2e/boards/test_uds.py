@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,9 @@ from udsoncan.exceptions import NegativeResponseException
 pytestmark = pytest.mark.host
 
 SERIAL, NAME, SESSION, COUNTERS = 0xF18C, 0xF197, 0xF186, 0xFD00
-CONFIG0, REMARK = 0x2002, 0x3000  # objects 2000h:2 and 2040h: docs/uds.md
+CONFIG0, REMARK = 0x2002, 0x3000  # objects 2000h:2 and 2040h: docs/tools/uds.md
 TEXT = "a remark of sixty-four characters, as long as one can possibly become"[:64]
-CODECS = {
+CODECS: dict[int | str, str | udsoncan.DidCodec | type[udsoncan.DidCodec]] = {
     SERIAL: "<I",
     NAME: udsoncan.AsciiCodec(5),
     SESSION: "<B",
@@ -59,7 +60,7 @@ def connection(client: Any) -> StepConnection:
 
 
 def code_of(refused: pytest.ExceptionInfo[NegativeResponseException]) -> int:
-    return int(refused.value.response.code)
+    return refused.value.response.code or 0
 
 
 def ask(client: Any, request: str) -> str:
@@ -96,7 +97,7 @@ def test_a_long_read_comes_whole_at_the_pace_that_the_client_sets(rig: Rig) -> N
     assert answer == b"\x62" + (b"\x30\x00" + TEXT.encode()) * 8  # 529 bytes
     consecutive = [t for t, frame in zip(seen, conn.frames, strict=True) if frame[0] >> 4 == 2]
     assert len(consecutive) == 75
-    assert min(b - a for a, b in zip(consecutive, consecutive[1:], strict=False)) >= 0.004
+    assert min(b - a for a, b in itertools.pairwise(consecutive)) >= 0.004
 
 
 def test_a_session_ends_after_five_seconds_without_a_request(rig: Rig) -> None:
@@ -251,7 +252,7 @@ def script(scenario: Path, save: Path | None = None) -> list[tuple[float, bytes]
     with (
         Emulator(scenario, cans=["socketcand:0"], pace="step") as emulator,
         CanHost(open_bus(bus_spec(emulator.endpoints[0])), WallClock()) as host,
-        Control(emulator.control_path or "") as control,
+        Control(emulator.control_path or Path()) as control,
     ):
         host.clock = StepClock(control)
         host.listeners.append(lambda m: seen.append((m.timestamp, bytes(m.data))))
@@ -278,7 +279,7 @@ def test_a_snapshot_keeps_the_session(tmp_path: Path) -> None:
     with (
         Emulator(cans=["socketcand:0"], pace="step", extra=extra) as emulator,
         CanHost(open_bus(bus_spec(emulator.endpoints[0])), WallClock()) as host,
-        Control(emulator.control_path or "") as control,
+        Control(emulator.control_path or Path()) as control,
     ):
         host.clock = StepClock(control)
         with uds_client(host, CODECS) as client:
@@ -298,5 +299,3 @@ def test_a_wrong_number_is_rejected(tmp_path: Path, units: str, why: str) -> Non
     done = psa_emu(tmp_path / "bad.yaml", "--dump")
     assert done.returncode == 2
     assert why in done.stderr
-
-

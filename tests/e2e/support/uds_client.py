@@ -6,9 +6,9 @@ from collections import deque
 
 import isotp
 from psabench.link.can_host import CanHost, Message
+from udsoncan import DidCodec
 from udsoncan.client import Client
 from udsoncan.connections import BaseConnection
-from udsoncan.exceptions import TimeoutException
 
 REQUEST, RESPONSE, FUNCTIONAL = 0x7E0, 0x7E8, 0x7DF
 STEP_S = 0.001  # of simulated time, while a response is awaited
@@ -57,7 +57,7 @@ class StepConnection(BaseConnection):
         deadline_s = self.host.clock.now_s() + (timeout or 0.0)
         while not self.transport.available():
             if self.host.clock.now_s() >= deadline_s:
-                raise TimeoutException(f"no response within {timeout} s of simulated time")
+                raise TimeoutError(f"no response within {timeout} s of simulated time")
             self.pump(STEP_S)
         return bytes(self.transport.recv() or b"")
 
@@ -75,7 +75,8 @@ class StepConnection(BaseConnection):
         return True
 
 
-def uds_client(host: CanHost, codecs: dict[int, object], **params: object) -> Client:
+def uds_client(host: CanHost, codecs: dict[int | str, str | DidCodec | type[DidCodec]], **params: object) -> Client:
     """udsoncan on our host's bus; params: of can-isotp."""
-    config = {"data_identifiers": codecs, "request_timeout": 3, "p2_timeout": 1, "p2_star_timeout": 5}
-    return Client(StepConnection(host, **params), config=config)
+    client = Client(StepConnection(host, **params))
+    client.set_configs({"data_identifiers": codecs, "request_timeout": 3, "p2_timeout": 1, "p2_star_timeout": 5})
+    return client

@@ -191,8 +191,9 @@ static void separation_time_runs_from_the_end_of_a_frame(void **state)
         const char *flow;
         int64_t gap_ns;
     } row[] = {
-        {"30 00 00", 0},          {"30 00 01", MS},         {"30 00 7F", 127 * MS}, {"30 00 F1", MS / 10},
-        {"30 00 F9", 9 * MS / 10}, {"30 00 80", 127 * MS}, {"30 00 F0", 127 * MS}, {"30 00 FA", 127 * MS}, /* reserved */
+        {"30 00 00", 0},        {"30 00 01", MS},          {"30 00 7F", 127 * MS},
+        {"30 00 F1", MS / 10},  {"30 00 F9", 9 * MS / 10}, {"30 00 80", 127 * MS},
+        {"30 00 F0", 127 * MS}, {"30 00 FA", 127 * MS}, /* reserved */
     };
     for (size_t i = 0; i < COUNT(row); i++) {
         struct rig *r = first_frame_out();
@@ -326,11 +327,17 @@ static void frames_of_no_form_are_counted(void **state)
 {
     (void)state;
     static const char *const frames[] = {
-        "", "00", "08 01 02 03 04 05 06 07", "04 01 02 03", /* single: no length, too long, cut */
-        "10 07 00 01 02 03 04 05",                          /* first: would fit a single frame */
-        "10 14 00 01 02 03 04",                             /* first: shorter than 8 */
-        "10 00 00 00 0F FF 00 00",                          /* first: 4095 in 32 bits */
-        "21 00", "30 00 00", "40 00", "F3",                 /* out of place; reserved */
+        "",
+        "00",
+        "08 01 02 03 04 05 06 07",
+        "04 01 02 03",             /* single: no length, too long, cut */
+        "10 07 00 01 02 03 04 05", /* first: would fit a single frame */
+        "10 14 00 01 02 03 04",    /* first: shorter than 8 */
+        "10 00 00 00 0F FF 00 00", /* first: 4095 in 32 bits */
+        "21 00",
+        "30 00 00",
+        "40 00",
+        "F3", /* out of place; reserved */
     };
     struct rig *r = rig_up(0);
     for (size_t i = 0; i < COUNT(frames); i++) {

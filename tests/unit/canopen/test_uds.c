@@ -182,18 +182,38 @@ static void negative_responses_have_the_codes_of_annex_a(void **state)
     static const struct {
         const char *question, *answer;
     } row[] = {
-        {"27 01", "7F 27 11"},       {"00", "7F 00 11"},          {"7E 00", "7F 7E 11"}, /* no such service */
-        {"10 02", "7F 10 12"},       {"11 03", "7F 11 12"},       {"19 0A FF", "7F 19 12"}, {"3E 01", "7F 3E 12"},
-        {"10", "7F 10 13"},          {"10 03 00", "7F 10 13"},    {"11 01 00", "7F 11 13"}, {"3E", "7F 3E 13"},
-        {"14 FF FF", "7F 14 13"},    {"14 FF FF FF FF", "7F 14 13"},
-        {"19 02", "7F 19 13"},       {"19 02 FF 00", "7F 19 13"},
-        {"22", "7F 22 13"},          {"22 F1", "7F 22 13"},       {"22 F1 8C F1", "7F 22 13"},
+        {"27 01", "7F 27 11"},
+        {"00", "7F 00 11"},
+        {"7E 00", "7F 7E 11"}, /* no such service */
+        {"10 02", "7F 10 12"},
+        {"11 03", "7F 11 12"},
+        {"19 0A FF", "7F 19 12"},
+        {"3E 01", "7F 3E 12"},
+        {"10", "7F 10 13"},
+        {"10 03 00", "7F 10 13"},
+        {"11 01 00", "7F 11 13"},
+        {"3E", "7F 3E 13"},
+        {"14 FF FF", "7F 14 13"},
+        {"14 FF FF FF FF", "7F 14 13"},
+        {"19 02", "7F 19 13"},
+        {"19 02 FF 00", "7F 19 13"},
+        {"22", "7F 22 13"},
+        {"22 F1", "7F 22 13"},
+        {"22 F1 8C F1", "7F 22 13"},
         {"22 F1 8C F1 8C F1 8C F1 8C F1 8C F1 8C F1 8C F1 8C F1 8C", "7F 22 13"}, /* nine */
-        {"2E 20 01", "7F 2E 13"},    {"2E 20 01 01", "7F 2E 13"}, {"2E 20 01 01 02 03", "7F 2E 13"},
-        {"14 00 00 00", "7F 14 31"}, {"22 F1 90", "7F 22 31"},    {"22 20 02", "7F 22 31"}, /* write-only */
-        {"22 20 03", "7F 22 31"},    {"22 24 00", "7F 22 31"},    {"22 1F FF", "7F 22 31"},
+        {"2E 20 01", "7F 2E 13"},
+        {"2E 20 01 01", "7F 2E 13"},
+        {"2E 20 01 01 02 03", "7F 2E 13"},
+        {"14 00 00 00", "7F 14 31"},
+        {"22 F1 90", "7F 22 31"},
+        {"22 20 02", "7F 22 31"}, /* write-only */
+        {"22 20 03", "7F 22 31"},
+        {"22 24 00", "7F 22 31"},
+        {"22 1F FF", "7F 22 31"},
         {"2E 20 01 00 80", "7F 2E 31"}, /* above the entry's limit */
-        {"2E F1 8C 01 02 03 04", "7F 2E 31"}, {"2E 20 00 02", "7F 2E 31"}, {"2E F1 86 01", "7F 2E 31"},
+        {"2E F1 8C 01 02 03 04", "7F 2E 31"},
+        {"2E 20 00 02", "7F 2E 31"},
+        {"2E F1 86 01", "7F 2E 31"},
     };
     struct rig *r = in_extended();
     for (size_t i = 0; i < COUNT(row); i++) asks(r, row[i].question, row[i].answer);
@@ -208,8 +228,8 @@ static void an_abort_of_the_owner_becomes_a_code(void **state)
         uint32_t abort;
         const char *answer;
     } row[] = {
-        {CO_AB_STATE, "7F 22 22"},     {CO_AB_VALUE, "7F 22 31"},   {CO_AB_NO_OBJECT, "7F 22 31"},
-        {CO_AB_READ_ONLY, "7F 22 31"}, {CO_AB_LENGTH, "7F 22 13"},  {CO_AB_TRANSFER, "7F 22 10"},
+        {CO_AB_STATE, "7F 22 22"},     {CO_AB_VALUE, "7F 22 31"},  {CO_AB_NO_OBJECT, "7F 22 31"},
+        {CO_AB_READ_ONLY, "7F 22 31"}, {CO_AB_LENGTH, "7F 22 13"}, {CO_AB_TRANSFER, "7F 22 10"},
         {CO_AB_GENERAL, "7F 22 10"},   {CO_AB_NO_SUB, "7F 22 31"},
     };
     struct rig *r = rig_up();
@@ -395,8 +415,8 @@ static void a_functional_request_gets_no_refusal_that_others_would_give_too(void
     static const struct {
         const char *question;
         bool answered;
-    } row[] = {{"22 F1 86", true}, {"27 01", false},    {"10 02", false},       {"22 F1 90", false},
-               {"10", true},       {"3E 00", true},     {"2E 20 01 01 00", false}, {"22 F1", true}};
+    } row[] = {{"22 F1 86", true}, {"27 01", false}, {"10 02", false},          {"22 F1 90", false},
+               {"10", true},       {"3E 00", true},  {"2E 20 01 01 00", false}, {"22 F1", true}};
     struct rig *r = rig_up();
     for (size_t i = 0; i < COUNT(row); i++) {
         const unsigned had = r->count;
