@@ -1,7 +1,7 @@
 /* ISO 15765-2 transport of one connection: messages of up to 4095 bytes over classic CAN frames, normal addressing.
  *
- * Half duplex: while a message goes out, an incoming one is ignored. A message from the peer that begins anew ends the one
- * under way (9.8.3). The owner puts frames on the bus and reports with isotp_sent() when one has been there; separation
+ * Half duplex: while a message goes out, an incoming one is ignored. One that begins while another comes ends that
+ * (9.8.3). The owner puts frames on the bus and reports with isotp_sent() when one has been there; separation
  * time and timeouts run from then, in simulated time. Any bytes may arrive; what is ignored is counted. Clauses are of
  * ISO 15765-2:2016. Not modelled: CAN FD frames, the 32-bit length of a first frame (FC.OVFLW), FC.WAIT of our own. Owned
  * by the caller, one thread, no allocation. */

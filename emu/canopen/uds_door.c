@@ -74,12 +74,12 @@ static void on_done(void *ctx, enum isotp_result r, int64_t t_ns)
 
 /* ---- objects ---- */
 
-/* The owner answers to the ticket that the SDO server shows during the access; no access of its own has it before or after. */
+/* The owner answers to the ticket that the SDO server shows during the access; no access of its own has the same. */
 static bool begin_access(struct uds_door *d)
 {
     struct co_sdo *s = &d->node->sdo;
     if (s->state == CO_SDO_READING || s->state == CO_SDO_WRITING) return false;
-    d->ticket = ++s->ticket;
+    d->ticket = s->ticket;
     d->pending = true;
     return true;
 }

@@ -186,7 +186,7 @@ def test_flow_control_that_breaks_ends_the_response_and_nothing_else(rig: Rig) -
             rig.host.send(REQUEST, bytes.fromhex(flow))
         rig.host.advance(0.01)
         if not flow:
-            rig.host.send(REQUEST, bytes.fromhex("023E00"))  # half duplex: nobody listens yet
+            rig.host.send(REQUEST, bytes.fromhex("023E00"))  # half duplex: ignored
             rig.host.advance(1.0)
         assert [f[0] >> 4 for f in conn.frames] == [1], flow
         rig.host.send(REQUEST, bytes.fromhex("023E00"))

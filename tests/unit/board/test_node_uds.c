@@ -147,6 +147,18 @@ static void a_given_up_access_disturbs_no_later_one(void **state)
     assert_int_equal(upload(r, 0x1018, 4), 4711);
 }
 
+/* A ticket that comes round to 0 is not the door's, which has had none yet. */
+static void an_sdo_access_is_never_taken_for_the_door_s(void **state)
+{
+    (void)state;
+    struct rig *r = door_up(1000000);
+    r->can.node.sdo.ticket = UINT32_MAX;
+    ask(r, 0x40, PSD1_OD_BUS, 3, 0);
+    assert_int_equal(r->can.ticket, door.ticket);
+    done(r, 0x4444);
+    assert_int_equal(answer(r) & 0xFFFF, 0x4444);
+}
+
 static void ecu_reset_is_a_reset_of_the_node_after_its_response(void **state)
 {
     (void)state;
@@ -249,6 +261,23 @@ static void a_long_response_obeys_flow_control_on_the_bus(void **state)
     expect(r, 2, "\x7E\x00");
 }
 
+static void a_stop_ends_messages_both_ways(void **state)
+{
+    (void)state;
+    struct rig *r = door_up(1000000);
+    memset(r->can.remark, 'x', 62);
+    say(r, REQUEST, 3, "\x22\x30\x00");
+    nmt(r, 2);
+    nmt(r, 128);
+    host_sends(r, REQUEST, 3, (const uint8_t[]){0x30, 0, 0});
+    assert_int_equal(seen_count(r, RESPONSE), 0);
+    host_sends(r, REQUEST, 8, (const uint8_t[]){0x10, 8, 0x22, 0xF1, 0x86, 0xF1, 0x86, 0xF1});
+    nmt(r, 2);
+    nmt(r, 128);
+    host_sends(r, REQUEST, 8, (const uint8_t[]){0x21, 0x86, 0x86, 0, 0, 0, 0, 0});
+    assert_int_equal(seen_count(r, RESPONSE), 0);
+}
+
 static void a_message_that_fails_leaves_the_door_open(void **state)
 {
     (void)state;
@@ -311,11 +340,13 @@ int main(void)
         cmocka_unit_test(one_access_at_a_time_whichever_door),
         cmocka_unit_test(an_answer_goes_to_the_door_that_asked),
         cmocka_unit_test(a_given_up_access_disturbs_no_later_one),
+        cmocka_unit_test(an_sdo_access_is_never_taken_for_the_door_s),
         cmocka_unit_test(ecu_reset_is_a_reset_of_the_node_after_its_response),
         cmocka_unit_test(the_door_follows_the_node_s_state),
         cmocka_unit_test(requests_to_all_are_single_frames),
         cmocka_unit_test(frames_that_are_not_for_the_door_pass_it),
         cmocka_unit_test(a_long_response_obeys_flow_control_on_the_bus),
+        cmocka_unit_test(a_stop_ends_messages_both_ways),
         cmocka_unit_test(a_message_that_fails_leaves_the_door_open),
         cmocka_unit_test(trouble_codes_are_the_node_s_errors),
         cmocka_unit_test(each_object_of_each_board_has_one_identifier_by_the_rule),
