@@ -168,9 +168,9 @@ def test_an_ecu_reset_is_a_reset_of_the_node(rig: Rig) -> None:
 
 def test_a_request_to_all_is_answered_unless_it_is_not_for_this_unit(rig: Rig) -> None:
     conn = StepConnection(rig.host)
-    rig.host.send(FUNCTIONAL, bytes.fromhex("023E00"))
-    rig.host.send(FUNCTIONAL, bytes.fromhex("022701"))
-    conn.pump(0.05)
+    for request in ("023E00", "022701"):
+        rig.host.send(FUNCTIONAL, bytes.fromhex(request))
+        conn.pump(0.05)
     assert conn.frames == [bytes.fromhex("027E00CCCCCCCCCC")]
 
 
