@@ -22,6 +22,7 @@ examples:
   psabench waveform run.vcd --from 9.878ms --to 9.9ms --lines A0,RFX,SCLK,SDAT,D --wavedrom cycle.json --svg cycle.svg
                                          a window as a WaveDrom timing picture and as a picture of our own
   psabench waveform --decoders           installs the sigrok decoders for this user
+  psabench waveform --wireshark          installs Wireshark's dissectors for this user
 
 PulseView loads the .pvs file by itself; GTKWave: gtkwave run.vcd run.gtkw.
 """
@@ -36,9 +37,12 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p = Parser(prog="psabench waveform", description="Write viewer files, install decoders.", epilog=EPILOG)
     p.set_defaults(handler=_run_waveform)
     p.add_argument("file", type=Path, nargs="?", help="VCD file of psa-emu --vcd")
-    p.add_argument("--decoders", action="store_true", help="copy the sigrok decoders into FOLDER")
-    folder = user_decoders()
-    p.add_argument("--dir", type=Path, metavar="FOLDER", default=folder, help="folder of decoders (%(default)s)")
+    both = p.add_mutually_exclusive_group()
+    both.add_argument(
+        "--decoders", action="store_true", help=f"copy the sigrok decoders into FOLDER ({user_decoders()})"
+    )
+    both.add_argument("--wireshark", action="store_true", help=f"the dissectors into FOLDER ({user_plugins()})")
+    p.add_argument("--dir", type=Path, metavar="FOLDER", help="another folder")
     window = p.add_argument_group("a window of FILE, as a picture")
     window.add_argument("--wavedrom", type=Path, metavar="OUT", help="WaveDrom JSON, a column a tick")
     window.add_argument("--svg", type=Path, metavar="OUT", help="SVG")
@@ -65,12 +69,20 @@ def user_decoders() -> Path:
     return Path(data) / "libsigrokdecode/decoders"
 
 
+def user_plugins() -> Path:
+    """Where Wireshark looks for a user's Lua plugins (tshark -G folders)."""
+    return Path.home() / ".local/lib/wireshark/plugins"
+
+
 def _run_waveform(args: argparse.Namespace) -> int:
     pictures = args.wavedrom or args.svg
-    if args.file is None and (pictures or not args.decoders):
-        raise BadInput(expected("a VCD file" if pictures else "a VCD file or --decoders", "none", "waveform"))
+    installs = args.decoders or args.wireshark
+    if args.file is None and (pictures or not installs):
+        what = "a VCD file" if pictures else "a VCD file, --decoders or --wireshark"
+        raise BadInput(expected(what, "none", "waveform"))
     written = write_pictures(args) if pictures else write_sessions(args.file) if args.file else []
-    written += install_decoders(args.dir) if args.decoders else []
+    written += install_decoders(args.dir or user_decoders()) if args.decoders else []
+    written += install_dissectors(args.dir or user_plugins()) if args.wireshark else []
     for path in written:
         print(path)
     return 0
@@ -137,6 +149,15 @@ def write_pictures(args: argparse.Namespace) -> list[Path]:
 def gtkw_text(scope: str, lines: Sequence[str]) -> str:
     """A GTKWave save file with all lines, in the order of the recording."""
     return "\n".join(["[timestart] 0", "@28", *(f"{scope}.{line}" for line in lines), ""])
+
+
+def install_dissectors(folder: Path) -> list[Path]:
+    """Wireshark's plugins. Raises BadInput, OutputError."""
+    try:
+        from psabench.logs import plugins  # pymavlink, the generator of one of them
+    except ImportError as e:
+        raise BadInput(expected(f"the Python package {e.name}", "none", "--wireshark")) from e
+    return plugins.install_dissectors(shipped_folder("share") / "wireshark", folder)
 
 
 def install_decoders(folder: Path) -> list[Path]:

@@ -169,10 +169,12 @@ def test_a_strobe_that_is_too_short_is_told(length_ns: int, warnings: list[str],
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ([], "expected a VCD file or --decoders, got none"),
+        ([], "expected a VCD file, --decoders or --wireshark, got none"),
         (["nothing.vcd"], "No such file"),
         ([__file__], "expected a VCD file with a scope and wires"),
         (["--decoders", "--dir", "/proc/x"], "/proc/x"),
+        (["--wireshark", "--dir", "/proc/x"], "/proc/x"),
+        (["--wireshark", "--decoders"], "--decoders: expected one of it and --wireshark, got both"),
     ],
 )
 def test_waveform_says_what_is_wrong(words: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
