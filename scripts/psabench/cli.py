@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "convert": ("logs.convert_command", "convert a CAN log to another format, or to a ROS 2 bag"),
     "decode": ("boards.decode_command", "convert a log or a line capture to CSV in SI units"),
     "view": ("logs.view_command", "show the CAN bus live in Foxglove, Lichtblick or PlotJuggler"),
+    "tap": ("logs.tap_command", "record what is on a serial port, for Wireshark"),
     "waveform": ("logs.viewers", "write viewer files and pictures of a VCD file, install decoders and dissectors"),
     "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),

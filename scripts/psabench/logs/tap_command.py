@@ -1,0 +1,77 @@
+"""`psabench tap`: its options, and what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from psabench.errors import BadInput, expected
+from psabench.options import LINE_HZ, Parser, positive
+
+if TYPE_CHECKING:
+    from psabench.logs.tap import Tap
+
+EPILOG = """\
+examples:
+  psabench tap slcan /dev/ttyACM0 run.pcap          prints a port for the CAN program, e.g. slcan:/dev/pts/7
+  psabench tap bus build/busport run.pcap --for 60  the bus port of psa-emu --bus-port build/busport
+  psabench tap line build/capture.bin run.pcap      bytes that were recorded from the line port
+  mkfifo run.pcap; wireshark -k -i run.pcap &       then any of them: live
+
+Stops at --for, at the end of PORT, at Ctrl-C. The dissectors: psabench waveform --wireshark.
+"""
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench tap`. Raises BadInput."""
+    p = Parser(prog="psabench tap", description="Record what is on a serial port, for Wireshark.", epilog=EPILOG)
+    p.set_defaults(handler=_tap)
+    p.add_argument("kind", choices=("slcan", "bus", "line"), help="what the port speaks")
+    p.add_argument(
+        "port", type=Path, metavar="PORT", help="serial port, pseudo-terminal, or file with bytes of a board"
+    )
+    p.add_argument("out", type=Path, metavar="OUT", help="pcap file")
+    p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
+    p.add_argument("--line-hz", type=positive, default=LINE_HZ, help="samples a second of the line port (%(default)g)")
+    return p.parse_args(words)
+
+
+def _tap(args: argparse.Namespace) -> int:
+    from psabench.logs import tap
+
+    if not args.port.exists():
+        raise BadInput(f"{args.port}: no such file")
+    if args.out.exists() and args.port.samefile(args.out):
+        raise BadInput(expected("another file than the one that is read", args.out, "OUT"))
+    with tap.tap_file(args.kind, args.out) as t:
+        if args.port.is_file():
+            tap.read_capture(t, args.port, args.line_hz)
+        else:
+            _relay(args, t)
+    print(f"{t.packets[tap.TO_BOARD]} packets to the board, {t.packets[tap.FROM_BOARD]} from it, in {args.out}")
+    if t.cut:
+        print(f"{t.cut} were too long and are in pieces", file=sys.stderr)
+    return 0
+
+
+def _relay(args: argparse.Namespace, t: Tap) -> None:
+    from psabench.logs.tap import Relay
+
+    start_ns = time.time_ns()
+    deadline_s = None if args.for_s is None else time.monotonic() + args.for_s
+    samples = args.kind == "line"  # have their times from their rate
+
+    def took(direction: int, data: bytes) -> None:
+        now_ns = time.time_ns()
+        t.take(direction, data, lambda at: start_ns + round(at * 1e9 / args.line_hz) if samples else now_ns)
+
+    with Relay(args.port, one_way=samples) as relay:
+        print("ready" if samples else f"ready tap={relay.path}", flush=True)
+        try:
+            relay.run(took, deadline_s)
+        except KeyboardInterrupt:
+            print()
