@@ -23,6 +23,19 @@ READERS: Mapping[str, str] = {  # module and function; text logs: read_text
 }
 TEXT_READER = "psabench.logs.python_can:read_text"
 READABLE = sorted({*MESSAGE_READERS, *READERS})
+# What each keeps beside the frame: instants to the microsecond, and the number of the bus. docs/tools/logs.md.
+KEEPS: Mapping[str, tuple[str, ...]] = {
+    ".asc": ("channels",),
+    ".blf": ("channels",),
+    ".csv": ("time stamps",),
+    ".db": ("time stamps",),
+    ".lcmlog": ("time stamps", "channels"),
+    ".log": ("time stamps", "channels"),
+    ".mcap": ("time stamps", "channels"),
+    ".mf4": ("time stamps", "channels"),
+    ".pcap": ("time stamps",),
+    ".trc": (),
+}
 ALL_S, ALL_FRAMES = 1e12, 1 << 40
 
 

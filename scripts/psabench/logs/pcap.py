@@ -105,28 +105,28 @@ class Pcap(Checked):
 def read_pcap(path: Path) -> Iterator[can.Message]:
     """Frames of a pcap file of either byte order and resolution. Raises BadInput."""
     with path.open("rb") as file:
-        order, unit_s = _file_header(path, file)
+        order, hz = _file_header(path, file)
         n = 0
         while head := file.read(16):
             n += 1
             try:
-                yield _next_packet(file, head, order, unit_s)
+                yield _next_packet(file, head, order, hz)
             except ValueError as e:
                 raise BadInput(f"{path}: frame {n}: {e}") from e
 
 
-def _file_header(path: Path, file: BinaryIO) -> tuple[str, float]:
+def _file_header(path: Path, file: BinaryIO) -> tuple[str, int]:
     head = file.read(24)
     for order in "<>":
         if len(head) == 24 and (magic := struct.unpack_from(f"{order}I", head)[0]) in (MAGIC_NS, MAGIC_US):
             linktype = struct.unpack_from(f"{order}I", head, 20)[0] & 0xFFFF
             if linktype != LINKTYPE:
                 raise BadInput(expected(f"link type {LINKTYPE} (SocketCAN)", linktype, path))
-            return order, 1e-9 if magic == MAGIC_NS else 1e-6
+            return order, 1_000_000_000 if magic == MAGIC_NS else 1_000_000
     raise BadInput(expected("a pcap file", "another file (pcapng: editcap -F pcap IN OUT)", path))
 
 
-def _next_packet(file: BinaryIO, head: bytes, order: str, unit_s: float) -> can.Message:
+def _next_packet(file: BinaryIO, head: bytes, order: str, hz: int) -> can.Message:
     if len(head) < 16:
         raise ValueError(expected("a whole record", f"{len(head)} bytes"))
     seconds, parts, length, _ = struct.unpack(f"{order}IIII", head)
@@ -135,4 +135,4 @@ def _next_packet(file: BinaryIO, head: bytes, order: str, unit_s: float) -> can.
     body = file.read(length)
     if len(body) < length:
         raise ValueError(expected("a whole record", f"{len(body)} of {length} bytes"))
-    return frame_of(body, seconds + parts * unit_s)
+    return frame_of(body, (seconds * hz + parts) / hz)  # of integers: exact for the digits of the stamp

@@ -22,7 +22,7 @@ MOST_LINE = 1 << 16  # characters of a line of a text log
 class _Lines(io.TextIOWrapper):
     """Raises ValueError for a line without an end, which would fill the memory."""
 
-    def __next__(self) -> str:  # type: ignore[override]
+    def __next__(self) -> str:  # type: ignore[override]  # of the stub's base, which is of bytes
         line = self.readline(MOST_LINE + 1)
         if not line:
             raise StopIteration

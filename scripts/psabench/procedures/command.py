@@ -294,10 +294,15 @@ def progress_of(args: argparse.Namespace) -> Iterator[Told]:
 def _compare(args: argparse.Namespace) -> int:
     """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
     from psabench.procedures import compare_converters, comparison
+    from psabench.procedures.call_log import refuse_beside_replay
     from psabench.report import comparison_page
 
     p = compare_converters.CompareParams()
-    c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed)
+    if args.replay:
+        refuse_beside_replay({"--record": args.record, "--scenario": args.scenario, "--seed": args.seed})
+        c = comparison.replay(args.out, p, Bar(), args.replay)
+    else:
+        c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed, record=args.record)
     page = comparison_page.write(args.out, c)
     if args.verbose:
         print(comparison.console_table(c))
@@ -329,8 +334,11 @@ def _gyro(args: argparse.Namespace) -> int:
 
 
 # What each takes of COMMON.
-_STARTED = ("--scenario", "--seed", "--out", "--verbose")
-_PLATFORM = ("--can", "--control", "--truth", "--scenario", "--seed", "--real-time", "--out", "--lcm", "--verbose")
+_STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
+_PLATFORM = (
+    *("--can", "--control", "--truth", "--scenario", "--seed", "--real-time"),
+    *("--record", "--replay", "--out", "--lcm", "--verbose"),
+)
 _HEAD = tuple(COMMON)
 
 _EXAMPLES: Mapping[str, str] = {

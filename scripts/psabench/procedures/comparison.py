@@ -10,17 +10,22 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from psabench.bench import Bench
-from psabench.errors import BenchError, expected
+from psabench.errors import BadInput, BenchError, expected
+from psabench.link.own import output_text
 from psabench.link.signals import Floats
 from psabench.procedures import compare_converters as measured
+from psabench.procedures.call_log import check_procedure
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
+from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
 from psabench.report.grading import aligned
 
 TRUTH_EVERY_S = 0.01
@@ -123,10 +128,15 @@ def integrate(t_s: Floats, a_mps2: Floats) -> Floats:
     return np.concatenate([np.zeros((1, a_mps2.shape[1])), np.cumsum(steps, axis=0)])
 
 
+def _mark(unit: str) -> str:
+    """What is near the begin of each line of a unit."""
+    return f'"unit":"{unit}",'
+
+
 def read_truth(path: Path, unit: str) -> Motion:
     """From a truth log, lines of one unit. Raises BenchError for a log without it."""
     t_s, a = [], []
-    mark = f'"unit":"{unit}",'
+    mark = _mark(unit)
     with path.open(encoding="utf-8") as lines:
         for line in lines:
             if mark in line[:80]:
@@ -230,25 +240,68 @@ class Comparison:
 
 
 def compare(
-    out: Path, p: CompareParams, progress: Progress, *, scenario: str | Path | None = None, seed: int | None = None
+    out: Path,
+    p: CompareParams,
+    progress: Progress,
+    *,
+    scenario: str | Path | None = None,
+    seed: int | None = None,
+    record: Path | None = None,
 ) -> Comparison:
-    """Start an emulator with the scenario, record, grade. Raises BenchError."""
+    """Start an emulator with the scenario, measure, grade. record: a log of the run for `replay`. Raises BenchError."""
     out.mkdir(parents=True, exist_ok=True)
     name = scenario or measured.SCENARIO
-    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
-        log = Path(folder) / "truth.jsonl"
-        extra: list[str | Path] = ["--truth-log", log, "--truth-every", f"{TRUTH_EVERY_S * 1e3:g}ms"]
-        extra += ["--resolved", out / "scenario-converters.json"]
-        with Bench.start(name, seed=seed, extra=extra) as bench:
-            tracks = measured.record(bench, p, progress)
-        motion = read_truth(log, tracks[0].name)
-    graded = tuple(grade(measured.figures(t, p, G_MPS2), motion, p, G_MPS2) for t in tracks)
     facts = {
         "scenario": str(name),
         "seed": "of the scenario" if seed is None else str(seed),
         "recorded": f"{p.seconds:g} s",
         "g": f"{G_MPS2} m/s²",
     }
+    with tempfile.TemporaryDirectory(prefix="psabench-") as folder, ExitStack() as stack:
+        log = Path(folder) / "truth.jsonl"
+        extra: list[str | Path] = ["--truth-log", log, "--truth-every", f"{TRUTH_EVERY_S * 1e3:g}ms"]
+        extra += ["--resolved", out / "scenario-converters.json"]
+        with Bench.start(name, seed=seed, extra=extra) as bench:
+            heard: Any = bench
+            if record:
+                setup = {"procedure": measured.NAME, "facts": facts}
+                heard = stack.enter_context(BenchRecorder(bench, record, setup))
+            tracks = measured.record(heard, p, progress)
+            stack.close()
+        motion = read_truth(log, tracks[0].name)
+        if record:
+            _keep_truth(log, tracks[0].name, record)
+    return _graded(tracks, motion, p, facts)
+
+
+def replay(out: Path, p: CompareParams, progress: Progress, log: Path) -> Comparison:
+    """The same from a recording. Raises BadInput."""
+    bench: Any = RecordedBench(log)
+    check_procedure(log, bench.setup, measured.NAME)
+    truth = truth_path(log)
+    if not truth.exists():
+        raise BadInput(f"{truth}: no such file; psabench run --record writes it beside the log")
+    out.mkdir(parents=True, exist_ok=True)
+    tracks = measured.record(bench, p, progress)
+    bench.finish()
+    facts = {str(k): str(v) for k, v in bench.setup["facts"].items()}
+    return _graded(tracks, read_truth(truth, tracks[0].name), p, facts)
+
+
+def truth_path(log: Path) -> Path:
+    """Where the true motion of a recording is; the procedure itself never reads it."""
+    return log.with_name(log.name + ".truth.jsonl")
+
+
+def _keep_truth(log: Path, unit: str, record: Path) -> None:
+    """The lines of one unit: all were moved alike."""
+    mark = _mark(unit)
+    with log.open(encoding="utf-8") as lines, output_text(truth_path(record)) as out:
+        out.writelines(line for line in lines if mark in line[:80])
+
+
+def _graded(tracks: Sequence[Track], motion: Motion, p: CompareParams, facts: Mapping[str, str]) -> Comparison:
+    graded = tuple(grade(measured.figures(t, p, G_MPS2), motion, p, G_MPS2) for t in tracks)
     return Comparison(graded=graded, motion=motion, params=p, g_mps2=G_MPS2, facts=facts)
 
 

@@ -6,7 +6,8 @@ Without --can and --control each reading gets an emulator of its own with the sa
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,13 @@ from psabench.bench import Bench
 from psabench.boards.gyro.device import Gyro
 from psabench.errors import BadInput, expected
 from psabench.procedures import gyrocompass, heading_hold
+from psabench.procedures.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth
@@ -39,6 +42,8 @@ class GyroOptions:
     scenario: Path | None = None
     seed: int | None = None
     real_time: bool = False
+    record: Path | None = None  # CAN log of the run, its calls beside it
+    replay: Path | None = None  # such a log instead of a bench
     params: Mapping[str, Any] = field(default_factory=dict)  # fields of the parameters, by name
 
 
@@ -47,14 +52,20 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     readings: ReadingParams = made_params(ReadingParams, options.procedure, options.params)
     for name in readings.readings:
         params_of(name, fields_of(GyrocompassParams, options.params))
+    if options.record and len(readings.readings) != 1:
+        raise BadInput(expected("one reading (--reading article or improved)", "several", "--record"))
     holds = options.procedure == heading_hold.NAME
     hold_params = made_params(HoldParams, options.procedure, options.params) if holds else None
+    if options.replay:
+        return [_replayed(hold_params, options, progress)]
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
 
 
 def facts(options: GyroOptions) -> dict[str, str]:
     """What the report says of the run."""
+    if options.replay:
+        return {str(k): str(v) for k, v in Calls(options.replay).setup["facts"].items()}
     there = " ".join(str(x) for x in (options.can, options.control) if x)
     return {
         "procedure": options.procedure,
@@ -68,19 +79,54 @@ def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progr
     with _bench(options) as bench:
         if options.scenario and not any(isinstance(u, Gyro) for u in bench.units.values()):
             raise BadInput(expected(f"a scenario with a gyro unit, as {SCENARIO}", options.scenario, "--scenario"))
-        given = {**_site(options), **fields_of(GyrocompassParams, options.params)}
-        p = params_of(label, given)
-        platform = WirePlatform(bench, signals=p.signals)
-        truth = _Truth(bench)
-        windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
-        result = gyrocompass.estimate(windows, p)
-        section = GyroSection(label=label, result=result, truth=truth.of(result))
-        if hold_params is None or result.doubts:
-            return section  # navigation does not begin with a heading that is in doubt
-        hold = heading_hold.hold(
-            platform, result, hold_params, progress, watch=truth.look, depart=lambda: _depart(bench, hold_params)
-        )
-        return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
+        with ExitStack() as stack:
+            heard: Any = bench
+            site = _site(options)
+            if options.record:
+                setup = {"procedure": options.procedure, "reading": label, "site": site, "facts": facts(options)}
+                heard = stack.enter_context(BenchRecorder(bench, options.record, setup))
+            truth = _Truth(bench)
+            return _measured(heard, label, site, hold_params, options, progress, truth, lambda p: _depart(bench, p))
+
+
+def _measured(
+    bench: Any,
+    label: str,
+    site: Mapping[str, float],
+    hold_params: HoldParams | None,
+    options: GyroOptions,
+    progress: Progress,
+    truth: _Truth,
+    depart: Callable[[HoldParams], None],
+) -> GyroSection:
+    """bench: a Bench, or its recorder or recording."""
+    p = params_of(label, {**site, **fields_of(GyrocompassParams, options.params)})
+    platform = WirePlatform(bench, signals=p.signals)
+    windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
+    result = gyrocompass.estimate(windows, p)
+    section = GyroSection(label=label, result=result, truth=truth.of(result))
+    if hold_params is None or result.doubts:
+        return section  # navigation does not begin with a heading that is in doubt
+    hold = heading_hold.hold(
+        platform, result, hold_params, progress, watch=truth.look, depart=lambda: depart(hold_params)
+    )
+    return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
+
+
+def _replayed(hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
+    """The reading that was recorded, on the recording: the same result, without a truth."""
+    assert options.replay is not None
+    given: dict[str, object] = {"--record": options.record, "--can": options.can, "--control": options.control}
+    given |= {"--truth": options.truth, "--scenario": options.scenario, "--seed": options.seed}
+    refuse_beside_replay(given | {"--real-time": options.real_time or None})
+    bench = RecordedBench(options.replay)
+    check_procedure(options.replay, bench.setup, options.procedure)
+    options.out.mkdir(parents=True, exist_ok=True)
+    site = {k: float(v) for k, v in dict(bench.setup.get("site", {})).items()}
+    label = str(bench.setup.get("reading"))
+    section = _measured(bench, label, site, hold_params, options, progress, _Truth(bench), lambda _: None)
+    bench.finish()
+    return section
 
 
 def _resolved(options: GyroOptions) -> Path | None:
@@ -113,8 +159,8 @@ def _depart(bench: Bench, p: HoldParams) -> None:
 class _Truth:
     """What the truth port says after each window and at each look, where there is one."""
 
-    def __init__(self, bench: Bench) -> None:
-        self._bench = bench
+    def __init__(self, bench: Bench | RecordedBench) -> None:
+        self._bench: Any = bench
         self._there = bench.truth_path is not None
         self._windows: list[Mapping[str, Any]] = []
         self._headings: list[float] = []

@@ -30,19 +30,12 @@ from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
-from psabench.logs.formats import READABLE
+from psabench.procedures.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
 from psabench.procedures.head_bench import HeadBench
 
-COLUMNS = ("call", "argument", "answer", "t_s", "frames")
-SETUP, END = "setup", "end"
 LONGEST_S = 1e9  # of a recording
 SDO_ANSWER = 0x580
 UPLOADED_4 = 0x43  # first byte of an answer that holds four bytes
-
-
-def calls_path(log: Path) -> Path:
-    """Where the calls of a log are."""
-    return log.with_name(log.name + ".calls.csv")
 
 
 class HeadRecorder(AbstractContextManager["HeadRecorder"]):
@@ -53,8 +46,7 @@ class HeadRecorder(AbstractContextManager["HeadRecorder"]):
         self.g_mps2 = bench.g_mps2
         self._bench, self._host, self._frames = bench, host, 0
         self._t_s = bench.t_s
-        if path.suffix.lower() not in READABLE:
-            raise BadInput(expected(f"an ending of {' '.join(READABLE)}, which --replay reads", path.suffix, path))
+        check_ending(path)
         with ExitStack() as stack:
             self._log = LogFile(path)
             stack.callback(self._log.close)
@@ -115,50 +107,38 @@ class RecordedHead:
 
     def __init__(self, path: Path) -> None:
         """Raises BadInput for a log or calls that are missing, cut, damaged or do not belong together."""
-        self.path = calls_path(path)
-        self._calls = _read_calls(self.path)
-        self._at = 0
+        self._calls = Calls(path)
         self.setup = self._read_setup()
         self.g_mps2 = float(self.setup["g_mps2"])
         self._node, self._average = int(self.setup["node"]), int(self.setup["average"])
         self._frames = _read_frames(path)
-        if len(self._frames) != int(self._calls[-1]["frames"]):
-            raise BadInput(
-                expected(f"{self._calls[-1]['frames']} frames, as {self.path} says", len(self._frames), path)
-            )
+        self._calls.check_frames(len(self._frames))
 
     def _read_setup(self) -> dict[str, Any]:
-        row = self._next(SETUP, None)
+        setup = self._calls.setup
         try:
-            setup = json.loads(row["argument"])
-            _ = (
-                float(setup["g_mps2"]),
-                int(setup["node"]),
-                int(setup["average"]),
-                dict(setup["facts"]),
-                setup["procedure"],
-            )
+            _ = float(setup["g_mps2"]), int(setup["node"]), int(setup["average"])
         except (ValueError, KeyError, TypeError) as e:
-            raise BadInput(expected("the set-up of a run", row["argument"][:60], self._where())) from e
-        return dict(setup)
+            raise self._calls.no_setup() from e
+        return setup
 
     @property
     def t_s(self) -> float:
-        return float(self._calls[self._at - 1]["t_s"])
+        return self._calls.t_s
 
     def turn(self, angle_deg: float) -> float:
-        return float(self._next("turn", repr(float(angle_deg)))["answer"])
+        return float(self._calls.next("turn", repr(float(angle_deg)))["answer"])
 
     def mount(self, face: Face) -> None:
-        self._next("mount", face.value)
+        self._calls.next("mount", face.value)
 
     def wait(self, dwell_s: float) -> None:
-        self._next("wait", repr(float(dwell_s)))
+        self._calls.next("wait", repr(float(dwell_s)))
 
     def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
-        begin = int(self._calls[self._at - 1]["frames"])
-        row = self._next("read", f"{axis} {readings}")
-        frames = self._frames[begin : int(row["frames"])]
+        begin = self._calls.frames
+        self._calls.next("read", f"{axis} {readings}")
+        frames = self._frames[begin : self._calls.frames]
         if self._average:
             return self._streamed(frames, axis, readings)
         return self._words(frames, axis, readings)
@@ -181,63 +161,12 @@ class RecordedHead:
 
     def _check_count(self, got: int, wanted: int, what: str) -> None:
         if got != wanted:
-            raise BadInput(expected(f"{wanted} {what} in the log for this reading", got, self._where()))
-
-    def _next(self, call: str, argument: str | None) -> dict[str, str]:
-        """The next call of the recording. Raises BadInput when the procedure makes another one."""
-        row = self._calls[self._at]
-        self._at += 1
-        if row["call"] != call or argument not in (None, row["argument"]):
-            asked = f"{call} {argument or ''}".strip()
-            raise BadInput(
-                expected(f"{row['call']} {row['argument']}".strip(), f"{asked} (of the procedure)", self._where())
-            )
-        return row
-
-    def _where(self) -> str:
-        return f"{self.path}:{self._at + 1}"
-
-
-def _read_calls(path: Path) -> list[dict[str, str]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(
-            f"{path}: {getattr(e, 'strerror', None) or e}; psabench run --record writes it beside the log"
-        ) from e
-    rows = list(csv.reader(text.splitlines()))
-    if not rows or tuple(rows[0]) != COLUMNS:
-        raise BadInput(expected(f"the columns {','.join(COLUMNS)}", ",".join(rows[0]) if rows else "none", f"{path}:1"))
-    calls, frames = [], 0
-    for line, row in enumerate(rows[1:], start=2):
-        call = dict(zip(COLUMNS, row, strict=False))
-        if (
-            len(row) != len(COLUMNS)
-            or not call["frames"].isdecimal()
-            or int(call["frames"]) < frames
-            or not _is_good(call)
-        ):
-            raise BadInput(
-                expected("a call, its answer, a time and a rising number of frames", ",".join(row), f"{path}:{line}")
-            )
-        frames = int(call["frames"])
-        calls.append(call)
-    if not calls or calls[-1]["call"] != END:
-        raise BadInput(expected("a last row `end`", "a run that was ended early", path))
-    return calls
-
-
-def _is_good(call: Mapping[str, str]) -> bool:
-    try:
-        return bool(np.isfinite([float(call["t_s"]), float(call["answer"] or 0)]).all())
-    except ValueError:
-        return False
+            raise BadInput(expected(f"{wanted} {what} in the log for this reading", got, self._calls.where))
 
 
 def _read_frames(path: Path) -> tuple[CanFrame, ...]:
     """Raises BadInput for a log that cannot be read to its end."""
-    if path.suffix.lower() not in READABLE:
-        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
+    check_ending(path)
     try:
         take = read_can(path, Bounds(max_s=LONGEST_S))
     except OSError as e:

@@ -17,6 +17,7 @@ from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
+from psabench.procedures.call_log import check_procedure, refuse_beside_replay
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder
@@ -109,19 +110,10 @@ def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Sec
     assert options.replay is not None
     head = RecordedHead(options.replay)
     name = str(head.setup["procedure"])
-    if list(options.procedures) != [name]:
-        raise BadInput(expected(f"run {name}, as recorded", " ".join(options.procedures), options.replay))
-    clash: dict[str, object] = {
-        "--record": options.record,
-        "--can": options.can,
-        "--head": options.head,
-        "--control": options.control,
-    }
-    clash |= {"--truth": options.truth, "--scenario": options.scenario, "--seed": options.seed}
-    clash |= {"--average": options.average, "--gravity": options.g_mps2}
-    for option, value in clash.items():
-        if value is not None:
-            raise BadInput(expected("no option of the bench beside --replay", option, "run"))
+    check_procedure(options.replay, head.setup, " ".join(options.procedures))
+    given: dict[str, object] = {"--record": options.record, "--can": options.can, "--head": options.head}
+    given |= {"--control": options.control, "--truth": options.truth, "--scenario": options.scenario}
+    refuse_beside_replay(given | {"--seed": options.seed, "--average": options.average, "--gravity": options.g_mps2})
     options.out.mkdir(parents=True, exist_ok=True)
     procedure, label = PROCEDURES[name], str(head.setup.get("condition", ""))
     params = made_params(procedure.params, name, options.params or {})

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+import io
 import json
+import shutil
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
 from psabench import cli
+from psabench.procedures.call_log import calls_path
+from psabench.procedures.comparison import truth_path
 
 ROOT = Path(__file__).resolve().parents[3]
 PULSES = {"pik": 60e-3, "pik5": 60e-3, "pik6": 5e-3, "pmka": 2.4e-5}  # m/s, as the article prints them
 
 
-def test_seven_units_one_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["run", "compare-converters", "--out", str(tmp_path)]) == 0
-    assert "The velocities of all 7 generations lie within their limits" in capsys.readouterr().out
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run with its recording, run.log."""
+    folder = tmp_path_factory.mktemp("converters")
+    words = ["run", "compare-converters", "--out", str(folder), "--record", str(folder / "run.log")]
+    with redirect_stdout(io.StringIO()) as out:
+        assert cli.main(words) == 0
+    assert "The velocities of all 7 generations lie within their limits" in out.getvalue()
+    return folder
+
+
+def test_seven_units_one_motion(recorded: Path) -> None:
+    tmp_path = recorded
     data = json.loads((tmp_path / "result.json").read_text())
     of = {g["name"]: g for g in data["generations"]}
     for name, printed in PULSES.items():
@@ -32,6 +47,23 @@ def test_seven_units_one_motion(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert of["pik6"]["noise_rms_mps"][2] == pytest.approx(of["pik6"]["quantum_mps"] / 12**0.5, rel=0.1)
     assert (tmp_path / "report.html").read_text().count("<svg") == 3
     assert json.loads((tmp_path / "scenario-converters.json").read_text())["units"]
+
+
+def test_a_replay_gives_the_live_results(recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = recorded / "run.log"
+    words = ["run", "compare-converters", "--out", str(tmp_path), "--replay", str(log)]
+    assert cli.main([*words, "--seed", "1"]) == 2
+    assert "expected no option of the bench beside --replay, got --seed" in capsys.readouterr().err
+    assert cli.main(words) == 0
+    for name in ("result.json", "report.html"):
+        assert (tmp_path / name).read_bytes() == (recorded / name).read_bytes(), name
+    assert truth_path(log).stat().st_size < log.stat().st_size / 4  # of one unit
+    pcap = Path(shutil.copy(calls_path(log), tmp_path / "run.pcap.calls.csv")).with_suffix("").with_suffix("")
+    assert cli.main([*words[:-1], str(pcap)]) == 2
+    assert "expected a format that keeps channels (.lcmlog .log .mcap .mf4), got .pcap" in capsys.readouterr().err
+    truth_path(log).rename(tmp_path / "elsewhere")
+    assert cli.main(words) == 2
+    assert "no such file; psabench run --record writes it beside the log" in capsys.readouterr().err
 
 
 def test_another_bench_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,258 @@
+"""A run over the wire as a recording, whatever the procedure: its frames in a CAN log, what the program did beside it.
+
+`BenchRecorder` and `RecordedBench` are as much of a `Bench` as a procedure asks for that uses units and time alone.
+Units send and receive through hosts that write down each request, each step of time, and how many frames had come by
+then. On replay the same code makes the same requests, and gets the recorded frames at the same places. Instants are
+rounded to a microsecond in both, and time moves with the calls, so that the results are the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import can
+
+from psabench.bench import Bench
+from psabench.boards.devices import of_board
+from psabench.boards.unit import Unit
+from psabench.errors import BadInput, BenchError, expected
+from psabench.link.can_host import CanHost, Listener
+from psabench.link.log_file import LogFile
+from psabench.link.own import output_text
+from psabench.logs.formats import KEEPS, read_frames
+from psabench.procedures.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
+
+STAMP_DIGITS = 6  # of a second: what all formats keep that keep instants
+Board = TypeVar("Board", bound=Unit)
+
+
+class _Teller(Protocol):
+    """Who writes calls down, or has them. bus: its number."""
+
+    @property
+    def t_s(self) -> float: ...
+    def send(
+        self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]
+    ) -> None: ...
+    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool: ...
+    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None: ...
+
+
+class _Host(CanHost):
+    """A program's end of a bus whose calls go through a recorder or a recording; inner: None on replay."""
+
+    def __init__(self, teller: _Teller, bus: int, inner: CanHost | None) -> None:  # no link: the base's is not made
+        self._teller, self._number, self._inner = teller, bus, inner
+        self.clock = self  # type: ignore[assignment]
+        self.listeners: list[Listener] = []
+
+    def now_s(self) -> float:
+        """As of the last call."""
+        return self._teller.t_s
+
+    def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
+        how = {name: True for name, on in (("fd", fd), ("remote", remote)) if on}
+        frame = " ".join([f"{can_id:03X}#{bytes(data).hex().upper()}", *how])
+        self._teller.send(self._number, frame, self._inner, (can_id, data), how)
+
+    def receive(self, timeout_s: float) -> bool:
+        return self._teller.receive(self._number, self._inner, timeout_s)
+
+    def advance(self, dwell_s: float) -> None:
+        self._teller.advance(self._number, self._inner, dwell_s)
+
+    def take(self, message: can.Message) -> None:
+        """A frame has come."""
+        for listener in self.listeners:
+            listener(message)
+
+    def close(self) -> None:
+        """The bench closes its own."""
+
+
+class _Units:
+    """Units on hosts of ours, and how a procedure finds them."""
+
+    units: dict[str, Unit]
+
+    def board(self, kind: type[Board]) -> Board:
+        """The first unit with such a board."""
+        for unit in self.units.values():
+            if isinstance(unit, kind):
+                return unit
+        raise BenchError(expected(f"a {kind.title}", ", ".join(u.title for u in self.units.values()), "unit"))
+
+
+class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
+    """A bench whose frames and calls are stored. The units of `bench` itself hear nothing meanwhile."""
+
+    def __init__(self, bench: Bench, path: Path, setup: Mapping[str, Any]) -> None:
+        """setup: `procedure`, `facts` and what else the replay needs. Raises BadInput, OutputError."""
+        check_keeps(path, len(bench.hosts))
+        self._bench, self._frames, self.t_s = bench, 0, bench.time_s
+        self._hosts = {inner: _Host(self, k, inner) for k, inner in enumerate(bench.hosts.values())}
+        self.units = {name: of_board(u.board)(self._hosts[u.host], u.node.node_id) for name, u in bench.units.items()}
+        with ExitStack() as stack:
+            self._log = LogFile(path)
+            stack.callback(self._log.close)
+            file = stack.enter_context(output_text(calls_path(path), lambda: f"stored {self._frames} frames"))
+            self._csv = csv.writer(file, lineterminator="\n")
+            self._csv.writerow(COLUMNS)
+            self._stack = stack.pop_all()
+        for k, (inner, host) in enumerate(self._hosts.items()):
+            inner.listeners[:] = [_Keeper(self, k, host)]
+        buses = list(bench.hosts.values())
+        units = [[n, u.board, u.node.node_id, buses.index(u.host)] for n, u in bench.units.items()]
+        self._store(SETUP, json.dumps({**setup, "buses": len(buses), "units": units}))
+
+    def keep(self, bus: int, host: _Host, message: can.Message) -> None:
+        """A frame that has come, into the log and to the unit."""
+        message.timestamp = round(message.timestamp, STAMP_DIGITS)
+        message.channel = bus
+        if not message.is_error_frame:
+            self._frames += self._log(message)
+        host.take(message)
+
+    def _store(self, call: str, argument: str) -> None:
+        """A call that is over. Raises OutputError when the log could not take its frames."""
+        if self._log.error is not None:
+            raise self._log.error
+        self.t_s = self._bench.time_s
+        self._csv.writerow([call, argument, "", repr(self.t_s), self._frames])
+
+    @property
+    def time_s(self) -> float:
+        """As of the last call: what the recording knows."""
+        return self.t_s
+
+    def wait(self, dwell_s: float) -> None:
+        self._bench.wait(dwell_s)
+        self._store("wait", repr(float(dwell_s)))
+
+    def wait_away(self, dwell_s: float) -> None:
+        self._bench.wait_away(dwell_s)
+        self._store("wait_away", repr(float(dwell_s)))
+
+    def send(self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]) -> None:
+        assert host is not None
+        host.send(*args, **how)
+        self._store("send", f"{bus} {frame}")
+
+    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
+        assert host is not None
+        came = host.receive(timeout_s)
+        if came:
+            self._store("receive", str(bus))
+        return came
+
+    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
+        assert host is not None
+        host.advance(dwell_s)
+        self._store("advance", f"{bus} {dwell_s!r}")
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        for inner in self._hosts:
+            inner.listeners.clear()
+        try:
+            if kind is None:
+                self._store(END, "")
+        finally:
+            self._stack.__exit__(kind, *rest)
+        if kind is None and self._log.error is not None:
+            raise self._log.error
+
+
+class _Keeper:
+    """Listener of a host of the bench."""
+
+    def __init__(self, recorder: BenchRecorder, bus: int, host: _Host) -> None:
+        self._recorder, self._bus, self._host = recorder, bus, host
+
+    def __call__(self, message: can.Message) -> None:
+        self._recorder.keep(self._bus, self._host, message)
+
+
+class RecordedBench(_Units):
+    """A bench whose units answer as they did in a recording. Without a truth, faults or instruments."""
+
+    pace = "real"
+    truth_path = None
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadInput for a log or calls that are missing, cut, damaged or do not belong together."""
+        self._calls = Calls(path)
+        self.setup = self._calls.setup
+        self._buses, units = self._read_setup()
+        check_keeps(path, self._buses)
+        self._frames = [m for m in read_frames(path) if not m.is_error_frame]
+        self._calls.check_frames(len(self._frames))
+        self._given = 0
+        self._hosts = [_Host(self, k, None) for k in range(self._buses)]
+        self.units = {name: of_board(board)(self._hosts[bus], node) for name, board, node, bus in units}
+
+    def _read_setup(self) -> tuple[int, list[tuple[str, str, int, int]]]:
+        try:
+            buses = int(self.setup["buses"])
+            units = [(str(name), str(board), int(node), int(bus)) for name, board, node, bus in self.setup["units"]]
+            for _, board, _, bus in units:
+                of_board(board)
+                _ = range(buses)[bus]
+        except (ValueError, KeyError, TypeError, IndexError) as e:
+            raise self._calls.no_setup() from e
+        return buses, units
+
+    @property
+    def t_s(self) -> float:
+        return self._calls.t_s
+
+    @property
+    def time_s(self) -> float:
+        return self.t_s
+
+    def _next(self, call: str, argument: str) -> None:
+        """The same call, and the frames that came meanwhile."""
+        self._calls.next(call, argument)
+        while self._given < self._calls.frames:
+            message = self._frames[self._given]
+            self._given += 1
+            bus = can.util.channel2int(message.channel) or 0 if self._buses > 1 else 0
+            if bus >= self._buses:
+                raise BadInput(expected(f"frames of {self._buses} buses", message.channel, self._calls.where))
+            self._hosts[bus].take(message)
+
+    def wait(self, dwell_s: float) -> None:
+        self._next("wait", repr(float(dwell_s)))
+
+    def wait_away(self, dwell_s: float) -> None:
+        self._next("wait_away", repr(float(dwell_s)))
+
+    def send(self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]) -> None:
+        self._next("send", f"{bus} {frame}")
+
+    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
+        if not self._calls.comes("receive", str(bus)):
+            return False
+        self._next("receive", str(bus))
+        return True
+
+    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
+        self._next("advance", f"{bus} {dwell_s!r}")
+
+    def finish(self) -> None:
+        """The run ends where it ended. Raises BadInput."""
+        self._next(END, "")
+
+
+def check_keeps(path: Path, buses: int) -> None:
+    """Results of such a run depend on instants, and on the bus. Raises BadInput with what the format does not keep."""
+    check_ending(path)
+    needed = ["time stamps", *(["channels"] if buses > 1 else [])]
+    missing = [what for what in needed if what not in KEEPS[path.suffix.lower()]]
+    if missing:
+        good = " ".join(e for e, kept in KEEPS.items() if set(needed) <= set(kept))
+        raise BadInput(expected(f"a format that keeps {' and '.join(missing)} ({good})", path.suffix, path))
