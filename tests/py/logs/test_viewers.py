@@ -11,6 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+import pywellen
 from psabench import cli
 from psabench.boards.board import PARALLEL_BUS
 from psabench.boards.registry import BOARDS
@@ -25,13 +26,13 @@ from tests.py.boards.test_sigrok import sigrok, write
 NEEDS_SIGROK = pytest.mark.skipif(not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed")
 
 
-def recorded(folder: Path, board: str) -> Path:
+def recorded(folder: Path, board: str, *extra: str) -> Path:
     scenario, vcd = folder / "unit.yaml", folder / "run.vcd"
     scenario.write_text(f"units:\n  - {{name: a, board: {board}}}\n")
     on_platform = board == "gyro"  # which has no unit without one
-    extra: list[str | Path] = ["--for", "5ms", "--vcd", vcd, *(["--unit", "gyro"] if on_platform else [])]
+    options = ["--for", "5ms", "--vcd", vcd, *(["--unit", "gyro"] if on_platform else []), *extra]
     with Emulator(
-        "gyrocompass" if on_platform else scenario, cans=["none"], pace="free", control=False, extra=extra
+        "gyrocompass" if on_platform else scenario, cans=["none"], pace="free", control=False, extra=options
     ) as emu:
         assert emu.wait(30) == 0
     return vcd
@@ -68,6 +69,19 @@ def test_the_shipped_sessions_are_those_of_the_table(tmp_path: Path) -> None:
     assert names == {f"{board}{ending}" for board in BOARDS for ending in (".pvs", ".gtkw")}
     for name in names:
         assert (CHECKOUT / "share" / name).read_text() == (tmp_path / name).read_text(), "run make docs"
+
+
+@pytest.mark.parametrize("board", ["psa2", "psd1"])
+@pytest.mark.parametrize("unit_ns", [1, 100])
+def test_the_parser_of_surfer_reads_the_same_levels(tmp_path: Path, board: str, unit_ns: int) -> None:
+    """pywellen, which shares nothing with our reader."""
+    vcd = recorded(tmp_path, board, "--vcd-unit", str(unit_ns))
+    theirs, ours = pywellen.Waveform(str(vcd)), read_vcd(vcd).wires
+    scale_ns = theirs.timescale.factor * 10 ** (9 + theirs.timescale.unit.to_exponent())
+    assert scale_ns == unit_ns
+    found = {v.full_name.rpartition(".")[2]: [(t * scale_ns, int(x)) for t, x in v.tv] for v in theirs.all_vars()}
+    assert found == {name: list(zip(w.t_ns.tolist(), w.level.tolist(), strict=True)) for name, w in ours.items()}
+    assert sum(map(len, found.values())) > 100
 
 
 @NEEDS_SIGROK
