@@ -40,7 +40,7 @@ Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench or a link failed, 
 """
 
 RECORDING_EPILOG = """\
-FILE: at most one log of the CAN bus (.log of candump, .blf, .asc, .trc, .csv, .mf4), at most one recording of lines
+FILE: at most one log of the CAN bus (.log of candump, .blf, .mcap, .mf4 ...), at most one recording of lines
 (.vcd of any tool, .sr of sigrok, .bin: bytes of the line port). Together they form one recording of one bench.
 
 A requirement that the files do not show is reported as not observable, never as passed.

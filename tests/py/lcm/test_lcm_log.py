@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import struct
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import can
 import lcm
 import pytest
+from psabench.conform.sources import mf4
 from psabench.errors import BadInput
 from psabench.lcm.can_io import LcmReader, LcmWriter
 from psabench.lcm.event_log import put_event, read_events
@@ -16,6 +20,7 @@ from psabench.lcm.frames import read_frames, to_values
 from psabench.lcm.types import lcm_type
 from psabench.link.log_file import LogFile
 
+ROOT = Path(__file__).resolve().parents[3]
 FRAMES = (
     can.Message(timestamp=0.000055, arbitration_id=0x705, is_extended_id=False, data=b"\0"),
     can.Message(timestamp=1.5, arbitration_id=0x123, is_extended_id=False, data=bytes(8)),
@@ -137,3 +142,44 @@ def test_a_name_that_lcm_has_no_room_for_is_refused() -> None:
     for name in ("", "x" * 64):
         with pytest.raises(ValueError, match="a channel name of 1 to 63 bytes"):
             put_event(0, 0, name, b"")
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("", "NumPy: pandas is not installed\n"),
+        pytest.param(
+            str(mf4.FOLDER), "", marks=pytest.mark.skipif(not (mf4.FOLDER / "pandas").is_dir(), reason="make setup")
+        ),
+    ],
+)
+def test_the_example_makes_the_same_table_with_and_without_pandas(path: str, said: str, tmp_path: Path) -> None:
+    kind = lcm_type("psa2_reading_t")
+    zeros = {
+        "epoch_ns": 0,
+        "unit": "a",
+        "form": 0,
+        "sample": 0,
+        "x_code": 1,
+        "y_code": 2,
+        "z_code": 3,
+        "t_sample_s": 0.0,
+    }
+    zeros |= {"temp_channel": 1, "temp_new": False, "settled": True, "clipped": False, "overrun": False}
+    data = b""
+    for n in range(3):
+        row = {**zeros, "t_ns": 1000 * n + 1, "x_v": n / 3, "y_v": -1e-7, "z_v": 0.0, "sequence": n, "temp_code": -n}
+        data += put_event(2 * n, n, "PSABENCH_PSA2_a", kind.encode(row))
+        data += put_event(2 * n + 1, n, "PSABENCH_PSA2_b", kind.encode({**row, "x_v": 5.0}))  # of another unit
+    (tmp_path / "run.lcmlog").write_bytes(data)
+    done = subprocess.run(
+        [sys.executable, ROOT / "examples/lcm_to_pandas.py", "run.lcmlog"],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == f"{said}run.csv: 3 readings, 0.000 s, mean of X 0.333333 V\n"
+    assert (tmp_path / "run.csv").read_text().splitlines() == [
+        "t_s,x_v,y_v,z_v,sequence,temp_code,settled",
+        "1e-09,0.0,-1e-07,0.0,0,0,1",
+        "1.001e-06,0.3333333333333333,-1e-07,0.0,1,-1,1",
+        "2.001e-06,0.6666666666666666,-1e-07,0.0,2,-2,1",
+    ]
