@@ -94,7 +94,7 @@ static void request_done(void *ctx, struct psd1_request *r, enum board_cycle_res
     const bool read = r->command >= PSD1_CMD_CONTROL;
     can->busy = false;
     co_node_answer(&can->node.node, can->ticket, result == BOARD_CYCLE_OK ? CO_OK : CO_AB_TRANSFER, read ? &v : NULL,
-                  t_ns);
+                   t_ns);
 }
 
 /* One of a client that has given up is still the board's. */
