@@ -163,7 +163,7 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
                         channels.add(c.id)
                 elif int.from_bytes(data[:2], "little") in channels:
                     n += 1
-                    yield frame_of(_parsed(data[MESSAGE_HEAD:]))
+                    yield frame_of(_parsed_json(data[MESSAGE_HEAD:]))
         except DAMAGE as e:
             said = " ".join(str(e).split())[:120] or type(e).__name__
             raise BadInput(expected("a whole log", f"damage behind message {n} ({said})", path)) from e
@@ -173,14 +173,14 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
 DAMAGE = (McapError, ValueError, struct.error, EOFError, IndexError, zstandard.ZstdError, MemoryError, OverflowError)
 
 
-def _parsed(data: bytes) -> object:
+def _parsed_json(data: bytes) -> object:
     """Raises ValueError."""
     if len(data) > MOST_RECORD:  # no frame takes as much; JSON nested so deep would end the parser
         raise ValueError(expected(f"records of {MOST_RECORD} bytes at most", len(data)))
     try:
         return json.loads(data)
     except RecursionError as e:
-        raise ValueError(expected("JSON nested less deep", "more levels than the parser takes")) from e
+        raise ValueError(expected("a frame as JSON", "JSON nested too deep")) from e
 
 
 # mcap's StreamReader makes an object of every record, and a list of all in a chunk: a gigabyte for 128 MiB of
@@ -230,13 +230,13 @@ def _decompressed_chunk(chunk: Chunk) -> bytes:
         raise ValueError(expected("compression zstd or none", repr(chunk.compression[:20])))
     data = chunk.data
     if chunk.compression:
-        data = b"".join(_unpacked(data))
+        data = b"".join(_unpacked_parts(data))
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError(expected(f"a chunk with the checksum {chunk.uncompressed_crc:08x}", f"{zlib.crc32(data):08x}"))
     return data
 
 
-def _unpacked(data: bytes) -> Iterator[bytes]:
+def _unpacked_parts(data: bytes) -> Iterator[bytes]:
     """Raises ValueError beyond MOST_CHUNK bytes."""
     size = 0
     with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(data) as stream:

@@ -35,12 +35,12 @@ def read_text(path: Path) -> Iterator[can.Message]:
     """Of candump, ASC, TRC, CSV. Raises BadInput at a damage, after the frames before it, OSError."""
     readers: Mapping[str, Callable[..., Any]] = MESSAGE_READERS
     with _Lines(path.open("rb"), encoding="utf-8", errors="replace") as file:
-        yield from _told(path, readers[path.suffix.lower()](file))
+        yield from _until_damage(path, readers[path.suffix.lower()](file))
 
 
 def read_blf(path: Path) -> Iterator[can.Message]:
     """Raises BadInput at a damage, after the frames before it, OSError."""
-    yield from _told(path, _blf_messages(path))
+    yield from _until_damage(path, _blf_messages(path))
 
 
 def _blf_messages(path: Path) -> Iterator[can.Message]:
@@ -52,7 +52,7 @@ def _blf_messages(path: Path) -> Iterator[can.Message]:
             raise ValueError(trouble)
 
 
-def _told(path: Path, messages: Iterator[can.Message]) -> Iterator[can.Message]:
+def _until_damage(path: Path, messages: Iterator[can.Message]) -> Iterator[can.Message]:
     """Raises BadInput for what the reader raises."""
     read = 0
     try:

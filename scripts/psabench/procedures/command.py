@@ -293,8 +293,8 @@ def progress_of(args: argparse.Namespace) -> Iterator[Told]:
 
 def _compare(args: argparse.Namespace) -> int:
     """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
+    from psabench.logs.call_log import refuse_beside_replay
     from psabench.procedures import compare_converters, comparison
-    from psabench.procedures.call_log import refuse_beside_replay
     from psabench.report import comparison_page
 
     p = compare_converters.CompareParams()

@@ -21,8 +21,8 @@ from psabench.bench import Bench
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.own import output_text
 from psabench.link.signals import Floats
+from psabench.logs.call_log import check_procedure
 from psabench.procedures import compare_converters as measured
-from psabench.procedures.call_log import check_procedure
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
@@ -128,7 +128,7 @@ def integrate(t_s: Floats, a_mps2: Floats) -> Floats:
     return np.concatenate([np.zeros((1, a_mps2.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _mark(unit: str) -> str:
+def _unit_mark(unit: str) -> str:
     """What is near the begin of each line of a unit."""
     return f'"unit":"{unit}",'
 
@@ -136,7 +136,7 @@ def _mark(unit: str) -> str:
 def read_truth(path: Path, unit: str) -> Motion:
     """From a truth log, lines of one unit. Raises BenchError for a log without it."""
     t_s, a = [], []
-    mark = _mark(unit)
+    mark = _unit_mark(unit)
     with path.open(encoding="utf-8") as lines:
         for line in lines:
             if mark in line[:80]:
@@ -271,7 +271,7 @@ def compare(
         motion = read_truth(log, tracks[0].name)
         if record:
             _keep_truth(log, tracks[0].name, record)
-    return _graded(tracks, motion, p, facts)
+    return _grade_tracks(tracks, motion, p, facts)
 
 
 def replay(out: Path, p: CompareParams, progress: Progress, log: Path) -> Comparison:
@@ -280,12 +280,12 @@ def replay(out: Path, p: CompareParams, progress: Progress, log: Path) -> Compar
     check_procedure(log, bench.setup, measured.NAME)
     truth = truth_path(log)
     if not truth.exists():
-        raise BadInput(f"{truth}: no such file; psabench run --record writes it beside the log")
+        raise BadInput(expected("the true motion, which psabench run --record writes", "no such file", truth))
     out.mkdir(parents=True, exist_ok=True)
     tracks = measured.record(bench, p, progress)
-    bench.finish()
+    bench.end_run()
     facts = {str(k): str(v) for k, v in bench.setup["facts"].items()}
-    return _graded(tracks, read_truth(truth, tracks[0].name), p, facts)
+    return _grade_tracks(tracks, read_truth(truth, tracks[0].name), p, facts)
 
 
 def truth_path(log: Path) -> Path:
@@ -295,12 +295,12 @@ def truth_path(log: Path) -> Path:
 
 def _keep_truth(log: Path, unit: str, record: Path) -> None:
     """The lines of one unit: all were moved alike."""
-    mark = _mark(unit)
+    mark = _unit_mark(unit)
     with log.open(encoding="utf-8") as lines, output_text(truth_path(record)) as out:
         out.writelines(line for line in lines if mark in line[:80])
 
 
-def _graded(tracks: Sequence[Track], motion: Motion, p: CompareParams, facts: Mapping[str, str]) -> Comparison:
+def _grade_tracks(tracks: Sequence[Track], motion: Motion, p: CompareParams, facts: Mapping[str, str]) -> Comparison:
     graded = tuple(grade(measured.figures(t, p, G_MPS2), motion, p, G_MPS2) for t in tracks)
     return Comparison(graded=graded, motion=motion, params=p, g_mps2=G_MPS2, facts=facts)
 

@@ -15,8 +15,8 @@ from typing import Any
 from psabench.bench import Bench
 from psabench.boards.gyro.device import Gyro
 from psabench.errors import BadInput, expected
+from psabench.logs.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures import gyrocompass, heading_hold
-from psabench.procedures.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
@@ -57,7 +57,7 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
     holds = options.procedure == heading_hold.NAME
     hold_params = made_params(HoldParams, options.procedure, options.params) if holds else None
     if options.replay:
-        return [_replayed(hold_params, options, progress)]
+        return [_replay_reading(hold_params, options, progress)]
     options.out.mkdir(parents=True, exist_ok=True)
     return [_one(name, hold_params, options, progress) for name in readings.readings]
 
@@ -86,10 +86,12 @@ def _one(label: str, hold_params: HoldParams | None, options: GyroOptions, progr
                 setup = {"procedure": options.procedure, "reading": label, "site": site, "facts": facts(options)}
                 heard = stack.enter_context(BenchRecorder(bench, options.record, setup))
             truth = _Truth(bench)
-            return _measured(heard, label, site, hold_params, options, progress, truth, lambda p: _depart(bench, p))
+            return _measure_reading(
+                heard, label, site, hold_params, options, progress, truth, lambda p: _depart(bench, p)
+            )
 
 
-def _measured(
+def _measure_reading(
     bench: Any,
     label: str,
     site: Mapping[str, float],
@@ -113,7 +115,7 @@ def _measured(
     return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
 
 
-def _replayed(hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
+def _replay_reading(hold_params: HoldParams | None, options: GyroOptions, progress: Progress) -> GyroSection:
     """The reading that was recorded, on the recording: the same result, without a truth."""
     assert options.replay is not None
     given: dict[str, object] = {"--record": options.record, "--can": options.can, "--control": options.control}
@@ -124,8 +126,8 @@ def _replayed(hold_params: HoldParams | None, options: GyroOptions, progress: Pr
     options.out.mkdir(parents=True, exist_ok=True)
     site = {k: float(v) for k, v in dict(bench.setup.get("site", {})).items()}
     label = str(bench.setup.get("reading"))
-    section = _measured(bench, label, site, hold_params, options, progress, _Truth(bench), lambda _: None)
-    bench.finish()
+    section = _measure_reading(bench, label, site, hold_params, options, progress, _Truth(bench), lambda _: None)
+    bench.end_run()
     return section
 
 

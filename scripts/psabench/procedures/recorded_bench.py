@@ -24,8 +24,8 @@ from psabench.errors import BadInput, BenchError, expected
 from psabench.link.can_host import CanHost, Listener
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
+from psabench.logs.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
 from psabench.logs.formats import KEEPS, read_frames
-from psabench.procedures.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
 
 STAMP_DIGITS = 6  # of a second: what all formats keep that keep instants
 Board = TypeVar("Board", bound=Unit)
@@ -36,11 +36,11 @@ class _Teller(Protocol):
 
     @property
     def t_s(self) -> float: ...
-    def send(
+    def send_frame(
         self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]
     ) -> None: ...
-    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool: ...
-    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None: ...
+    def receive_frame(self, bus: int, host: CanHost | None, timeout_s: float) -> bool: ...
+    def advance_time(self, bus: int, host: CanHost | None, dwell_s: float) -> None: ...
 
 
 class _Host(CanHost):
@@ -58,15 +58,15 @@ class _Host(CanHost):
     def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
         how = {name: True for name, on in (("fd", fd), ("remote", remote)) if on}
         frame = " ".join([f"{can_id:03X}#{bytes(data).hex().upper()}", *how])
-        self._teller.send(self._number, frame, self._inner, (can_id, data), how)
+        self._teller.send_frame(self._number, frame, self._inner, (can_id, data), how)
 
     def receive(self, timeout_s: float) -> bool:
-        return self._teller.receive(self._number, self._inner, timeout_s)
+        return self._teller.receive_frame(self._number, self._inner, timeout_s)
 
     def advance(self, dwell_s: float) -> None:
-        self._teller.advance(self._number, self._inner, dwell_s)
+        self._teller.advance_time(self._number, self._inner, dwell_s)
 
-    def take(self, message: can.Message) -> None:
+    def pass_on(self, message: can.Message) -> None:
         """A frame has come."""
         for listener in self.listeners:
             listener(message)
@@ -108,17 +108,17 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
             inner.listeners[:] = [_Keeper(self, k, host)]
         buses = list(bench.hosts.values())
         units = [[n, u.board, u.node.node_id, buses.index(u.host)] for n, u in bench.units.items()]
-        self._store(SETUP, json.dumps({**setup, "buses": len(buses), "units": units}))
+        self._store_call(SETUP, json.dumps({**setup, "buses": len(buses), "units": units}))
 
-    def keep(self, bus: int, host: _Host, message: can.Message) -> None:
+    def keep_frame(self, bus: int, host: _Host, message: can.Message) -> None:
         """A frame that has come, into the log and to the unit."""
         message.timestamp = round(message.timestamp, STAMP_DIGITS)
         message.channel = bus
         if not message.is_error_frame:
             self._frames += self._log(message)
-        host.take(message)
+        host.pass_on(message)
 
-    def _store(self, call: str, argument: str) -> None:
+    def _store_call(self, call: str, argument: str) -> None:
         """A call that is over. Raises OutputError when the log could not take its frames."""
         if self._log.error is not None:
             raise self._log.error
@@ -132,35 +132,37 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
 
     def wait(self, dwell_s: float) -> None:
         self._bench.wait(dwell_s)
-        self._store("wait", repr(float(dwell_s)))
+        self._store_call("wait", repr(float(dwell_s)))
 
     def wait_away(self, dwell_s: float) -> None:
         self._bench.wait_away(dwell_s)
-        self._store("wait_away", repr(float(dwell_s)))
+        self._store_call("wait_away", repr(float(dwell_s)))
 
-    def send(self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]) -> None:
+    def send_frame(
+        self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]
+    ) -> None:
         assert host is not None
         host.send(*args, **how)
-        self._store("send", f"{bus} {frame}")
+        self._store_call("send", f"{bus} {frame}")
 
-    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
+    def receive_frame(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
         assert host is not None
         came = host.receive(timeout_s)
         if came:
-            self._store("receive", str(bus))
+            self._store_call("receive", str(bus))
         return came
 
-    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
+    def advance_time(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
         assert host is not None
         host.advance(dwell_s)
-        self._store("advance", f"{bus} {dwell_s!r}")
+        self._store_call("advance", f"{bus} {dwell_s!r}")
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         for inner in self._hosts:
             inner.listeners.clear()
         try:
             if kind is None:
-                self._store(END, "")
+                self._store_call(END, "")
         finally:
             self._stack.__exit__(kind, *rest)
         if kind is None and self._log.error is not None:
@@ -174,7 +176,7 @@ class _Keeper:
         self._recorder, self._bus, self._host = recorder, bus, host
 
     def __call__(self, message: can.Message) -> None:
-        self._recorder.keep(self._bus, self._host, message)
+        self._recorder.keep_frame(self._bus, self._host, message)
 
 
 class RecordedBench(_Units):
@@ -214,38 +216,40 @@ class RecordedBench(_Units):
     def time_s(self) -> float:
         return self.t_s
 
-    def _next(self, call: str, argument: str) -> None:
+    def _make_call(self, call: str, argument: str) -> None:
         """The same call, and the frames that came meanwhile."""
-        self._calls.next(call, argument)
+        self._calls.next_call(call, argument)
         while self._given < self._calls.frames:
             message = self._frames[self._given]
             self._given += 1
             bus = can.util.channel2int(message.channel) or 0 if self._buses > 1 else 0
             if bus >= self._buses:
                 raise BadInput(expected(f"frames of {self._buses} buses", message.channel, self._calls.where))
-            self._hosts[bus].take(message)
+            self._hosts[bus].pass_on(message)
 
     def wait(self, dwell_s: float) -> None:
-        self._next("wait", repr(float(dwell_s)))
+        self._make_call("wait", repr(float(dwell_s)))
 
     def wait_away(self, dwell_s: float) -> None:
-        self._next("wait_away", repr(float(dwell_s)))
+        self._make_call("wait_away", repr(float(dwell_s)))
 
-    def send(self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]) -> None:
-        self._next("send", f"{bus} {frame}")
+    def send_frame(
+        self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]
+    ) -> None:
+        self._make_call("send", f"{bus} {frame}")
 
-    def receive(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
-        if not self._calls.comes("receive", str(bus)):
+    def receive_frame(self, bus: int, host: CanHost | None, timeout_s: float) -> bool:
+        if not self._calls.comes_next("receive", str(bus)):
             return False
-        self._next("receive", str(bus))
+        self._make_call("receive", str(bus))
         return True
 
-    def advance(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
-        self._next("advance", f"{bus} {dwell_s!r}")
+    def advance_time(self, bus: int, host: CanHost | None, dwell_s: float) -> None:
+        self._make_call("advance", f"{bus} {dwell_s!r}")
 
-    def finish(self) -> None:
+    def end_run(self) -> None:
         """The run ends where it ended. Raises BadInput."""
-        self._next(END, "")
+        self._make_call(END, "")
 
 
 def check_keeps(path: Path, buses: int) -> None:

@@ -30,7 +30,7 @@ from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
-from psabench.procedures.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
+from psabench.logs.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
 from psabench.procedures.head_bench import HeadBench
 
 LONGEST_S = 1e9  # of a recording
@@ -127,17 +127,17 @@ class RecordedHead:
         return self._calls.t_s
 
     def turn(self, angle_deg: float) -> float:
-        return float(self._calls.next("turn", repr(float(angle_deg)))["answer"])
+        return float(self._calls.next_call("turn", repr(float(angle_deg)))["answer"])
 
     def mount(self, face: Face) -> None:
-        self._calls.next("mount", face.value)
+        self._calls.next_call("mount", face.value)
 
     def wait(self, dwell_s: float) -> None:
-        self._calls.next("wait", repr(float(dwell_s)))
+        self._calls.next_call("wait", repr(float(dwell_s)))
 
     def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
         begin = self._calls.frames
-        self._calls.next("read", f"{axis} {readings}")
+        self._calls.next_call("read", f"{axis} {readings}")
         frames = self._frames[begin : self._calls.frames]
         if self._average:
             return self._streamed(frames, axis, readings)

@@ -17,7 +17,7 @@ from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
-from psabench.procedures.call_log import check_procedure, refuse_beside_replay
+from psabench.logs.call_log import check_procedure, refuse_beside_replay
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder

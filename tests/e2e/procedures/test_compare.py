@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from psabench import cli
-from psabench.procedures.call_log import calls_path
+from psabench.logs.call_log import calls_path
 from psabench.procedures.comparison import truth_path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -63,7 +63,7 @@ def test_a_replay_gives_the_live_results(recorded: Path, tmp_path: Path, capsys:
     assert "expected a format that keeps channels (.lcmlog .log .mcap .mf4), got .pcap" in capsys.readouterr().err
     truth_path(log).rename(tmp_path / "elsewhere")
     assert cli.main(words) == 2
-    assert "no such file; psabench run --record writes it beside the log" in capsys.readouterr().err
+    assert "expected the true motion, which psabench run --record writes, got no such file" in capsys.readouterr().err
 
 
 def test_another_bench_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,8 +11,8 @@ from psabench import cli
 from psabench.conform.sources import mf4
 from psabench.emulator import Emulator
 from psabench.link.log_file import FORMATS, LogFile
+from psabench.logs.call_log import calls_path
 from psabench.logs.formats import READABLE, read_frames
-from psabench.procedures.recorded_head import calls_path
 from rig import PSABENCH
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]

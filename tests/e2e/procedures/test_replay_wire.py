@@ -12,8 +12,8 @@ from psabench import cli
 from psabench.conform.sources import mf4
 from psabench.emulator import Emulator
 from psabench.link.log_file import LogFile
+from psabench.logs.call_log import calls_path
 from psabench.logs.formats import KEEPS, READABLE, read_frames
-from psabench.procedures.call_log import calls_path
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]
 

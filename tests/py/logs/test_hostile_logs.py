@@ -16,8 +16,8 @@ import can
 import numpy as np
 import pytest
 import zstandard
-from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Message
+from mcap.data_stream import RecordBuilder
 from psabench import cli
 from psabench.conform.sources import blf, mf4
 from psabench.errors import BadInput
@@ -143,7 +143,7 @@ def test_a_small_mcap_of_many_empty_messages_takes_little_memory(tmp_path: Path)
 @pytest.mark.parametrize(
     ("data", "why"),
     [
-        (mcap(raw_channel(), message(b"[" * 4000)), "JSON nested less deep"),
+        (mcap(raw_channel(), message(b"[" * 4000)), "JSON nested too deep"),
         (mcap(raw_channel(), message(b'{"x":' * 100_000)), "records of 4096 bytes at most"),
         (mcap(raw_channel({str(n): "" for n in range(120_000)})), "records of 1048576 bytes at most"),
         (MAGIC + struct.pack("<BQ", 6, 1 << 63), "a record is cut"),

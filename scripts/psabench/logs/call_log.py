@@ -41,7 +41,7 @@ class Calls:
         self._log, self.path = log, calls_path(log)
         self._rows = _read_calls(self.path)
         self._at = 0
-        row = self.next(SETUP, None)
+        row = self.next_call(SETUP, None)
         try:
             self.setup: dict[str, Any] = dict(json.loads(row["argument"]))
             _ = dict(self.setup["facts"]), self.setup["procedure"]
@@ -72,12 +72,12 @@ class Calls:
         """File and line of the last call."""
         return f"{self.path}:{self._at + 1}"
 
-    def comes(self, call: str, argument: str) -> bool:
+    def comes_next(self, call: str, argument: str) -> bool:
         """Whether this is the next call."""
         row = self._rows[min(self._at, len(self._rows) - 1)]
         return (row["call"], row["argument"]) == (call, argument)
 
-    def next(self, call: str, argument: str | None) -> dict[str, str]:
+    def next_call(self, call: str, argument: str | None) -> dict[str, str]:
         """The next call of the recording. Raises BadInput when the procedure makes another one."""
         row = self._rows[min(self._at, len(self._rows) - 1)]
         self._at += 1
