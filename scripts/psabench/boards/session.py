@@ -42,7 +42,7 @@ class Session:
     groups: Mapping[str, str]  # lines under a heading; "*": those of the parallel bus
 
 
-def period(name: str, color: int, line: str) -> Stack:
+def period_stack(name: str, color: int, line: str) -> Stack:
     """The time from each rise of a line to the next."""
     return Stack(name, color, (Decoder("timing", {"edge": "rising"}, hidden=(1, 2)),), {"Data": line})
 

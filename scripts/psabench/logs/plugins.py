@@ -14,7 +14,7 @@ from pathlib import Path
 import pymavlink.dialects.v20
 from pymavlink.generator import mavgen, mavparse
 
-from psabench.errors import BadInput, output_error
+from psabench.errors import BadInput, expected, output_error
 from psabench.places import proto_file
 
 STANDARD = ("common", "standard", "minimal")  # as psabench.xml includes them, one another
@@ -56,5 +56,5 @@ def mavlink_dissector() -> str:
         with contextlib.redirect_stdout(report), contextlib.redirect_stderr(report):
             done = mavgen.mavgen(options, [str(xml)])
         if done is False:
-            raise BadInput(f"{xml.name}: mavgen --lang WLua: {report.getvalue()}")
+            raise BadInput(expected("a definition that mavgen takes", report.getvalue().strip(), xml.name))
         return (folder / MAVLINK).read_text(encoding="utf-8")

@@ -41,7 +41,7 @@ def _stack_lines(stack: Stack) -> Iterator[str]:
         yield from (f"{at}id={decoder.id}", f"{at}visible=true", f"{at}options={len(decoder.options)}")
         for k, (name, value) in enumerate(decoder.options.items()):
             yield f"{at}option{k}\\name={name}"
-            yield from (f"{at}option{k}\\{rest}" for rest in _option(value))
+            yield from (f"{at}option{k}\\{rest}" for rest in _option_lines(value))
         yield from (f"{at}row{row}\\visible=false" for row in decoder.hidden)
     yield f"channels={len(stack.channels)}"
     for n, (name, line) in enumerate(stack.channels.items()):
@@ -49,7 +49,7 @@ def _stack_lines(stack: Stack) -> Iterator[str]:
         yield from (f"{at}name={name}", f"{at}initial_pin_state=2", f"{at}assigned_signal_name={line}")
 
 
-def _option(value: str | int) -> tuple[str, str]:
+def _option_lines(value: str | int) -> tuple[str, str]:
     """A GVariant: bytes of a text with its end, or of a 64-bit number, in Qt's escapes; and its type."""
     if isinstance(value, str):
         return f'value="@ByteArray({value}\\0)"', "type=s"

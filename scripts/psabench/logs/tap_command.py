@@ -44,7 +44,7 @@ def _tap(args: argparse.Namespace) -> int:
     from psabench.logs import tap
 
     if not args.port.exists():
-        raise BadInput(f"{args.port}: no such file")
+        raise BadInput(expected("a serial port", "no such file", args.port))
     if args.out.exists() and args.port.samefile(args.out):
         raise BadInput(expected("another file than the one that is read", args.out, "OUT"))
     with tap.tap_file(args.kind, args.out) as t:

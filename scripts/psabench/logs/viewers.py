@@ -46,16 +46,18 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     window = p.add_argument_group("a window of FILE, as a picture")
     window.add_argument("--wavedrom", type=Path, metavar="OUT", help="WaveDrom JSON, a column a tick")
     window.add_argument("--svg", type=Path, metavar="OUT", help="SVG")
-    window.add_argument("--from", dest="from_ns", type=_ns, metavar="TIME", help="such as 9.878ms (the first instant)")
-    window.add_argument("--to", dest="to_ns", type=_ns, metavar="TIME", help="(the last instant)")
+    window.add_argument(
+        "--from", dest="from_ns", type=_time_ns, metavar="TIME", help="such as 9.878ms (the first instant)"
+    )
+    window.add_argument("--to", dest="to_ns", type=_time_ns, metavar="TIME", help="(the last instant)")
     window.add_argument("--lines", metavar="NAMES", help="such as Int,Data,CLK; D for D0, D1 ... as a number (all)")
     tick = "length of a column (the longest that shows every edge)"
-    window.add_argument("--tick", dest="tick_ns", type=_ns, default=0, metavar="TIME", help=tick)
+    window.add_argument("--tick", dest="tick_ns", type=_time_ns, default=0, metavar="TIME", help=tick)
     window.add_argument("--title", default="", help="(name of FILE)")
     return p.parse_args(words)
 
 
-def _ns(text: str) -> int:
+def _time_ns(text: str) -> int:
     """Nanoseconds of a time such as 5ms."""
     try:
         return round(number(text, "s") * NS_PER_S)

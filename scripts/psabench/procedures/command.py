@@ -300,7 +300,7 @@ def _compare(args: argparse.Namespace) -> int:
     p = compare_converters.CompareParams()
     if args.replay:
         refuse_beside_replay({"--record": args.record, "--scenario": args.scenario, "--seed": args.seed})
-        c = comparison.replay(args.out, p, Bar(), args.replay)
+        c = comparison.replay_comparison(args.out, p, Bar(), args.replay)
     else:
         c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed, record=args.record)
     page = comparison_page.write(args.out, c)

@@ -274,7 +274,7 @@ def compare(
     return _grade_tracks(tracks, motion, p, facts)
 
 
-def replay(out: Path, p: CompareParams, progress: Progress, log: Path) -> Comparison:
+def replay_comparison(out: Path, p: CompareParams, progress: Progress, log: Path) -> Comparison:
     """The same from a recording. Raises BadInput."""
     bench: Any = RecordedBench(log)
     check_procedure(log, bench.setup, measured.NAME)

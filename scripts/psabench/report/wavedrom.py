@@ -36,12 +36,15 @@ def wavedrom_text(vcd: Vcd, window: Window, title: str) -> str:
     """The JSON file. Raises ValueError: no such line, an empty window, too many columns."""
     wires = [_wires_of(vcd, name) for name in window.lines]
     _need_time(vcd, window)
-    edges = _edges(vcd, [wire for names in wires for wire in names], window)
-    tick_ns, first_ns = _grid(edges, window)
+    edges = _edge_instants(vcd, [wire for names in wires for wire in names], window)
+    tick_ns, first_ns = _column_grid(edges, window)
     at_ns = np.arange(first_ns, window.end_ns + 1, tick_ns)
-    signal = [_signal(name, _levels(vcd, names, at_ns), names) for name, names in zip(window.lines, wires, strict=True)]
+    signal = [
+        _signal_row(name, _column_levels(vcd, names, at_ns), names)
+        for name, names in zip(window.lines, wires, strict=True)
+    ]
     foot = f"a column is {tick_ns} ns, the first begins at {first_ns} ns"
-    return "\n".join(_pretty(signal, title, foot, {"skin": "narrow"} if len(at_ns) >= NARROW_COLUMNS else {}))
+    return "\n".join(_json_lines(signal, title, foot, {"skin": "narrow"} if len(at_ns) >= NARROW_COLUMNS else {}))
 
 
 def window_picture(vcd: Vcd, windows: Sequence[Window], title: str) -> str:
@@ -70,7 +73,7 @@ def _need_time(vcd: Vcd, window: Window) -> None:
         raise ValueError(expected(span, f"from {window.start_ns} to {window.end_ns} ns", "window"))
 
 
-def _edges(vcd: Vcd, wires: Sequence[str], window: Window) -> list[Ints]:
+def _edge_instants(vcd: Vcd, wires: Sequence[str], window: Window) -> list[Ints]:
     """Of each line, instants of its changes inside the window."""
     found = []
     for wire in wires:
@@ -79,7 +82,7 @@ def _edges(vcd: Vcd, wires: Sequence[str], window: Window) -> list[Ints]:
     return found
 
 
-def _grid(edges: Sequence[Ints], window: Window) -> tuple[int, int]:
+def _column_grid(edges: Sequence[Ints], window: Window) -> tuple[int, int]:
     """Tick and begin of the first column, at the window's begin or up to a tick before it.
 
     By default every edge begins a column where so many columns do, else the shortest pulse is a column.
@@ -107,14 +110,14 @@ def _columns_of(span_ns: int, tick_ns: int) -> int:
     return span_ns // tick_ns + 2
 
 
-def _levels(vcd: Vcd, wires: Sequence[str], at_ns: Ints) -> list[int]:
+def _column_levels(vcd: Vcd, wires: Sequence[str], at_ns: Ints) -> list[int]:
     """The number that the lines are, bit 0 first, in each column."""
     bits = [vcd.wires[wire].at(at_ns).astype(np.int64) << bit for bit, wire in enumerate(wires)]
     return [int(value) for value in np.sum(bits, axis=0)]
 
 
-def _signal(name: str, levels: Sequence[int], wires: Sequence[str]) -> dict[str, object]:
-    wave = "".join(_marks(levels, len(wires)))
+def _signal_row(name: str, levels: Sequence[int], wires: Sequence[str]) -> dict[str, object]:
+    wave = "".join(_wave_marks(levels, len(wires)))
     if len(wires) == 1:
         return {"name": name, "wave": wave}
     digits = (len(wires) + 3) // 4
@@ -122,14 +125,14 @@ def _signal(name: str, levels: Sequence[int], wires: Sequence[str]) -> dict[str,
     return {"name": f"{name}[{len(wires) - 1}:0]", "wave": wave, "data": [f"{v:0{digits}X}h" for v in values]}
 
 
-def _marks(levels: Sequence[int], bits: int) -> Iterator[str]:
+def _wave_marks(levels: Sequence[int], bits: int) -> Iterator[str]:
     before = None
     for level in levels:
         yield "." if level == before else str(level) if bits == 1 else "="
         before = level
 
 
-def _pretty(signal: Sequence[dict[str, object]], title: str, foot: str, config: dict[str, str]) -> Iterator[str]:
+def _json_lines(signal: Sequence[dict[str, object]], title: str, foot: str, config: dict[str, str]) -> Iterator[str]:
     """JSON with a line a signal."""
     yield '{"signal": ['
     yield ",\n".join("  " + json.dumps(row, ensure_ascii=False) for row in signal)

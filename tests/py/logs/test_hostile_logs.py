@@ -16,8 +16,8 @@ import can
 import numpy as np
 import pytest
 import zstandard
-from mcap.records import Channel, Chunk, Message
 from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Chunk, Message
 from psabench import cli
 from psabench.conform.sources import blf, mf4
 from psabench.errors import BadInput

@@ -30,7 +30,7 @@ def recorded(folder: Path, board: str, *extra: str) -> Path:
     scenario, vcd = folder / "unit.yaml", folder / "run.vcd"
     scenario.write_text(f"units:\n  - {{name: a, board: {board}}}\n")
     on_platform = board == "gyro"  # which has no unit without one
-    options = ["--for", "5ms", "--vcd", vcd, *(["--unit", "gyro"] if on_platform else []), *extra]
+    options: list[str | Path] = ["--for", "5ms", "--vcd", vcd, *(["--unit", "gyro"] if on_platform else []), *extra]
     with Emulator(
         "gyrocompass" if on_platform else scenario, cans=["none"], pace="free", control=False, extra=options
     ) as emu:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from psabench.boards.board import Beat, Board, Setting
 from psabench.boards.objects import GyroObjects
-from psabench.boards.session import GREEN, Session, period
+from psabench.boards.session import GREEN, Session, period_stack
 
 LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
 
 SESSION = Session(
-    stacks=(period("Steps", GREEN, "STEP"),),
+    stacks=(period_stack("Steps", GREEN, "STEP"),),
     from_ns=195_000_000,
     scale="2e-04",
     comment="Opens on the first steps; the lines carry\nthe names of docs/boards/gyro.md.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import PARALLEL_BUS, Board, Bus, Fields, bits
-from psabench.boards.session import GREEN, ORANGE, Decoder, Session, Stack, bus_stack, period
+from psabench.boards.session import GREEN, ORANGE, Decoder, Session, Stack, bus_stack, period_stack
 
 _AXES = ("X", "Y", "Z")
 
@@ -28,7 +28,7 @@ SESSION = Session(
             )
             for line in _PULSES
         ),
-        period("Latch", ORANGE, "LATCH"),
+        period_stack("Latch", ORANGE, "LATCH"),
         bus_stack(PARALLEL_BUS),
     ),
     from_ns=9_500_000,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.board import PARALLEL_BUS, Beat, Bits, Board, Bus, Fields, bits
-from psabench.boards.session import GREEN, Session, bus_stack, period
+from psabench.boards.session import GREEN, Session, bus_stack, period_stack
 
 _AXES = ("X", "Y", "Z")
 _INTEGRATORS = ("X", "Y", "Z", "K")
@@ -29,7 +29,7 @@ FIELDS: Fields = {
 }
 
 SESSION = Session(
-    stacks=(period("Samples", GREEN, "SH"), bus_stack(PARALLEL_BUS)),
+    stacks=(period_stack("Samples", GREEN, "SH"), bus_stack(PARALLEL_BUS)),
     from_ns=9_500_000,
     scale="2e-05",
     trace_height=14,

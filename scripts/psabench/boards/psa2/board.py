@@ -47,7 +47,9 @@ FIELDS: Fields = {
 }
 
 
-def _spi(*, miso: str, mosi: str, above: Decoder, options: Mapping[str, str | int], name: str, color: int) -> Stack:
+def _spi_stack(
+    *, miso: str, mosi: str, above: Decoder, options: Mapping[str, str | int], name: str, color: int
+) -> Stack:
     """A converter of PSA-2. SClk is for the accelerometer converters while CST is high."""
     lowest = Decoder("spi", options, hidden=(0, 2, 3, 5, 6))
     return Stack(name, color, (lowest, above), {"CLK": "SClk", "MISO": miso, "MOSI": mosi, "CS#": "CST"})
@@ -56,7 +58,7 @@ def _spi(*, miso: str, mosi: str, above: Decoder, options: Mapping[str, str | in
 SESSION = Session(
     stacks=(
         Stack("Frame", GREEN, (Decoder("psa2frame", hidden=(0,)),), {"INT": "Int", "DATA": "Data", "CLK": "CLK"}),
-        _spi(
+        _spi_stack(
             name="Accelerometers",
             color=PURPLE,
             miso="DOutX",
@@ -64,7 +66,7 @@ SESSION = Session(
             options={"cs_polarity": "active-high"},
             above=Decoder("ads128x"),
         ),
-        _spi(
+        _spi_stack(
             name="Temperature",
             color=ORANGE,
             miso="DOutT",
