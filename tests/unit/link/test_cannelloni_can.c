@@ -115,6 +115,22 @@ static void what_waits_fills_datagrams_and_stays_in_order(void **state)
     down(r);
 }
 
+static void without_a_peer_nothing_is_held_up_or_reported(void **state)
+{
+    struct bench *r = up(0);
+    struct can_msg m = {.flags = CAN_FD, .len = 64};
+    (void)state;
+    close(r->fd); /* the kernel answers each datagram with "port unreachable" */
+    for (; m.id < 100; m.id++) assert_int_equal(can_send(&r->bus, &r->other, &m, 0), CAN_OK);
+    run(r, 1);
+    r->c.io.link.flush(&r->c.io.link, r->s.now_ns);
+    assert_int_equal(r->c.io.can.delivered, 100);
+    assert_int_equal(r->c.io.can.dropped, 0);
+    assert_int_equal(r->c.io.link.pending, 0);
+    assert_string_equal(r->said, "");
+    cannelloni_can_close(&r->c);
+}
+
 /* ---- peer to bus */
 
 static void frames_without_room_wait_and_the_next_datagram_with_them(void **state)
@@ -198,6 +214,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_waits_fills_datagrams_and_stays_in_order),
+        cmocka_unit_test(without_a_peer_nothing_is_held_up_or_reported),
         cmocka_unit_test(frames_without_room_wait_and_the_next_datagram_with_them),
         cmocka_unit_test(a_datagram_lost_in_the_kernel_is_counted_once_and_others_besides),
         cmocka_unit_test(a_frame_that_cannot_be_is_refused_alone_and_said),
