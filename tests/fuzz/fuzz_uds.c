@@ -133,7 +133,7 @@ static void op_frame(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
     struct can_msg m = {.id = b & 7 ? REQUEST : TO_ALL, .len = b >> 3 & 7, .flags = b >> 6 == 3 ? CAN_RTR : 0};
-    m.len += m.len == 7;
+    m.len = (uint8_t)(m.len + (m.len == 7));
     for (unsigned i = 0; i < m.len; i++) m.data[i] = script_byte(s);
     mark_asked(w, &m);
     put(w, &m);
@@ -156,7 +156,7 @@ static void op_object(struct world *w, struct script *s)
     const struct co_entry *e = &psa2_od.entry[script_uint(s, 2) % psa2_od.count];
     const uint8_t b = script_byte(s);
     const unsigned did =
-        e->index >= 0x2000 && e->index < 0x2080 ? 0x2000 + 0x40 * (e->index - 0x2000u) + e->sub : 0xF187 + (b >> 4);
+        e->index >= 0x2000 && e->index < 0x2080 ? 0x2000 + 0x40 * (e->index - 0x2000u) + e->sub : 0xF187u + (b >> 4);
     struct can_msg m = {
         .id = REQUEST, .len = 8, .data = {(b & 3) == 3 ? 7 : 3, 0x22, (uint8_t)(did >> 8), (uint8_t)did}};
     for (unsigned i = 4; i < 8; i++) m.data[i] = (b & 3) == 3 ? m.data[i - 2] : 0xCC;
