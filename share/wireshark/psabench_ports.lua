@@ -164,7 +164,7 @@ function bus.dissector(tvb, pinfo, tree)
     branch:add(b.text, tvb(), shown(tvb))
     pinfo.cols.protocol = "busport"
     pinfo.cols.info = way() .. shown(tvb)
-    local line = tvb:raw():gsub("[\r\n]+$", ""):gsub("%s+", " ")
+    local line = tvb:raw():gsub("[\r\n]+$", ""):gsub("%s+", " "):gsub("^ ", "")
     if not from_board() then line = line:upper() end
     local kind = bus_fields(tvb, branch, line)
     if not kind then

@@ -233,7 +233,7 @@ class Relay:
             return os.read(end, BLOCK)
         except BlockingIOError:
             return None
-        except OSError:  # EIO: a pseudo-terminal whose other end was closed
+        except OSError:  # an adapter that was unplugged
             return b""
 
     def _write(self, end: int) -> None:

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -147,6 +147,92 @@ def test_torn_frames_and_lost_samples_are_marked(tmp_path: Path) -> None:
     assert cli.main(["tap", "line", str(raw), str(out)]) == 0
     rows = tshark(out, "psabench_line.torn", "psabench_line.lost", "psabench_line.x")
     assert [[bool(v) for v in row] for row in rows] == [[False, False, True], [True, False, False], [False, True, True]]
+
+
+OUT, IN = tap.TO_BOARD, tap.FROM_BOARD
+NINES = "9" * 400
+SLCAN = (  # direction, line, kind, identifier, length, time stamp
+    (OUT, "t1853102030\r", "frame", "389", "3", ""),
+    (IN, "T1ABCDEF02AABB1234\r", "frame", "448585456", "2", "4660"),
+    (IN, "r7FF8\r", "frame", "2047", "8", ""),
+    (OUT, "b0019" + "11" * 12 + "\r", "frame", "1", "12", ""),
+    (OUT, "d001F" + "11" * 64 + "\r", "frame", "1", "64", ""),
+    (OUT, "t185310203\r", "unknown", "", "", ""),
+    (OUT, "t18531020304\r", "unknown", "", "", ""),
+    (OUT, "t0019" + "11" * 12 + "\r", "unknown", "", "", ""),
+    (OUT, "t8001AA\r", "unknown", "", "", ""),
+    (OUT, "T200000001AA\r", "unknown", "", "", ""),
+    (OUT, "t1853102030\a", "unknown", "", "", ""),
+    (OUT, "O\r", "open", "", "", ""),
+    (IN, "O\r", "unknown", "", "", ""),
+    (IN, "\a", "rejected", "", "", ""),
+    (OUT, "\a", "unknown", "", "", ""),
+    (IN, "F24\r", "status", "", "", ""),
+)
+BUS = (  # direction, line, kind, address, data, strobe, time
+    (OUT, "r 0fH 200\r\n", "read", "0x0f", "", "200", ""),
+    (OUT, "  W  3 12\n", "write", "0x03", "0x0012", "", ""),
+    (OUT, f"R 3 {NINES}\n", "read", "0x03", "", str(2**32 - 1), ""),
+    (IN, f"R 03h 8000 t={NINES}\n", "read", "0x03", "0x8000", "", str(2**53)),
+    (IN, "E busy R 02h t=5000000000\n", "rejected", "0x02", "", "", "5000000000"),
+    (IN, "E syntax - - t=7\n", "rejected", "", "", "", "7"),
+    (IN, "I pik 00h=X 01h=Y t=8\n", "board", "", "", "", "8"),
+    (IN, "R 3\n", "unknown", "", "", "", ""),
+    (OUT, "R 03h 8000 t=5\n", "unknown", "", "", "", ""),
+    (OUT, "W 3 12345\n", "unknown", "", "", "", ""),
+)
+
+
+@NEEDS_TSHARK
+@pytest.mark.parametrize(
+    ("kind", "lines", "fields"),
+    [
+        ("slcan", SLCAN, ("psabench_slcan.kind", "can.id", "can.len", "psabench_slcan.stamp_ms")),
+        ("bus", BUS, tuple(f"psabench_bus.{name}" for name in ("kind", "address", "data", "strobe_ns", "t_ns"))),
+    ],
+)
+def test_lines_right_and_wrong(
+    kind: str, lines: Sequence[tuple[int | str, ...]], fields: Sequence[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "run.pcap"
+    with tap.tap_file(kind, out) as t:
+        for way, text, *_ in lines:
+            t.take(int(way), str(text).encode(), lambda at: at)
+    assert t.cut == 0
+    rows = tshark(out, "_ws.lua.error", *fields)
+    assert [tuple(row[1:]) for row in rows] == [tuple(line[2:]) for line in lines]
+    assert not any(row[0] for row in rows)
+
+
+@NEEDS_TSHARK
+def test_words_of_16_24_and_32_bits_on_the_line_port(tmp_path: Path) -> None:
+    out, low, high, bits = tmp_path / "run.pcap", b"\0", b"\4", b"\2\6"
+    words = {size: [1 << (size - 1), 5, (1 << size) - 2, 0x1234] for size in (16, 24, 32)}
+    stream = b"".join(
+        b"\1" + b"".join((bits if word >> k & 1 else low + high) for word in four for k in range(size)) + b"\0\5\1"
+        for size, four in words.items()
+    )
+    with tap.tap_file("line", out) as t:
+        t.take(IN, stream + b"\0" * 8 + b"\1", lambda at: at)
+    rows = tshark(out, *(f"psabench_line.{name}" for name in "x y z t bits torn channel".split()))
+    assert [[int(v, 0) for v in row[:5]] for row in rows[:3]] == [
+        [-(1 << (size - 1)), 5, -2, 0x1234, 4 * size] for size in words
+    ]
+    assert [(row[4], bool(row[5]), bool(row[6])) for row in rows] == [
+        ("64", False, False), ("96", False, True), ("128", False, True), ("0", True, False)
+    ]  # fmt: skip
+
+
+def test_the_file_is_that_of_wireshark(tmp_path: Path) -> None:
+    """Header of link type 252 with stamps of 1 ns; tags padded to four bytes."""
+    out = tmp_path / "run.pcap"
+    with tap.tap_file("slcan", out) as t:
+        t.take(IN, b"V1013\rz", lambda at: 5_000_000_007)
+    assert out.read_bytes().hex(" ", -4) == (
+        "4d3cb2a1 02000400 00000000 00000000 00040100 fc000000"
+        " 05000000 07000000 26000000 26000000"
+        " 000c0010 70736162 656e6368 5f736c63 616e0000 00230004 00000001 00000000 56313031 330d"
+    )
 
 
 def spelled(kind: str, draw: random.Random) -> bytes:
