@@ -133,7 +133,7 @@ static void op_frame(struct world *w, struct script *s)
 {
     const uint8_t b = script_byte(s);
     struct can_msg m = {.id = b & 7 ? REQUEST : TO_ALL, .len = b >> 3 & 7, .flags = b >> 6 == 3 ? CAN_RTR : 0};
-    m.len = (uint8_t)(m.len + (m.len == 7));
+    if (m.len == 7) m.len = 8;
     for (unsigned i = 0; i < m.len; i++) m.data[i] = script_byte(s);
     mark_asked(w, &m);
     put(w, &m);

@@ -18,13 +18,14 @@ pytestmark = pytest.mark.host
 PAGE, FILES = "docs/new_board.md", ROOT / "tests/toy_board"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SHARED_MAX = 2  # files that a board edits by hand
-# What gen_proto.py writes: messages and objects of all boards, and two files of the board's own.
+# What gen_proto.py writes: messages, objects and UDS identifiers of all boards, and two files of the board's own.
 GENERATED = {
     "proto/psabench.dbc",
     "scripts/psabench/boards/objects.py",
     "scripts/psabench/boards/parameters.py",
     "proto/toy.eds",
     "docs/reference/protocol_toy.md",
+    "docs/tools/uds.md",
 }
 STEP_S = 300
 NEEDED = (
