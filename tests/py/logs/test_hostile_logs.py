@@ -232,10 +232,3 @@ def test_a_page_that_is_named_twice_ends_a_database(tmp_path: Path) -> None:
     frames, error = read(tmp_path / "x.db", bytes(data))
     assert "expected a row behind" in error
     assert 0 < frames < 500
-
-
-def test_the_reader_of_a_database_leaves_it_alone(good: Callable[[str], bytes], tmp_path: Path) -> None:
-    path = tmp_path / "x.db"
-    read(path, good(".db"))
-    assert path.read_bytes() == good(".db")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["x.db"]
