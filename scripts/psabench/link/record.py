@@ -80,13 +80,14 @@ def record(
 
 @contextmanager
 def ctrl_c_noted() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C is the usual way to end a recording; it takes effect between two messages, never inside one."""
+    """Ctrl-C is the usual way to end a recording, SIGTERM of a script: between two messages, never inside one."""
     pressed: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    before = {s: signal.signal(s, lambda number, _: pressed.append(number)) for s in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield lambda: bool(pressed)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def receive_until(

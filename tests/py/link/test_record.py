@@ -25,8 +25,9 @@ class Endless(can.BusABC):
 
 @pytest.mark.parametrize("ending", [".log", ".blf", ".asc"])
 @pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_falls_between_two_messages(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str, ending: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str, ending: str, number: signal.Signals
 ) -> None:
     path = tmp_path / f"bus{ending}"
     written = 0
@@ -36,15 +37,21 @@ def test_ctrl_c_falls_between_two_messages(
             nonlocal written
             written += 1
             if when == "before" and written == 3:
-                os.kill(os.getpid(), signal.SIGINT)
+                os.kill(os.getpid(), number)
             stored = super().__call__(m)
             if when == "after" and written == 3:
-                os.kill(os.getpid(), signal.SIGINT)
+                os.kill(os.getpid(), number)
             return stored
 
     monkeypatch.setattr(module, "LogFile", Interrupted)
-    handler = signal.getsignal(signal.SIGINT)
-    recorded = record(Endless(), path, node=5, for_s=10.0, count=None)
-    assert signal.getsignal(signal.SIGINT) is handler
+    def unnoted(*_: object) -> None:
+        raise AssertionError("the signal did not only end the recording")
+
+    before = signal.signal(number, unnoted)
+    try:
+        recorded = record(Endless(), path, node=5, for_s=10.0, count=None)
+        assert signal.getsignal(number) is unnoted
+    finally:
+        signal.signal(number, before)
     with can.LogReader(path) as logged:
         assert len(list(logged)) == recorded.stored == 3
