@@ -216,6 +216,9 @@ def open_bus(spec: str | None) -> can.BusABC:
             bus.serialPortOrig = ReadAhead(port)  # type: ignore[attr-defined]
         return bus
     except (can.CanInterfaceNotImplementedError, ValueError, TypeError) as e:
+        if spec is None:
+            what = "INTERFACE:CHANNEL[,key=value], or an interface in $CAN_INTERFACE or ~/.canrc"
+            raise BadInput(expected(what, f"none that python-can opens ({e})", "--can")) from e
         raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
         raise LinkError(f"--can {spec}: {e}") from e

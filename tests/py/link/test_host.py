@@ -310,6 +310,13 @@ def test_an_old_answer_between_the_segments_of_a_string_is_left_out() -> None:
 # ---- opening a bus
 
 
+def test_no_bus_says_where_one_could_be_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))  # no ~/.canrc
+    monkeypatch.delenv("CAN_INTERFACE", raising=False)
+    with pytest.raises(BadInput, match=r"^--can: expected INTERFACE:CHANNEL.*\$CAN_INTERFACE.*, got none"):
+        open_bus(None)
+
+
 @pytest.mark.parametrize(
     "spec", ["", "socketcand", "socketcand:", "socketcand:127.0.0.1", "slcan:/dev/x,fd", "frobnicate:x", "socketcan:"]
 )

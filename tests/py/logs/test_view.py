@@ -144,7 +144,7 @@ def test_a_port_in_use_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert cli.main(["view", "--can", "virtual:x", "--port", str(port)]) == 2
-    assert f"--port: 127.0.0.1:{port}: " in capsys.readouterr().err
+    assert f"--port: expected a free port of 127.0.0.1, or 0 (any free port), got {port} (" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "x"])
