@@ -41,7 +41,10 @@ def safe_blf(path: Path) -> Iterator[tuple[io.BytesIO, str]]:
 
 
 def _whole_objects(file: io.BufferedReader) -> Iterator[tuple[bytes, str]]:
-    """Objects of one container after the other; one that goes on in the next container comes with that."""
+    """Objects of one container after the other; one that goes on in the next container comes with that.
+
+    One that goes on in a container that is not there was never stored whole: so ends a recording on a full disk.
+    """
     rest, before = b"", 0  # unpacked bytes before the rest
     for part, trouble in _unpacked(file):
         objects = rest + part
@@ -53,8 +56,6 @@ def _whole_objects(file: io.BufferedReader) -> Iterator[tuple[bytes, str]]:
         if len(rest) > MOST_UNPACKED:
             yield b"", f"an object of more than {MOST_UNPACKED} bytes at unpacked byte {before}"
             return
-    if len(rest) >= BASE.size:
-        yield b"", f"the last object, at unpacked byte {before}, is cut"
 
 
 def _container(objects: bytes) -> bytes:
