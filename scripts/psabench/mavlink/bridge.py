@@ -15,15 +15,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import can
-
 from psabench.bench import Bench
 from psabench.boards.objects import Psa2Objects as OD
 from psabench.boards.parameters import PARAMETERS
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader
-from psabench.errors import BadInput, BenchError, DeviceError, expected, output_error
+from psabench.errors import BadInput, BenchError, DeviceError, expected
 from psabench.link.canopen_host import Described
+from psabench.logs.formats import check_readable, read_frames
 from psabench.mavlink import calibration
 from psabench.mavlink.calibration import CalibrationPlan, CalibrationResult, Cancelled
 from psabench.mavlink.dialect import mavlink
@@ -326,12 +325,11 @@ class LogBridge(Bridge):
     """A recorded log as if the board were there: at its own pace, `speed` times as fast, or (0) at once."""
 
     def __init__(self, options: BridgeOptions, path: Path, node: int, speed: float) -> None:
-        """Raises BadInput for a file that is not there."""
-        if not path.is_file():
-            raise BadInput(expected("a log of a CAN bus", "none", path))
+        """Raises BadInput for a file that is not there and for an ending that we do not read."""
+        check_readable(path)
         super().__init__(options)
         self.station.can_calibrate = False
-        self._path, self._speed = path, speed
+        self._path, self._node, self._speed = path, node, speed
         self._reader = FrameReader(node)
         for k, axis in enumerate(AXES.upper()):
             self._add_scale(f"ZERO_V_{axis}", self.scale.zero_v, k, -10.0, 10.0)
@@ -344,10 +342,14 @@ class LogBridge(Bridge):
         self.parameters.add(Parameter(name=name, value=float(values[k]), low=low, high=high, write=write))
 
     def run(self) -> None:
-        """To the end of the log; begins with the first peer. Raises BadInput for a damaged log, its good part sent."""
+        """To the end of the log; begins with the first peer.
+
+        Raises BadInput for a damaged log, its good part sent, and for one without a reading.
+        """
         self.station.start()
         while not self.station.port.peers and not self.over():
             self._settle(PEER_S)
+        self.station.send_heartbeat()  # the peer knows whose readings follow, even when all come at once
         begun_s = first_s = None
         for t_s in self._slices():
             if begun_s is None or first_s is None:
@@ -359,23 +361,21 @@ class LogBridge(Bridge):
                 return
         self.samples.take(self._reader.take())
         self._settle(PEER_S)
+        if not self.samples.count:
+            raise BadInput(expected(f"frames of node {self._node}", "none", self._path))
 
     def _slices(self) -> Iterator[float]:
         """Time of the log after each slice of it, whose frames the reader has."""
-        read, slice_s = 0, -math.inf
+        slice_s = -math.inf
         try:
-            with can.LogReader(str(self._path)) as log:
-                for read, m in enumerate(log, start=1):  # noqa: B007 (the number is in the message below)
-                    self._reader.on_message(m)
-                    if m.timestamp >= slice_s:
-                        slice_s = m.timestamp + LOG_SLICE_S
-                        yield m.timestamp
-        except OSError as e:
-            raise output_error(self._path, e) from e
-        except Exception as e:  # python-can's readers raise whatever their parsing comes to
-            self.samples.take(self._reader.take())
-            got = f"a damaged one ({e}); the {read} before it were sent"
-            raise BadInput(expected("a whole message", got, f"{self._path}: message {read + 1}")) from e
+            for m in read_frames(self._path):
+                self._reader.on_message(m)
+                if m.timestamp >= slice_s:
+                    slice_s = m.timestamp + LOG_SLICE_S
+                    yield m.timestamp
+        except BadInput:
+            self.samples.take(self._reader.take())  # what came before the damage is good
+            raise
 
     def _settle(self, for_s: float) -> None:
         """Do the station's jobs for this real time."""

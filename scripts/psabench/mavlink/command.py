@@ -87,7 +87,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     group.add_argument("--real-time", action="store_true", help="that emulator calibrates at wall-clock pace, too")
     group.add_argument("--node", type=node_id, default=DBC_NODE, metavar="N", help="CANopen node (%(default)s)")
     group = p.add_argument_group("a log instead")
-    group.add_argument("--log", type=Path, metavar="FILE", help="recorded log (python-can formats)")
+    group.add_argument("--log", type=Path, metavar="FILE", help="recorded log, in a format that psabench decode reads")
     group.add_argument("--speed", type=float, default=1.0, metavar="X", help="1: as recorded; 0: as fast as possible")
     group = p.add_argument_group("calibration")
     group.add_argument("--procedure", choices=list(ON_THE_HEAD), default="turns", help="procedure (%(default)s)")

@@ -109,6 +109,10 @@ class Station:
             self._mav.seq = (self._mav.seq + 1) % 256
             self.messages_sent += 1
 
+    def send_heartbeat(self) -> None:
+        state = 3 if self._calibrating is None else 2  # MAV_STATE: standby, calibrating
+        self.send(mavlink().MAVLink_heartbeat_message(0, self.identity.autopilot, 0, 0, state, 3))
+
     def text(self, severity: int, text: str) -> None:
         """STATUSTEXT, in chunks where it is longer than one holds."""
         raw = text.encode("ascii", "replace")
@@ -165,7 +169,7 @@ class Station:
             while not self._stop.is_set():
                 now_s = time.monotonic()
                 if now_s >= beat_s:
-                    self._send_heartbeat()
+                    self.send_heartbeat()
                     beat_s = max(beat_s + HEARTBEAT_S, now_s)
                 for m in self._poll():
                     self.received += 1
@@ -175,10 +179,6 @@ class Station:
 
     def _poll(self) -> list[Any]:
         return self.port.poll(POLL_S)
-
-    def _send_heartbeat(self) -> None:
-        state = 3 if self._calibrating is None else 2  # MAV_STATE: standby, calibrating
-        self.send(mavlink().MAVLink_heartbeat_message(0, self.identity.autopilot, 0, 0, state, 3))
 
     def take(self, m: Any) -> None:
         """One message of a peer."""
@@ -271,7 +271,7 @@ class Station:
 
     def _send_requested(self, number: int) -> bool:
         if number == 0:
-            self._send_heartbeat()
+            self.send_heartbeat()
         elif number == 148:  # AUTOPILOT_VERSION: MAVLink 2, parameters bytewise, COMMAND_INT
             self.send(
                 mavlink().MAVLink_autopilot_version_message(

@@ -13,10 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from mavlink_client import TIMEOUT_S, command, free_port, parameters, receive, set_parameter, station
 from psabench.emulator import Emulator
 from psabench.link.control import Control
+from psabench.link.log_file import LogFile
 from rig import HERE, HOST, SEED, addresses, one_line, psabench
 
 pytestmark = HOST
@@ -155,7 +157,8 @@ def _signed(digits: str) -> int:
     [
         (("--mavlink", "usb"), "--mavlink: expected udp[:PORT], udpin[:PORT] or tcp[:PORT], got 'usb'"),
         (("--mavlink", "udp:0"), "--mavlink: expected a port from 1 to 65535, got 'udp:0'"),
-        (("--log", "no.log"), "no.log: expected a log of a CAN bus, got none"),
+        (("--log", "no.log"), "no.log: no such file"),
+        (("--log", "no.txt"), "no.txt: expected an ending of .asc"),
         (("--log", "x.log", "--can", "y"), "--log: expected a log or a bench, got both"),
         (("--imu", "-5"), "--imu: expected 0 or a number from 0.01 to 10000, got '-5'"),
         (("--sysid", "256"), "--sysid: expected an integer from 1 to 255, got '256'"),
@@ -180,6 +183,18 @@ def test_a_damaged_log_is_sent_up_to_the_damage(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert "message 3: expected a whole message" in said
     assert "readings 1," in said
+
+
+@pytest.mark.parametrize("ending", [".log", ".mcap", ".pcap"])
+def test_a_log_of_another_node_is_bad_input(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"other{ending}"
+    log = LogFile(path, {6: "psd1"})
+    log(can.Message(arbitration_id=0x186, data=bytes(8), is_extended_id=False, timestamp=1.0))
+    log.close()
+    process = psabench("mavlink", "--mavlink", "udp:9", "--log", path)
+    _, said = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 2
+    assert f"psabench: {path}: expected frames of node 5, got none" in said
 
 
 def test_hostile_bytes_do_not_end_the_bridge() -> None:
