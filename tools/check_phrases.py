@@ -76,7 +76,6 @@ DECLARED = {
     ("scripts/psabench/boards/gyro/device.py", "rejected by the unit"): "the unit's own text",
     ("scripts/psabench/campaign/emulated.py", "psa-emu: "): "the emulator's own text",
     ("scripts/psabench/link/canopen_host.py", "remote frames"): "not supported by the transports",
-    ("scripts/psabench/logs/python_can.py", "is damaged"): "the messages before the damage are decoded",
     ("scripts/psabench/options.py", "next(texts"): "argparse's messages, in this form where options.py knows them",
 }
 # The count of C texts of another form: states of links, files and the bus, and input texts to rewrite. Only lower it.

@@ -17,7 +17,7 @@ from psabench.errors import BadInput, expected
 from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
-from psabench.logs.formats import READABLE, read_frames
+from psabench.logs.formats import check_readable, read_frames
 
 CHUNK = 4096  # samples decoded at once
 
@@ -33,9 +33,7 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
     """
-    if path.suffix not in READABLE:
-        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
-    _check_there(path)
+    check_readable(path)
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
     if not _write(out, (_of_frames(f) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):

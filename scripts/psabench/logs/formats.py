@@ -41,14 +41,19 @@ ALL_S, ALL_FRAMES = 1e12, 1 << 40
 
 def read_frames(path: Path) -> Iterator[can.Message]:
     """Frames of a log, in the order of the file. Raises BadInput at a damage, after the frames before it."""
-    if path.suffix.lower() not in READABLE:
-        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
-    if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+    check_readable(path)
     try:
         yield from reader_of(path)(path)
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
+
+
+def check_readable(path: Path) -> None:
+    """Whether there is a log with an ending that we read; its content is not looked at. Raises BadInput."""
+    if path.suffix.lower() not in READABLE:
+        raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
+    if not path.exists() or path.is_dir():
+        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
 
 
 def reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:

@@ -20,7 +20,7 @@ MOST_LINE = 1 << 16  # characters of a line of a text log
 
 
 class _Lines(io.TextIOWrapper):
-    """Raises ValueError for a line without an end, which would fill the memory."""
+    """Raises ValueError for a line without an end: it would fill the memory, or was cut and gave a shorter frame."""
 
     def __next__(self) -> str:  # type: ignore[override]  # of the stub's base, which is of bytes
         line = self.readline(MOST_LINE + 1)
@@ -28,6 +28,8 @@ class _Lines(io.TextIOWrapper):
             raise StopIteration
         if len(line) > MOST_LINE:
             raise ValueError(expected(f"lines of {MOST_LINE} characters at most", "more"))
+        if not line.endswith("\n"):
+            raise ValueError(expected("a line feed at the end", repr(line[-40:])))
         return line
 
 
@@ -63,5 +65,5 @@ def _until_damage(path: Path, messages: Iterator[can.Message]) -> Iterator[can.M
         raise
     except Exception as e:  # no byte of a file may end us
         said = str(e)[:160] if type(e) is ValueError else f"{type(e).__name__}: {str(e)[:160]}"
-        good = f"; the {read} messages before it are decoded"
-        raise BadInput(f"{path}: message {read + 1} is damaged ({said}){good}") from e
+        got = f"a damaged one ({said}); the {read} before it are good"
+        raise BadInput(expected("a whole message", got, f"{path}: message {read + 1}")) from e

@@ -136,13 +136,13 @@ class Tap:
         return sum(cutter.cut for cutter in self.cutters)
 
     def _record(self, direction: int, t_ns: int, packet: bytes) -> bytes:
-        tags = _tag(TAG_DISSECTOR, self.dissector) + _tag(TAG_DIRECTION, struct.pack(">I", direction))
-        body = tags + _tag(TAG_END, b"") + packet
+        tags = _block_tag(TAG_DISSECTOR, self.dissector) + _block_tag(TAG_DIRECTION, struct.pack(">I", direction))
+        body = tags + _block_tag(TAG_END, b"") + packet
         seconds, ns = divmod(t_ns, NS_PER_S)
         return struct.pack("<IIII", seconds, ns, len(body), len(body)) + body
 
 
-def _tag(kind: int, value: bytes) -> bytes:
+def _block_tag(kind: int, value: bytes) -> bytes:
     padded = value.ljust(-(-len(value) // 4) * 4, b"\0")
     return struct.pack(">HH", kind, len(padded)) + padded
 
@@ -167,11 +167,11 @@ def tap_file(kind: str, path: Path) -> Iterator[Tap]:
 def read_capture(tap: Tap, source: Path, rate_hz: float) -> None:
     """Bytes that were recorded from a board. Samples have their times, lines have none. Raises BadInput, Unstored."""
     ns_per_byte = NS_PER_S / rate_hz if tap.kind == "line" else 0.0
-    for data in _blocks(source):
+    for data in _pcapng_blocks(source):
         tap.take(FROM_BOARD, data, lambda at: round(at * ns_per_byte))
 
 
-def _blocks(source: Path) -> Iterator[bytes]:
+def _pcapng_blocks(source: Path) -> Iterator[bytes]:
     try:
         with source.open("rb", buffering=0) as stream:
             while data := stream.read(BLOCK):

@@ -51,14 +51,14 @@ def _tap(args: argparse.Namespace) -> int:
         if args.port.is_file():
             tap.read_capture(t, args.port, args.line_hz)
         else:
-            _relay(args, t)
+            _relay_bytes(args, t)
     print(f"{t.packets[tap.TO_BOARD]} packets to the board, {t.packets[tap.FROM_BOARD]} from it, in {args.out}")
     if t.cut:
         print(f"{t.cut} were too long and are in pieces", file=sys.stderr)
     return 0
 
 
-def _relay(args: argparse.Namespace, t: Tap) -> None:
+def _relay_bytes(args: argparse.Namespace, t: Tap) -> None:
     from psabench.logs.tap import Relay
 
     start_ns = time.time_ns()

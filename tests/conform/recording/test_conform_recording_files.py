@@ -92,7 +92,7 @@ def test_what_came_before_a_cut_is_judged_and_said(
     assert said.passed
     printed = capsys.readouterr().out
     assert f"{path}: " in printed
-    assert any(word in printed for word in ("last line is cut", "container", "unpacked byte", "got '?broken'"))
+    assert any(word in printed for word in ("a line feed at the end", "container", "unpacked byte", "got '?broken'"))
 
 
 def test_a_damaged_chunk_of_a_session_ends_it_there(

@@ -44,6 +44,7 @@ def test_ctrl_c_falls_between_two_messages(
             return stored
 
     monkeypatch.setattr(module, "LogFile", Interrupted)
+
     def unnoted(*_: object) -> None:
         raise AssertionError("the signal did not only end the recording")
 

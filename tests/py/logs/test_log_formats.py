@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -220,6 +220,20 @@ def test_damaged_logs_end_in_bad_input_after_what_is_good(tmp_path: Path, ending
         for _ in range(chance.randrange(1, 6)):
             hurt[chance.randrange(len(hurt))] = chance.randrange(256)
         assert_bounded(path, bytes(hurt))
+
+
+@pytest.mark.parametrize("ending", [".asc", ".csv", ".log", ".trc"])
+def test_a_line_that_is_cut_is_no_frame(tmp_path: Path, ending: str) -> None:
+    path = write(tmp_path / f"bus{ending}", [m for n in range(4) for m in pair(n, n)])
+    data, whole = path.read_bytes(), [(m.arbitration_id, m.dlc, m.data) for m in read_frames(path)]
+    assert len(whole) == 8
+    for cut in range(data.rindex(b"\n", 0, len(data) // 2) + 2, len(data), 5):
+        path.write_bytes(data[:cut])
+        got = []
+        with nullcontext() if data[cut - 1 : cut] in b"\r\n" else pytest.raises(BadInput, match=r"message \d"):
+            for m in read_frames(path):
+                got.append((m.arbitration_id, m.dlc, m.data))
+        assert got == whole[: len(got)]
 
 
 def assert_bounded(path: Path, data: bytes) -> None:

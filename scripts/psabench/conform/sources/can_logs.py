@@ -16,7 +16,6 @@ from psabench.conform.sources.taken import MOST_FRAMES, Bounds, CanTake
 from psabench.errors import BadInput, expected
 from psabench.logs.formats import READABLE, reader_of
 
-TEXT = (".log", ".asc", ".trc", ".csv")
 ENDINGS = tuple(READABLE)
 EPOCH_S = 1e6  # stamps beyond are of a calendar: they are reported from the first one on
 MOST_S = 1e11  # of a stamp
@@ -41,9 +40,6 @@ def read_can(path: Path, bounds: Bounds) -> CanTake:
             frames.append(CanFrame.of(m, float(m.timestamp)))
     except BadInput as e:
         note = str(e).removeprefix(f"{path}: ")
-    if not note and frames and path.suffix.lower() in TEXT and not _ends_with_a_line(path):
-        frames.pop()
-        note = f"its last line is cut; the {len(frames)} frames before it are judged"
     note = note or trouble
     if not frames:
         raise BadInput(f"{path}: {note}" if note else expected("CAN frames", "none", path))
@@ -68,10 +64,3 @@ def _from_begin(frames: list[CanFrame]) -> tuple[CanFrame, ...]:
     if not zero_s:
         return tuple(frames)
     return tuple(f._replace(t_s=f.t_s - zero_s) for f in frames)
-
-
-def _ends_with_a_line(path: Path) -> bool:
-    """A line that is cut may still read as a frame, and would be a shorter one."""
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - 1))
-        return file.read(1) == b"\n"
