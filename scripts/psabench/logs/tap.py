@@ -41,7 +41,7 @@ class Cutter(Protocol):
 
     cut: int  # packets that were too long
 
-    def feed(self, data: bytes) -> Iterable[tuple[int, bytes]]:
+    def packets_of(self, data: bytes) -> Iterable[tuple[int, bytes]]:
         """Whole packets, each with the number of bytes before it in the stream."""
 
 
@@ -54,7 +54,7 @@ class LineCutter:
     _rest: bytes = b""
     _at: int = 0  # of the rest
 
-    def feed(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+    def packets_of(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """As Cutter says."""
         self._rest += data
         end = re.compile(b"[%b]" % re.escape(self.ends))
@@ -77,7 +77,7 @@ class FrameCutter:
     _rest: bytes = b""
     _at: int = 0
 
-    def feed(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+    def packets_of(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """As Cutter says."""
         self._rest += data
         begin = 0
@@ -123,9 +123,11 @@ class Tap:
         self.cutters, self.dissector = (make(), make()), name.encode()
         self.file.append(struct.pack("<IHHiIII", MAGIC_NS, 2, 4, 0, 0, MOST_FRAME + 1024, LINKTYPE))
 
-    def take(self, direction: int, data: bytes, stamp_ns: Callable[[int], int]) -> None:
+    def take_bytes(self, direction: int, data: bytes, stamp_ns: Callable[[int], int]) -> None:
         """Bytes that went this way; stamp_ns: the time of a packet by the bytes before it. Raises OSError."""
-        records = [self._record(direction, stamp_ns(at), packet) for at, packet in self.cutters[direction].feed(data)]
+        records = [
+            self._record_of(direction, stamp_ns(at), packet) for at, packet in self.cutters[direction].packets_of(data)
+        ]
         self.packets[direction] += len(records)
         if records:
             self.file.append(b"".join(records))
@@ -135,14 +137,14 @@ class Tap:
         """Packets that were too long."""
         return sum(cutter.cut for cutter in self.cutters)
 
-    def _record(self, direction: int, t_ns: int, packet: bytes) -> bytes:
-        tags = _block_tag(TAG_DISSECTOR, self.dissector) + _block_tag(TAG_DIRECTION, struct.pack(">I", direction))
-        body = tags + _block_tag(TAG_END, b"") + packet
+    def _record_of(self, direction: int, t_ns: int, packet: bytes) -> bytes:
+        tags = _tag_bytes(TAG_DISSECTOR, self.dissector) + _tag_bytes(TAG_DIRECTION, struct.pack(">I", direction))
+        body = tags + _tag_bytes(TAG_END, b"") + packet
         seconds, ns = divmod(t_ns, NS_PER_S)
         return struct.pack("<IIII", seconds, ns, len(body), len(body)) + body
 
 
-def _block_tag(kind: int, value: bytes) -> bytes:
+def _tag_bytes(kind: int, value: bytes) -> bytes:
     padded = value.ljust(-(-len(value) // 4) * 4, b"\0")
     return struct.pack(">HH", kind, len(padded)) + padded
 
@@ -167,11 +169,11 @@ def tap_file(kind: str, path: Path) -> Iterator[Tap]:
 def read_capture(tap: Tap, source: Path, rate_hz: float) -> None:
     """Bytes that were recorded from a board. Samples have their times, lines have none. Raises BadInput, Unstored."""
     ns_per_byte = NS_PER_S / rate_hz if tap.kind == "line" else 0.0
-    for data in _pcapng_blocks(source):
-        tap.take(FROM_BOARD, data, lambda at: round(at * ns_per_byte))
+    for data in _blocks_of(source):
+        tap.take_bytes(FROM_BOARD, data, lambda at: round(at * ns_per_byte))
 
 
-def _pcapng_blocks(source: Path) -> Iterator[bytes]:
+def _blocks_of(source: Path) -> Iterator[bytes]:
     try:
         with source.open("rb", buffering=0) as stream:
             while data := stream.read(BLOCK):
@@ -211,23 +213,23 @@ class Relay:
         for end in (self._port, self._ours, self._theirs):
             os.close(end)
 
-    def run(self, took: Callable[[int, bytes], None], deadline_s: float | None = None) -> None:
-        """Passes bytes on until the port ends, or until an instant of time.monotonic(). Raises LinkError."""
+    def pass_on(self, took: Callable[[int, bytes], None], deadline_s: float | None = None) -> None:
+        """Passes bytes on until the port ends, or until an instant of time.monotonic()."""
         while deadline_s is None or time.monotonic() < deadline_s:
             readable = [end for end, (to, _) in self._ways.items() if len(self._held[to]) < MOST_HELD]
             writable = [end for end, held in self._held.items() if held]
             come, go, _ = select.select(readable, writable, [], POLL_S)
             for end in come:
                 to, direction = self._ways[end]
-                data = self._read(end)
+                data = self._read_from(end)
                 if data == b"":
                     return
                 took(direction, data or b"")
                 self._held[to] += b"" if self._one_way else data or b""
-            for end in go:
-                self._write(end)
+            if not all(self._write_to(end) for end in go):
+                return
 
-    def _read(self, end: int) -> bytes | None:
+    def _read_from(self, end: int) -> bytes | None:
         """b"" where the other side has gone, None where there is nothing after all."""
         try:
             return os.read(end, BLOCK)
@@ -236,10 +238,12 @@ class Relay:
         except OSError:  # an adapter that was unplugged
             return b""
 
-    def _write(self, end: int) -> None:
+    def _write_to(self, end: int) -> bool:
+        """False where the other side has gone, with what it had not read."""
         try:
             self._held[end] = self._held[end][os.write(end, self._held[end]) :]
         except BlockingIOError:
-            return
-        except OSError as e:
-            raise LinkError(f"tap: {e.strerror}") from e
+            pass
+        except OSError:
+            return False
+        return True

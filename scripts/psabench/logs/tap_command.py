@@ -29,7 +29,7 @@ Stops at --for, at the end of PORT, at Ctrl-C. The dissectors: psabench waveform
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench tap`. Raises BadInput."""
     p = Parser(prog="psabench tap", description="Record what is on a serial port, for Wireshark.", epilog=EPILOG)
-    p.set_defaults(handler=_tap)
+    p.set_defaults(handler=_run_tap)
     p.add_argument("kind", choices=("slcan", "bus", "line"), help="what the port speaks")
     p.add_argument(
         "port", type=Path, metavar="PORT", help="serial port, pseudo-terminal, or file with bytes of a board"
@@ -40,25 +40,25 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _tap(args: argparse.Namespace) -> int:
+def _run_tap(args: argparse.Namespace) -> int:
     from psabench.logs import tap
 
     if not args.port.exists():
-        raise BadInput(expected("a serial port", "no such file", args.port))
+        raise BadInput(expected("a port or a file", "none", args.port))
     if args.out.exists() and args.port.samefile(args.out):
         raise BadInput(expected("another file than the one that is read", args.out, "OUT"))
     with tap.tap_file(args.kind, args.out) as t:
         if args.port.is_file():
             tap.read_capture(t, args.port, args.line_hz)
         else:
-            _relay_bytes(args, t)
+            _tap_port(args, t)
     print(f"{t.packets[tap.TO_BOARD]} packets to the board, {t.packets[tap.FROM_BOARD]} from it, in {args.out}")
     if t.cut:
         print(f"{t.cut} were too long and are in pieces", file=sys.stderr)
     return 0
 
 
-def _relay_bytes(args: argparse.Namespace, t: Tap) -> None:
+def _tap_port(args: argparse.Namespace, t: Tap) -> None:
     from psabench.logs.tap import Relay
 
     start_ns = time.time_ns()
@@ -67,11 +67,11 @@ def _relay_bytes(args: argparse.Namespace, t: Tap) -> None:
 
     def took(direction: int, data: bytes) -> None:
         now_ns = time.time_ns()
-        t.take(direction, data, lambda at: start_ns + round(at * 1e9 / args.line_hz) if samples else now_ns)
+        t.take_bytes(direction, data, lambda at: start_ns + round(at * 1e9 / args.line_hz) if samples else now_ns)
 
     with Relay(args.port, one_way=samples) as relay:
         print("ready" if samples else f"ready tap={relay.path}", flush=True)
         try:
-            relay.run(took, deadline_s)
+            relay.pass_on(took, deadline_s)
         except KeyboardInterrupt:
             print()

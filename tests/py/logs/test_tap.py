@@ -82,7 +82,16 @@ def test_frames_on_slcan_are_can_frames_for_wireshark(tmp_path: Path) -> None:
     volts = [float(xy.decode(bytes(m.data))["X"]) for m in got if m.arbitration_id == xy.frame_id]
     assert [float(r[4]) for r in received if r[4]][: len(volts)] == pytest.approx(volts, rel=1e-12)
     assert len(volts) > 5
-    assert {row[3] for row in rows} == {"frame", "close", "bit rate", "open", "empty", "done", "sent", "sent, extended"}
+    # C is on its way when the board ends
+    assert {row[3] for row in rows} - {"close"} == {
+        "frame",
+        "bit rate",
+        "open",
+        "empty",
+        "done",
+        "sent",
+        "sent, extended",
+    }
 
 
 @NEEDS_TSHARK
