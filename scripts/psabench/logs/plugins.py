@@ -56,5 +56,5 @@ def mavlink_dissector() -> str:
         with contextlib.redirect_stdout(report), contextlib.redirect_stderr(report):
             done = mavgen.mavgen(options, [str(xml)])
         if done is False:
-            raise BadInput(expected("a definition that mavgen takes", report.getvalue().strip(), xml.name))
+            raise BadInput(expected("a dialect that mavgen --lang WLua takes", report.getvalue(), xml.name))
         return (folder / MAVLINK).read_text(encoding="utf-8")

@@ -206,7 +206,7 @@ def test_lines_right_and_wrong(
     out = tmp_path / "run.pcap"
     with tap.tap_file(kind, out) as t:
         for way, text, *_ in lines:
-            t.take(int(way), str(text).encode(), lambda at: at)
+            t.take_bytes(int(way), str(text).encode(), lambda at: at)
     assert t.cut == 0
     rows = tshark(out, "_ws.lua.error", *fields)
     assert [tuple(row[1:]) for row in rows] == [tuple(line[2:]) for line in lines]
@@ -222,7 +222,7 @@ def test_words_of_16_24_and_32_bits_on_the_line_port(tmp_path: Path) -> None:
         for size, four in words.items()
     )
     with tap.tap_file("line", out) as t:
-        t.take(IN, stream + b"\0" * 8 + b"\1", lambda at: at)
+        t.take_bytes(IN, stream + b"\0" * 8 + b"\1", lambda at: at)
     rows = tshark(out, *(f"psabench_line.{name}" for name in "x y z t bits torn channel".split()))
     assert [[int(v, 0) for v in row[:5]] for row in rows[:3]] == [
         [-(1 << (size - 1)), 5, -2, 0x1234, 4 * size] for size in words
@@ -236,7 +236,7 @@ def test_the_file_is_that_of_wireshark(tmp_path: Path) -> None:
     """Header of link type 252 with stamps of 1 ns; tags padded to four bytes."""
     out = tmp_path / "run.pcap"
     with tap.tap_file("slcan", out) as t:
-        t.take(IN, b"V1013\rz", lambda at: 5_000_000_007)
+        t.take_bytes(IN, b"V1013\rz", lambda at: 5_000_000_007)
     assert out.read_bytes().hex(" ", -4) == (
         "4d3cb2a1 02000400 00000000 00000000 00040100 fc000000"
         " 05000000 07000000 26000000 26000000"
@@ -283,7 +283,7 @@ def test_arbitrary_bytes_are_shown_without_an_error_of_lua(kind: str, tmp_path: 
     out, field = tmp_path / "run.pcap", f"psabench_{kind}.{'samples' if kind == 'line' else 'kind'}"
     with tap.tap_file(kind, out) as t:
         for _ in range(1500):
-            t.take(draw.randrange(2), spelled(kind, draw), lambda at: at)
+            t.take_bytes(draw.randrange(2), spelled(kind, draw), lambda at: at)
     rows = tshark(out, "_ws.col.Protocol", field, "_ws.malformed", "_ws.lua.error")
     assert len(rows) == sum(t.packets) > 100
     assert all(row[1] for row in rows)
@@ -297,10 +297,10 @@ def test_packets_do_not_depend_on_how_the_bytes_come(kind: str) -> None:
     if kind == "line":
         data = b"".join(bytes([draw.randrange(128) * 2 + (n % 2)]) * draw.randrange(1, 9) for n in range(3000))
     _, make = tap.KINDS[kind]
-    whole = list(make().feed(data))
+    whole = list(make().packets_of(data))
     cuts = sorted(draw.randrange(len(data)) for _ in range(300))
     cutter = make()
-    pieces = [p for a, b in pairwise([0, *cuts, len(data)]) for p in cutter.feed(data[a:b])]
+    pieces = [p for a, b in pairwise([0, *cuts, len(data)]) for p in cutter.packets_of(data[a:b])]
     assert pieces == whole
     assert len(whole) > 100
     assert all(data[at : at + len(packet)] == packet for at, packet in whole)
@@ -311,7 +311,7 @@ def test_packets_do_not_depend_on_how_the_bytes_come(kind: str) -> None:
 )
 def test_a_packet_without_end_is_cut(kind: str, byte: bytes, most: int) -> None:
     cutter = tap.KINDS[kind][1]()
-    packets = [p for _ in range(40) for _, p in cutter.feed(byte * 5000)]
+    packets = [p for _ in range(40) for _, p in cutter.packets_of(byte * 5000)]
     assert max(len(p) for p in packets) <= most
     assert cutter.cut == len(packets) > 1
 
@@ -322,7 +322,7 @@ def test_a_relay_waits_for_a_reader_and_ends_with_the_port(tmp_path: Path) -> No
     took: list[tuple[int, bytes]] = []
     with tap.Relay(Path(os.ttyname(slave))) as relay:
         os.close(slave)
-        thread = threading.Thread(target=relay.run, args=(lambda way, data: took.append((way, data)),))
+        thread = threading.Thread(target=relay.pass_on, args=(lambda way, data: took.append((way, data)),))
         thread.start()
         os.write(master, b"hello\r")
         with open(relay.path, "r+b", buffering=0) as program:
@@ -339,7 +339,7 @@ def test_a_relay_waits_for_a_reader_and_ends_with_the_port(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("slcan nothing out.pcap", "nothing: no such file"),
+        ("slcan nothing out.pcap", "nothing: expected a port or a file, got none"),
         ("bus {file} {file}", "OUT: expected another file than the one that is read"),
         ("morse {file} out.pcap", "expected slcan, bus, line, got 'morse'"),
         ("line {file} /proc/x.pcap", "/proc/x.pcap"),
@@ -357,4 +357,4 @@ def test_tap_says_what_is_wrong(
 
 def test_a_full_disk_is_told() -> None:
     with pytest.raises((OutputError, BadInput)), tap.tap_file("slcan", Path("/dev/full")) as t:
-        t.take(tap.FROM_BOARD, b"V\r", lambda at: at)
+        t.take_bytes(tap.FROM_BOARD, b"V\r", lambda at: at)
