@@ -137,7 +137,7 @@ def test_a_damaged_recording_is_refused(turns: Path, tmp_path: Path) -> None:
     log.write_text("".join(lines[:-1]))
     assert "frames, as " in refused(log)
     log.write_text("".join(lines)[:-3])
-    assert "its last line is cut" in refused(log)
+    assert "a line feed at the end" in refused(log)
     at = next(k for k, line in enumerate(lines) if " 185#" in line)
     log.write_text("".join([*lines[:at], lines[at].replace(" 185#", " 184#"), *lines[at + 1 :]]))
     assert "in the log for this reading" in refused(log)
