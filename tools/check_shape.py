@@ -162,7 +162,7 @@ RULES = {
     "one-word-functions-python": Rule(one_word_functions, 926, 926),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 55_560, 55_560),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_170, 44_170),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_160, 44_160),
     "tracked-files": Rule(lambda root: len(tracked(root)), 1_643, 1_643),
 }
 

@@ -17,15 +17,27 @@
 /* Wall time from a going to the question whether a client is left: by then the kernel has taken note of it. */
 enum { ASK_MS = 37 };
 
-/* Through the master, which changes the slave's settings: an own open of the slave would look like a client's. Flushes what
- * the slave has not read. */
-static int set_raw(int master, bool defaults)
+/* Flushes what the slave has not read, and sets it up. The kernel takes the settings of the slave through the master, too: to
+ * open the slave would look like a client. */
+static int set_flushed(int master, const struct termios *tio)
+{
+    tcflush(master, TCOFLUSH); /* what the line discipline has not taken */
+    return tcsetattr(master, TCSAFLUSH, tio) < 0 ? -errno : 0;
+}
+
+/* The settings stay. Those that a client makes between the two calls, some microseconds, are lost. */
+static void flush_slave(int master)
+{
+    struct termios tio;
+    if (tcgetattr(master, &tio) == 0) set_flushed(master, &tio);
+}
+
+static int make_raw(int master)
 {
     struct termios tio;
     if (tcgetattr(master, &tio) < 0) return -errno;
-    if (defaults) cfmakeraw(&tio);
-    tcflush(master, TCOFLUSH);
-    return tcsetattr(master, TCSAFLUSH, &tio) < 0 ? -errno : 0;
+    cfmakeraw(&tio);
+    return set_flushed(master, &tio);
 }
 
 static bool in_use(const struct pty *p)
@@ -38,7 +50,7 @@ static void set_openers(struct pty *p, int openers, int64_t t_ns)
 {
     const bool was = p->openers > 0;
     p->openers = openers;
-    if (openers == 0) set_raw(p->line, false); /* what the last one has not read is not for the next */
+    if (openers == 0) flush_slave(p->line); /* what the last one has not read is not for the next */
     if (was != (openers > 0)) p->opened(p->ctx, openers > 0, t_ns);
 }
 
@@ -71,7 +83,7 @@ static void on_ask(struct link *l, int64_t t_ns)
     const bool used = in_use(p), unknown = used && p->openers == 0;
     if (!used) {
         set_openers(p, 0, t_ns);
-        set_raw(p->line, true); /* the next client does not inherit the last one's settings */
+        make_raw(p->line); /* the next client does not inherit the last one's settings */
     }
     if (unknown && p->doubted) set_openers(p, 1, t_ns);
     else if (unknown) l->timer_ms = ASK_MS;
@@ -108,7 +120,7 @@ static int open_pair(struct pty *p)
     if (err) return -err;
     own_port_lock(p->master, p->path);
     p->slave = open(p->path, O_RDWR | O_NOCTTY | O_CLOEXEC);
-    return p->slave < 0 ? -errno : set_raw(p->master, true);
+    return p->slave < 0 ? -errno : make_raw(p->master);
 }
 
 /* Watches who opens the slave; not fatal where inotify is not to be had. Closing ours makes the master hang up. */

@@ -15,7 +15,7 @@ struct pty {
         watch; /* first: inotify on the slave's node; served before the master, so that news of a client precede its
                           bytes */
     int master, slave; /* slave: -1 while clients can be watched */
-    int line;          /* the master's descriptor, whoever owns it */
+    int line;          /* descriptor of the master; the port's link owns it */
     bool doubted;      /* asked once, and the kernel knows of a client that we do not */
     struct link *port; /* the link that reads the master; set by its owner */
     char path[64];     /* /dev/pts/N */

@@ -23,6 +23,14 @@ local function unknown(proto)
     return ProtoExpert.new(proto.name:lower() .. ".unknown", "Not understood", expert.group.PROTOCOL, expert.severity.WARN)
 end
 
+-- The last row of a line: what it is; nil: not understood, with this note. Returns the bytes that are dissected, all.
+local function add_kind(branch, tvb, field, kind, expert_info, note)
+    if not kind then branch:add_proto_expert_info(expert_info, note) end
+    branch:add(field, tvb(), kind or "unknown"):set_generated()
+    branch:append_text(": " .. (kind or "unknown"))
+    return tvb:len()
+end
+
 ---------------------------------------------------------------- slcan
 
 local slcan = Proto("psabench_slcan", "slcan line")
@@ -93,14 +101,11 @@ function slcan.dissector(tvb, pinfo, tree)
     elseif last == "\a" and line == "" and from_board() then
         kind = "rejected"
     elseif last ~= "\r" or not kind then
-        kind = "unknown"
-        branch:add_proto_expert_info(slcan_unknown, "Not a line of slcan")
+        kind = nil
     elseif kind == "status" and line:match("^F%x%x$") then
         branch:add(s.status, tvb(1, 2), tonumber(line:sub(2), 16))
     end
-    branch:add(s.kind, tvb(), kind):set_generated()
-    branch:append_text(": " .. kind)
-    return tvb:len()
+    return add_kind(branch, tvb, s.kind, kind, slcan_unknown, "Not a line of slcan")
 end
 
 ---------------------------------------------------------------- the bus port
@@ -166,14 +171,7 @@ function bus.dissector(tvb, pinfo, tree)
     pinfo.cols.info = way() .. shown(tvb)
     local line = tvb:raw():gsub("[\r\n]+$", ""):gsub("%s+", " "):gsub("^ ", "")
     if not from_board() then line = line:upper() end
-    local kind = bus_fields(tvb, branch, line)
-    if not kind then
-        kind = "unknown"
-        branch:add_proto_expert_info(bus_unknown, "Not a line of the bus port")
-    end
-    branch:add(b.kind, tvb(), kind):set_generated()
-    branch:append_text(": " .. kind)
-    return tvb:len()
+    return add_kind(branch, tvb, b.kind, bus_fields(tvb, branch, line), bus_unknown, "Not a line of the bus port")
 end
 
 ---------------------------------------------------------------- the line port of a PSA-2

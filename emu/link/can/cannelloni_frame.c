@@ -3,7 +3,7 @@
 #include <arpa/inet.h>
 #include <string.h>
 
-enum { VERSION = 2, DATA = 0, FD_LEN = 0x80, FD_BRS = 0x01 };
+enum { VERSION = 2, DATA = 0, FD_LEN = 0x80, FD_BRS = 0x01, RTR_BYTE = 0x40 /* in the first byte of can_id */ };
 enum { ID_MASK = 0x1FFFFFFF, BASE = 5 /* can_id and len */ };
 
 /* linux/can.h: flags of can_id. */
@@ -38,9 +38,19 @@ size_t cannelloni_put_frame(const struct can_msg *m, uint8_t out[CANNELLONI_FRAM
     return (size_t)(p - out) + data;
 }
 
-size_t cannelloni_take_frame(const uint8_t *bytes, size_t size, struct can_msg *m)
+/* Bytes of the frame at the beginning; 0: cut short, or more data than a frame has. */
+static size_t frame_size(const uint8_t *bytes, size_t size)
 {
     if (size < BASE) return 0;
+    const size_t head = BASE + (bytes[4] & FD_LEN ? 1 : 0);
+    const size_t data = bytes[0] & RTR_BYTE ? 0 : bytes[4] & (FD_LEN - 1);
+    return data > CANNELLONI_FRAME_MAX - BASE - 1 || size < head + data ? 0 : head + data;
+}
+
+size_t cannelloni_take_frame(const uint8_t *bytes, size_t size, struct can_msg *m)
+{
+    const size_t n = frame_size(bytes, size);
+    if (!n) return 0;
     uint32_t id;
     memcpy(&id, bytes, sizeof id);
     id = ntohl(id);
@@ -49,21 +59,18 @@ size_t cannelloni_take_frame(const uint8_t *bytes, size_t size, struct can_msg *
     *m = (struct can_msg){.id = id & ID_MASK, .flags = is_fd ? CAN_FD : 0, .len = bytes[4] & (FD_LEN - 1)};
     for (unsigned i = 0; i < ID_FLAGS; i++)
         if (id & id_flags[i].bit) m->flags |= id_flags[i].flag;
-    const size_t data = m->flags & CAN_RTR ? 0 : m->len;
-    if (data > sizeof m->data || size < head + data) return 0;
     if (is_fd && bytes[BASE] & FD_BRS) m->flags |= CAN_BRS;
-    memcpy(m->data, bytes + head, data);
-    return head + data;
+    memcpy(m->data, bytes + head, n - head);
+    return n;
 }
 
 bool cannelloni_check(const uint8_t *bytes, size_t size, uint8_t *seq, unsigned *count)
 {
-    struct can_msg m;
     if (size < CANNELLONI_HEADER || bytes[0] != VERSION || bytes[1] != DATA) return false;
     const unsigned frames = (unsigned)bytes[3] << 8 | bytes[4];
     size_t at = CANNELLONI_HEADER;
     for (unsigned i = 0; i < frames; i++) {
-        const size_t n = cannelloni_take_frame(bytes + at, size - at, &m);
+        const size_t n = frame_size(bytes + at, size - at);
         if (!n) return false;
         at += n;
     }

@@ -10,12 +10,16 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
+import can
 import numpy as np
 
 from psabench.errors import BadInput, expected
+from psabench.link.log_file import LogFile
+from psabench.link.own import output_text
 from psabench.logs.formats import READABLE
 
 COLUMNS = ("call", "argument", "answer", "t_s", "frames")
@@ -31,6 +35,46 @@ def check_ending(log: Path) -> None:
     """Raises BadInput for a log that could not be read back."""
     if log.suffix.lower() not in READABLE:
         raise BadInput(expected(f"an ending of {' '.join(READABLE)}", log.suffix or "none", log))
+
+
+class CallWriter(AbstractContextManager["CallWriter"]):
+    """The CAN log and the calls of a run that is being recorded. Stores the end of a run that ends well."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BadInput or OutputError when one of the two files cannot be made."""
+        check_ending(path)
+        self._frames, self.t_s = 0, 0.0
+        with ExitStack() as stack:
+            self._log = LogFile(path)
+            stack.callback(self._log.close)
+            file = stack.enter_context(output_text(calls_path(path), lambda: f"stored {self._frames} frames"))
+            self._csv = csv.writer(file, lineterminator="\n")
+            self._csv.writerow(COLUMNS)
+            self._stack = stack.pop_all()
+
+    def keep_frame(self, message: can.Message) -> None:
+        """A frame that has come."""
+        if not message.is_error_frame:
+            self._frames += self._log(message)
+
+    def store_call(self, call: str, argument: str, answer: str, t_s: float) -> None:
+        """A call that is over, at the bench's time t_s. Raises OutputError when the log could not take its frames."""
+        self._check_log()
+        self.t_s = t_s
+        self._csv.writerow([call, argument, answer, repr(t_s), self._frames])
+
+    def _check_log(self) -> None:
+        if self._log.error is not None:
+            raise self._log.error
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        try:
+            if kind is None:
+                self.store_call(END, "", "", self.t_s)
+        finally:
+            self._stack.__exit__(kind, *rest)
+        if kind is None:
+            self._check_log()
 
 
 class Calls:

@@ -8,10 +8,9 @@ rounded to a microsecond in both, and time moves with the calls, so that the res
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -22,9 +21,7 @@ from psabench.boards.devices import of_board
 from psabench.boards.unit import Unit
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.can_host import CanHost, Listener
-from psabench.link.log_file import LogFile
-from psabench.link.own import output_text
-from psabench.logs.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
+from psabench.logs.call_log import END, SETUP, Calls, CallWriter, check_ending
 from psabench.logs.formats import KEEPS, read_frames
 
 STAMP_DIGITS = 6  # of a second: what all formats keep that keep instants
@@ -35,7 +32,7 @@ class _Teller(Protocol):
     """Who writes calls down, or has them. bus: its number."""
 
     @property
-    def t_s(self) -> float: ...
+    def time_s(self) -> float: ...
     def send_frame(
         self, bus: int, frame: str, host: CanHost | None, args: tuple[Any, ...], how: Mapping[str, Any]
     ) -> None: ...
@@ -53,7 +50,7 @@ class _Host(CanHost):
 
     def now_s(self) -> float:
         """As of the last call."""
-        return self._teller.t_s
+        return self._teller.time_s
 
     def send(self, can_id: int, data: bytes, *, fd: bool = False, remote: bool = False) -> None:
         how = {name: True for name, on in (("fd", fd), ("remote", remote)) if on}
@@ -94,16 +91,10 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
     def __init__(self, bench: Bench, path: Path, setup: Mapping[str, Any]) -> None:
         """setup: `procedure`, `facts` and what else the replay needs. Raises BadInput, OutputError."""
         check_keeps(path, len(bench.hosts))
-        self._bench, self._frames, self.t_s = bench, 0, bench.time_s
+        self._bench = bench
         self._hosts = {inner: _Host(self, k, inner) for k, inner in enumerate(bench.hosts.values())}
         self.units = {name: of_board(u.board)(self._hosts[u.host], u.node.node_id) for name, u in bench.units.items()}
-        with ExitStack() as stack:
-            self._log = LogFile(path)
-            stack.callback(self._log.close)
-            file = stack.enter_context(output_text(calls_path(path), lambda: f"stored {self._frames} frames"))
-            self._csv = csv.writer(file, lineterminator="\n")
-            self._csv.writerow(COLUMNS)
-            self._stack = stack.pop_all()
+        self._calls = CallWriter(path)
         for k, (inner, host) in enumerate(self._hosts.items()):
             inner.listeners[:] = [_Keeper(self, k, host)]
         buses = list(bench.hosts.values())
@@ -114,21 +105,16 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
         """A frame that has come, into the log and to the unit."""
         message.timestamp = round(message.timestamp, STAMP_DIGITS)
         message.channel = bus
-        if not message.is_error_frame:
-            self._frames += self._log(message)
+        self._calls.keep_frame(message)
         host.pass_on(message)
 
     def _store_call(self, call: str, argument: str) -> None:
-        """A call that is over. Raises OutputError when the log could not take its frames."""
-        if self._log.error is not None:
-            raise self._log.error
-        self.t_s = self._bench.time_s
-        self._csv.writerow([call, argument, "", repr(self.t_s), self._frames])
+        self._calls.store_call(call, argument, "", self._bench.time_s)
 
     @property
     def time_s(self) -> float:
         """As of the last call: what the recording knows."""
-        return self.t_s
+        return self._calls.t_s
 
     def wait(self, dwell_s: float) -> None:
         self._bench.wait(dwell_s)
@@ -160,13 +146,7 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         for inner in self._hosts:
             inner.listeners.clear()
-        try:
-            if kind is None:
-                self._store_call(END, "")
-        finally:
-            self._stack.__exit__(kind, *rest)
-        if kind is None and self._log.error is not None:
-            raise self._log.error
+        self._calls.__exit__(kind, *rest)
 
 
 class _Keeper:
@@ -209,12 +189,8 @@ class RecordedBench(_Units):
         return buses, units
 
     @property
-    def t_s(self) -> float:
-        return self._calls.t_s
-
-    @property
     def time_s(self) -> float:
-        return self.t_s
+        return self._calls.t_s
 
     def _make_call(self, call: str, argument: str) -> None:
         """The same call, and the frames that came meanwhile."""

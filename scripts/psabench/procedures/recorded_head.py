@@ -8,10 +8,9 @@ from the frames of the log, by number, so that what a format does to time stamps
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,7 @@ from psabench.conform.sources.taken import Bounds
 from psabench.errors import BadInput, expected
 from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
-from psabench.link.log_file import LogFile
-from psabench.link.own import output_text
-from psabench.logs.call_log import COLUMNS, END, SETUP, Calls, calls_path, check_ending
+from psabench.logs.call_log import SETUP, Calls, CallWriter, check_ending
 from psabench.procedures.head_bench import HeadBench
 
 LONGEST_S = 1e9  # of a recording
@@ -44,34 +41,18 @@ class HeadRecorder(AbstractContextManager["HeadRecorder"]):
     def __init__(self, bench: HeadBench, host: CanHost, path: Path, setup: Mapping[str, Any]) -> None:
         """Raises BadInput or OutputError when one of the two files cannot be made."""
         self.g_mps2 = bench.g_mps2
-        self._bench, self._host, self._frames = bench, host, 0
-        self._t_s = bench.t_s
-        check_ending(path)
-        with ExitStack() as stack:
-            self._log = LogFile(path)
-            stack.callback(self._log.close)
-            file = stack.enter_context(output_text(calls_path(path), lambda: f"stored {self._frames} frames"))
-            self._csv = csv.writer(file, lineterminator="\n")
-            self._csv.writerow(COLUMNS)
-            self._stack = stack.pop_all()
-        host.listeners.append(self._keep)
+        self._bench, self._host = bench, host
+        self._calls = CallWriter(path)
+        host.listeners.append(self._calls.keep_frame)
         self._store(SETUP, json.dumps(setup), "")
 
-    def _keep(self, message: can.Message) -> None:
-        if not message.is_error_frame:
-            self._frames += self._log(message)
-
     def _store(self, call: str, argument: str, answer: str) -> None:
-        """A call that is over. Raises OutputError when the log could not take its frames."""
-        if self._log.error is not None:
-            raise self._log.error
-        self._t_s = self._bench.t_s
-        self._csv.writerow([call, argument, answer, repr(self._t_s), self._frames])
+        self._calls.store_call(call, argument, answer, self._bench.t_s)
 
     @property
     def t_s(self) -> float:
         """As of the last call: what the recording knows."""
-        return self._t_s
+        return self._calls.t_s
 
     def turn(self, angle_deg: float) -> float:
         scale_deg = self._bench.turn(angle_deg)
@@ -92,14 +73,8 @@ class HeadRecorder(AbstractContextManager["HeadRecorder"]):
         return u_v
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
-        self._host.listeners.remove(self._keep)
-        try:
-            if kind is None:
-                self._store(END, "", "")
-        finally:
-            self._stack.__exit__(kind, *rest)
-        if kind is None and self._log.error is not None:
-            raise self._log.error
+        self._host.listeners.remove(self._calls.keep_frame)
+        self._calls.__exit__(kind, *rest)
 
 
 class RecordedHead:

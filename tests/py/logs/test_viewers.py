@@ -6,6 +6,8 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -127,6 +129,18 @@ def decoded(vcd: Path, board: str, name: str) -> list[str]:
     return sigrok(vcd, ":".join(words), f"{decoder.id}={row}")
 
 
+@contextmanager
+def stepped(vcd: Path, unit: str) -> Iterator[Control]:
+    """A bench of one unit whose time the control socket moves; its lines are in vcd afterwards."""
+    scenario = vcd.with_name("unit.yaml")
+    scenario.write_text(f"units: [{unit}]")
+    with (
+        Emulator(scenario, cans=["none"], pace="step", extra=["--vcd", vcd]) as emu,
+        Control(emu.directory / "control") as control,
+    ):
+        yield control
+
+
 def read_register(control: Control, address: int, strobe_ns: int = 800) -> int:
     """By a cycle on the bus, and a pause: cycles with no time between them are one strobe on the line."""
     reply = control.call("bus.read", unit="a", address=address, strobe_ns=strobe_ns)
@@ -136,12 +150,8 @@ def read_register(control: Control, address: int, strobe_ns: int = 800) -> int:
 
 @NEEDS_SIGROK
 def test_a_pulseview_of_a_pik_shows_the_counters_that_the_host_reads(tmp_path: Path) -> None:
-    scenario, vcd = tmp_path / "unit.yaml", tmp_path / "run.vcd"
-    scenario.write_text("units: [{name: a, board: pik, axes: {x: {sensor: mems, u0_v: 2.5}}}]")
-    with (
-        Emulator(scenario, cans=["none"], pace="step", extra=["--vcd", vcd]) as emu,
-        Control(emu.directory / "control") as control,
-    ):
+    vcd = tmp_path / "run.vcd"
+    with stepped(vcd, "{name: a, board: pik, axes: {x: {sensor: mems, u0_v: 2.5}}}") as control:
         control.call("run", for_s=0.0455)
         count, seq = (read_register(control, address) for address in (3, 9))
     texts = decoded(vcd, "pik", "Count FXP")
@@ -154,12 +164,8 @@ def test_a_pulseview_of_a_pik_shows_the_counters_that_the_host_reads(tmp_path: P
 
 @NEEDS_SIGROK
 def test_cycles_of_a_pmka_on_its_bus_are_those_of_the_host(tmp_path: Path) -> None:
-    scenario, vcd = tmp_path / "unit.yaml", tmp_path / "run.vcd"
-    scenario.write_text("units: [{name: a, board: pmka}]")
-    with (
-        Emulator(scenario, cans=["none"], pace="step", extra=["--vcd", vcd]) as emu,
-        Control(emu.directory / "control") as control,
-    ):
+    vcd = tmp_path / "run.vcd"
+    with stepped(vcd, "{name: a, board: pmka}") as control:
         control.call("run", for_s=0.02)
         want = []
         for address in range(10):
