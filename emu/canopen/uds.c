@@ -22,7 +22,7 @@ enum { OK = 0, LATER = 0x100 }; /* beside the negative response codes */
 
 static uint16_t get_be16(const uint8_t *p)
 {
-    return (uint16_t)(p[0] << 8 | p[1]);
+    return (uint16_t)bits_get_be(p, 2);
 }
 
 static void put_byte(struct uds *u, unsigned byte)

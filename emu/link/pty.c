@@ -17,8 +17,7 @@
 /* Wall time from a going to the question whether a client is left: by then the kernel has taken note of it. */
 enum { ASK_MS = 37 };
 
-/* Flushes what the slave has not read, and sets it up. The kernel takes the settings of the slave through the master, too: to
- * open the slave would look like a client. */
+/* Flushes what the slave has not read, and sets it up; by the master, since an open of the slave would look like a client. */
 static int set_flushed(int master, const struct termios *tio)
 {
     tcflush(master, TCOFLUSH); /* what the line discipline has not taken */

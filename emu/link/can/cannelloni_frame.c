@@ -1,6 +1,7 @@
 #include "link/can/cannelloni_frame.h"
 
-#include <arpa/inet.h>
+#include "base/bits.h"
+
 #include <string.h>
 
 enum { VERSION = 2, DATA = 0, FD_LEN = 0x80, FD_BRS = 0x01, RTR_BYTE = 0x40 /* in the first byte of can_id */ };
@@ -18,8 +19,7 @@ void cannelloni_put_header(uint8_t seq, uint16_t count, uint8_t out[CANNELLONI_H
     out[0] = VERSION;
     out[1] = DATA;
     out[2] = seq;
-    out[3] = (uint8_t)(count >> 8);
-    out[4] = (uint8_t)count;
+    bits_put_be(out + 3, count, 2);
 }
 
 size_t cannelloni_put_frame(const struct can_msg *m, uint8_t out[CANNELLONI_FRAME_MAX])
@@ -30,8 +30,7 @@ size_t cannelloni_put_frame(const struct can_msg *m, uint8_t out[CANNELLONI_FRAM
     uint32_t id = m->id;
     for (unsigned i = 0; i < ID_FLAGS; i++)
         if (m->flags & id_flags[i].flag) id |= id_flags[i].bit;
-    id = htonl(id);
-    memcpy(out, &id, sizeof id);
+    bits_put_be(out, id, 4);
     out[4] = (uint8_t)(m->len | (is_fd ? FD_LEN : 0));
     if (is_fd) *p++ = m->flags & CAN_BRS ? FD_BRS : 0;
     memcpy(p, m->data, data);
@@ -51,9 +50,7 @@ size_t cannelloni_take_frame(const uint8_t *bytes, size_t size, struct can_msg *
 {
     const size_t n = frame_size(bytes, size);
     if (!n) return 0;
-    uint32_t id;
-    memcpy(&id, bytes, sizeof id);
-    id = ntohl(id);
+    const uint32_t id = (uint32_t)bits_get_be(bytes, 4);
     const bool is_fd = bytes[4] & FD_LEN;
     const size_t head = BASE + (is_fd ? 1 : 0);
     *m = (struct can_msg){.id = id & ID_MASK, .flags = is_fd ? CAN_FD : 0, .len = bytes[4] & (FD_LEN - 1)};
@@ -67,7 +64,7 @@ size_t cannelloni_take_frame(const uint8_t *bytes, size_t size, struct can_msg *
 bool cannelloni_check(const uint8_t *bytes, size_t size, uint8_t *seq, unsigned *count)
 {
     if (size < CANNELLONI_HEADER || bytes[0] != VERSION || bytes[1] != DATA) return false;
-    const unsigned frames = (unsigned)bytes[3] << 8 | bytes[4];
+    const unsigned frames = (unsigned)bits_get_be(bytes + 3, 2);
     size_t at = CANNELLONI_HEADER;
     for (unsigned i = 0; i < frames; i++) {
         const size_t n = frame_size(bytes + at, size - at);
