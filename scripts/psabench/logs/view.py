@@ -63,6 +63,8 @@ class Publisher:
         self.counts = Viewed()
         self._channel(RAW_TOPIC, lambda: Channel(RAW_TOPIC, schema=dict(RAW_SCHEMA), context=context))
         self._channel(VIEW_TOPIC, lambda: Channel(VIEW_TOPIC, schema=VIEW_SCHEMA, context=context))
+        if self._reader is not None:
+            self._imu_channel()
 
     def on_message(self, m: Message) -> None:
         self._last_ns = stamp_ns(m.timestamp)
@@ -95,14 +97,15 @@ class Publisher:
     def _decoded_channel(self, topic: str, name: str) -> Channel:
         return Channel(topic, schema=schema(name), metadata=units(name), context=self._context)
 
+    def _imu_channel(self) -> Channel:
+        topic = f"/node{self._node}/imu"
+        kind = Schema(name="sensor_msgs/msg/Imu", encoding="ros2msg", data=IMU.encode())
+        return self._channel(topic, lambda: Channel(topic, schema=kind, message_encoding="cdr", context=self._context))
+
     def _log_imu(self) -> None:
         if self._reader is None or not len(self._reader):
             return
-        topic = f"/node{self._node}/imu"
-        kind = Schema(name="sensor_msgs/msg/Imu", encoding="ros2msg", data=IMU.encode())
-        channel = self._channel(
-            topic, lambda: Channel(topic, schema=kind, message_encoding="cdr", context=self._context)
-        )
+        channel = self._imu_channel()
         frames = self._reader.take()
         accel_mps2 = frames.u_v / self._v_per_g * G0_MPS2
         for t_s, axes in zip(frames.t_rx_s.tolist(), accel_mps2.tolist(), strict=True):
