@@ -197,4 +197,4 @@ lock: $(PY) ; tools/lock ## pin requirements*.in in requirements*.lock
 clean: ; rm -rf build build-* compile_commands.json ## remove everything that was built; .venv stays
 help: ## this list
 	@sed -n 's/^\([a-z_.0-9-]*\):.* ## \(.*\)/\1|\2/p' Makefile | while IFS='|' read -r t d; do printf '  %-22s %s\n' "$$t" "$$d"; done
--include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d) $(BENCH_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d) $(FUZZ_SRC:%.c=$(BUILD)/obj/%.d)
+-include $(OBJ:.o=.d) $(NAV_OBJ:.o=.d) $(UNIT:%.c=$(BUILD)/obj/%.d) $(BENCH_BIN:$(BUILD)/%=$(BUILD)/obj/tests/%.d) $(FUZZ_SRC:%.c=$(BUILD)/obj/%.d) $(wildcard $(BUILD)/obj/tests/fuzz/support/*.d)

@@ -48,7 +48,19 @@ class Budget:
             terminalreporter.write_line(f"left out: {len(self._left)} tests, after {self._budget_s:g} s: {files}")
 
 
+class Unused:
+    """Refuses a run of whole files in which an entry of tests/tiers.toml fits no test: it would leave out nothing."""
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        if any("::" in arg for arg in config.args):
+            return
+        if unused := tiers.unused(tiers.load(), [_described(item) for item in items]):
+            raise pytest.UsageError("\n".join(unused))
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Unused())
     if (budget_s := config.getoption("budget")) is not None:
         config.pluginmanager.register(Budget(budget_s))
 

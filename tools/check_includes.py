@@ -37,7 +37,7 @@ MAY_INCLUDE = {
     "api": {"base", "trace", "chip", "board", "board/*"},
     "app": _COMMANDS | {"control", "scpi", "scenario", "bench", "telemetry", "link"},
 }
-ONE_ROOM = {"phys", "link"}  # layers whose parts may include each other
+ONE_ROOM = {"base", "phys", "link"}  # layers whose parts may include each other
 # C11 without the headers of clocks, signals, locales, threads and jumps: those are the operating system's business.
 C_HEADERS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits math stdalign stdarg stdbool stddef stdint "
@@ -53,6 +53,7 @@ LIBRARIES = {
     "Eigen/Dense": {"nav"},
     "cjson/cJSON.h": _JSON,
     "cJSON.h": _JSON,
+    "immintrin.h": {"chip"},  # the compiler's, for the vectors of x86-64
     "libfyaml.h": {"scenario"},
     "psabench/mavlink.h": {"link"},  # generated from proto/mavlink
 }

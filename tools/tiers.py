@@ -89,6 +89,24 @@ def unmatched(table: Table, files: Iterable[Path]) -> list[str]:
     return said
 
 
+def _named(some: str, function: str, name: str) -> bool:
+    """Whether an entry of `all` has a test. Brackets are literal here: names of cases are full of them."""
+    return any(fnmatchcase(n, some.replace("[", "[[]")) for n in (function, name))
+
+
+def unused(table: Table, tests: Iterable[tuple[Path, str, str, Hashable]]) -> list[str]:
+    """Entries of `all` that fit no test, one message each; the tests are all of their files."""
+    names: dict[Path, set[tuple[str, str]]] = {}
+    for path, function, case, _ in tests:
+        names.setdefault(path, set()).add((function, f"{function}[{case}]"))
+    return [
+        f"tests/tiers.toml: {path.name}: expected a test named {some}"
+        for path, tests_of in names.items()
+        for some in (table.row(path) or Row()).all
+        if not any(_named(some, *test) for test in tests_of)
+    ]
+
+
 def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> list[bool]:
     """Of each test (file, function, case, group), whether make test runs it.
 
@@ -100,10 +118,7 @@ def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> l
     for path, function, case, group in tests:
         row = rows[path]
         name = f"{function}[{case}]" if case else function
-        # Brackets are literal here: names of cases are full of them.
-        out = row.tier == "all" or any(
-            fnmatchcase(n, some.replace("[", "[[]")) for some in row.all for n in (function, name)
-        )
+        out = row.tier == "all" or any(_named(some, function, name) for some in row.all)
         key = (path, function, group)
         chosen.append(not out and seen[key] % row.sample == 0)
         seen[key] += not out

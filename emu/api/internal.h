@@ -8,8 +8,8 @@
 
 #include "api/kind.h"
 #include "api/psabench.h"
+#include "base/draws.h"
 #include "base/reg.h"
-#include "base/rng.h"
 #include "base/sched.h"
 
 #include <stdbool.h>
@@ -101,7 +101,7 @@ typedef double api_source_fn(void *ctx, unsigned input, int64_t t_ns);
 api_source_fn *api_source(const struct psabench_part *p);
 
 /* Stream of one of the part's noise sources. */
-struct rng api_noise(const struct psabench_part *p, const char *source);
+struct draws api_noise(const struct psabench_part *p, const char *source);
 uint64_t api_serial(const struct psabench_part *p); /* made from its name */
 
 /* For a chip that calls at each change of a pin: the pin is read after the event that moved it. */

@@ -29,9 +29,9 @@ uint64_t api_serial(const struct psabench_part *p)
     return hash;
 }
 
-struct rng api_noise(const struct psabench_part *p, const char *source)
+struct draws api_noise(const struct psabench_part *p, const char *source)
 {
-    return rng_stream(p->bench->seed, api_serial(p), source);
+    return draws_of(p->bench->seed, api_serial(p), source);
 }
 
 psabench *psabench_of(const psabench_part *p)

@@ -200,9 +200,9 @@ static void follow_trace(struct psabench_part *p, int64_t t_ns)
 
 /* ---- the board ---- */
 
-static double accel_input(void *ctx, unsigned axis, int64_t t_ns)
+static void accel_input(void *ctx, unsigned axis, const struct looks *at, double *out)
 {
-    return api_input(ctx, axis, t_ns);
+    for (unsigned i = 0; i < at->n; i++) out[i] = api_input(ctx, axis, at->t_ns[i]);
 }
 
 static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)

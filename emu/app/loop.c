@@ -10,6 +10,12 @@
 #define BUSY_TURNS 32u                 /* consecutive turns with input, then pending signals are taken */
 #define SLOW_NS    INT64_C(2000000000) /* wall time; a busy reader has read by then */
 
+/* While all boards sleep nothing comes out that could fill a buffer: simulated time between looks at input is as long as takes
+ * about STRIDE_WALL_NS. */
+#define STRIDE_MIN_NS  INT64_C(20000000)
+#define STRIDE_MAX_NS  NS_PER_S
+#define STRIDE_WALL_NS INT64_C(1000000)
+
 /* ---- time */
 
 static int64_t min_ns(int64_t a, int64_t b)
@@ -17,8 +23,16 @@ static int64_t min_ns(int64_t a, int64_t b)
     return a < b ? a : b;
 }
 
-/* One slice of simulated time towards until_ns; true when it has been reached. */
-static bool run_slice(struct loop *l, int64_t until_ns)
+static void run_stride(struct loop *l, int64_t until_ns)
+{
+    const int64_t began_ns = pace_clock_ns();
+    sched_run_towards(l->sched, min_ns(until_ns, l->sched->now_ns + l->stride_ns), until_ns);
+    const int64_t took_ns = pace_clock_ns() - began_ns;
+    if (took_ns > STRIDE_WALL_NS && l->stride_ns > STRIDE_MIN_NS) l->stride_ns /= 2;
+    if (took_ns < STRIDE_WALL_NS / 2 && l->stride_ns < STRIDE_MAX_NS) l->stride_ns *= 2;
+}
+
+static void run_slice(struct loop *l, int64_t until_ns)
 {
     const int64_t now_ns = l->sched->now_ns;
     const int64_t next_ns = sched_next_ns(l->sched);
@@ -26,9 +40,15 @@ static bool run_slice(struct loop *l, int64_t until_ns)
     /* Over a stretch without events in one stride. */
     const int64_t from_ns = next_ns > now_ns && !sliced ? next_ns : now_ns;
     const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + BENCH_SLICE_NS);
-    sched_run_until(l->sched, to_ns);
+    sched_run_towards(l->sched, to_ns, until_ns);
+}
+
+/* Simulated time goes on towards until_ns, as far as it may before input and output are looked at. */
+static void run_on(struct loop *l, int64_t until_ns)
+{
+    if (l->sched->asleep > 0 && l->sched->asleep == l->boards) run_stride(l, until_ns);
+    else run_slice(l, until_ns);
     l->moved(l->ctx, l->sched->now_ns);
-    return l->sched->now_ns == until_ns;
 }
 
 /* Wall pace: everything due by now, instant by instant, so that each one's lateness is known. */
@@ -48,7 +68,7 @@ static void run_step(struct loop *l)
 {
     if (l->run == LOOP_ARMED && l->taken(l->ctx, l->after_taken)) l->run = LOOP_RUNNING;
     if (l->run != LOOP_RUNNING || links_full(l->links)) return;
-    run_slice(l, l->until_ns);
+    run_on(l, l->until_ns);
 }
 
 static bool step_over(const struct loop *l)
@@ -72,7 +92,7 @@ static void advance_time(struct loop *l)
         run_step(l);
         break;
     case PACE_FREE:
-        if (!links_full(l->links)) run_slice(l, l->end_ns);
+        if (!links_full(l->links)) run_on(l, l->end_ns);
         break;
     }
 }
@@ -218,6 +238,14 @@ static void take_signals(const sigset_t *unblocked)
     (void)ppoll(NULL, 0, &none, unblocked);
 }
 
+/* Clients and the counters at the end see boards as if every conversion had been computed. */
+static void settle_boards(struct loop *l)
+{
+    if (l->sched->asleep == 0) return;
+    sched_settle(l->sched);
+    l->moved(l->ctx, l->sched->now_ns);
+}
+
 static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
 {
     struct link *polled[LOOP_LINKS_MAX];
@@ -232,6 +260,7 @@ static void wait_and_serve(struct loop *l, const sigset_t *unblocked)
     if (l->busy_turns % BUSY_TURNS == BUSY_TURNS - 1) take_signals(unblocked);
     /* Input is stamped with the simulated time of its arrival: first bring the simulation there. */
     if (ready > 0 && l->started && l->pace->kind == PACE_WALL) run_wall(l);
+    if (ready > 0) settle_boards(l);
     if (ready > 0) serve_polled(l, polled, p, n);
     serve_timers(l);
     say_notices(l);
@@ -273,6 +302,7 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
     sigprocmask(SIG_SETMASK, NULL, &open);
     sigdelset(&open, SIGINT);
     sigdelset(&open, SIGTERM);
+    l->stride_ns = STRIDE_MIN_NS;
     while (!l->quit && !*stop && !is_over(l)) {
         const bool armed = l->run == LOOP_ARMED;
         if (!armed) advance_time(l);
@@ -287,6 +317,7 @@ void loop_run(struct loop *l, const volatile sig_atomic_t *stop)
         wait_and_serve(l, &open);
         if (armed) advance_time(l);
     }
+    settle_boards(l);
 }
 
 void loop_drain(struct loop *l, int timeout_ms)

@@ -18,6 +18,7 @@ struct loop {
     struct sched *sched;
     struct pace *pace;
     struct links *links;
+    unsigned boards;                          /* that may be asleep */
     int64_t end_ns;                           /* simulated time at which to stop; SCHED_NEVER: run on */
     bool (*may_start)(void *ctx);             /* free, wall: time waits until this is true; NULL: at once */
     void (*moved)(void *ctx, int64_t now_ns); /* after time has moved: traces and files follow */
@@ -32,6 +33,7 @@ struct loop {
     enum { LOOP_IDLE, LOOP_ARMED, LOOP_RUNNING } run; /* step pace: ARMED waits for one look at all input */
     int64_t until_ns;                                 /* of the run */
     uint64_t after_taken;
+    int64_t stride_ns;     /* simulated time between looks at input while all boards sleep */
     int64_t full_since_ns; /* wall time at which simulated time began to wait for a reader; 0: it does not wait */
     unsigned notices;      /* said so far */
     unsigned busy_turns;   /* consecutive turns with a ready descriptor */

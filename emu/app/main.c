@@ -72,7 +72,8 @@ static bool load_bench(const struct options *o, const struct snapshot *from, str
                              : scenario_load(o->scenario ? o->scenario : "calibrate", s, why, cap);
     if (!loaded || !scenario_open(s, why, cap)) return false;
     override_scenario(s, o);
-    bench_init(bench, s, 0);
+    if (!bench_init(bench, s, 0)) return why_fail(why, cap, "%s: out of memory for %u units", s->path, s->unit_count);
+    bench->sched.eager = o->eager;
     return timeline_check(bench, why, cap);
 }
 
@@ -147,13 +148,14 @@ int main(int argc, char *argv[])
     if (o.action == OPTIONS_LIST_KEYS) scenario_keys(stdout);
     if (o.action != OPTIONS_RUN && o.action != OPTIONS_DUMP) return end_stdout();
     struct scenario *scenario = malloc(sizeof *scenario);
-    struct bench *bench = malloc(sizeof *bench);
+    struct bench *bench = calloc(1, sizeof *bench); /* without units: bench_free() is harmless */
     struct service *service = malloc(sizeof *service);
     const int status = !scenario || !bench || !service ? print_error(SERVICE_MACHINE, "out of memory")
                        : o.action == OPTIONS_DUMP      ? dump_scenario(&o, scenario, bench)
                        : o.restore                     ? restore_bench(&o, scenario, bench, service)
                                                        : run_bench(&o, NULL, scenario, bench, service);
     free(service);
+    if (bench) bench_free(bench);
     free(bench);
     free(scenario);
     return status;

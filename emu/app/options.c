@@ -317,6 +317,8 @@ static const struct row rows[] = {
      "                           a logic analyser begins"},
     {"--seed", " N", set_seed, 0, "random seed; overrides the scenario"},
     {"--start", NULL, set_flag, IN(start), "start the units without an NMT command"},
+    {"--eager", NULL, set_flag, IN(eager), "compute every conversion, also of units that no one looks at\n"
+     "                           (docs/reference/lazy.md)"},
     {"--bitrate", " HZ", set_rate, IN(bitrate), "bit rate of every bus; overrides the scenario; 0: frames take no time"},
     {"--data-bitrate", " HZ", set_rate, IN(data_bitrate), "data bit rate of FD frames; overrides the scenario; 0: no FD"},
     {"--epoch", " SECONDS", set_epoch, 0, "offset of the time stamps that clients receive"},

@@ -107,6 +107,7 @@ struct options {
     int64_t epoch_ns; /* added to time stamps */
     bool wait_client; /* time begins with the first CAN client */
     bool until_eof;   /* end with standard input */
+    bool eager;       /* conversions that no one looks at are computed, too */
     bool start;       /* units start operational, without waiting for NMT */
     bool quiet;       /* no counters on stderr at the end */
 };

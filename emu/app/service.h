@@ -49,8 +49,6 @@ struct service {
     struct loop loop;
     struct control_bench view; /* what the commands may reach */
     struct fault_engine faults;
-    struct control control, truth;
-    struct timeline timeline;
     struct ctl_client *runner;     /* who waits for the answer to `run` */
     char vcd_path[4096];           /* of the recording, --vcd or vcd.start; Linux takes no longer path */
     char vcd_why[CONTROL_WHY_MAX]; /* why it has ended early; "": it has not */
@@ -68,6 +66,9 @@ struct service {
     int64_t lcm_look_ns;  /* wall time of the next look whether its file is there */
     struct snapshot_observers observers;
     struct link input; /* --until-eof */
+    /* last: who begins with them clears what has to be clear, and not the megabytes of room for a reply */
+    struct timeline timeline;
+    struct control control, truth;
 };
 
 /* Where the bench comes from. */

@@ -2,6 +2,7 @@
 #include "app/service.h"
 
 #include <errno.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -149,7 +150,9 @@ static void on_moved(void *ctx, int64_t now_ns)
 static void run_done(void *ctx)
 {
     struct service *s = ctx;
-    if (s->runner) ctl_reply(s->runner, control_run_done(&s->control, s->bench->sched.now_ns));
+    const char *reply = s->runner ? control_run_done(&s->control, s->bench->sched.now_ns) : NULL;
+    if (s->loop.run != LOOP_IDLE) return; /* the next piece of the same run */
+    if (reply) ctl_reply(s->runner, reply);
     s->runner = NULL;
 }
 
@@ -176,7 +179,7 @@ static void on_cycle(void *ctx, unsigned unit, const struct board_cycle *c)
 
 static void init_service(struct service *s, struct bench *b, const struct options *o)
 {
-    memset(s, 0, sizeof *s);
+    memset(s, 0, offsetof(struct service, timeline));
     s->o = o;
     s->bench = b;
     b->on_frame = on_frame;
@@ -196,6 +199,7 @@ static void init_service(struct service *s, struct bench *b, const struct option
     s->loop = (struct loop){.sched = &b->sched,
                             .pace = &s->pace,
                             .links = &s->ports.links,
+                            .boards = b->scenario.unit_count,
                             .end_ns = o->for_ns,
                             .may_start = may_start,
                             .moved = on_moved,

@@ -81,4 +81,14 @@ static inline struct clk_pos clk_on(struct clk_pos p, const struct clk_step *s)
     return p;
 }
 
+/* The latest edge of p, p + s, p + 2 s ... at or before t_ns, which is not before p; s goes forward. */
+static inline struct clk_pos clk_on_to(struct clk_pos p, const struct clk_step *s, int64_t t_ns)
+{
+    const int64_t n = (t_ns - p.t_ns) / (s->ns + 1); /* never too many */
+    const int64_t rest = p.rest + n * s->rest;
+    p = (struct clk_pos){p.k + n * s->k, p.t_ns + n * s->ns + rest / s->hz, rest % s->hz};
+    for (struct clk_pos next; next = clk_on(p, s), next.t_ns <= t_ns;) p = next;
+    return p;
+}
+
 #endif

@@ -113,6 +113,24 @@ struct det_pair det_sin_cos(double x_rad)
     return (struct det_pair){(k & 2) ? -s : s, ((k + 1) & 2) ? -c : c};
 }
 
+#define ROUND_DOUBLE 0x1.8p52 /* adding and taking it off rounds to an integer, without a call of floor() */
+
+/* |d| <= 1/128: the sine's next term is below 4e-19, the cosine's below 4e-22. */
+struct det_pair det_sin_cos_near(struct det_near *near, double x_rad)
+{
+    const double at_rad = ((x_rad * 64.0 + ROUND_DOUBLE) - ROUND_DOUBLE) * 0x1p-6;
+    if (at_rad != near->kept_rad || near->kept.cos == 0.0) {
+        near->kept_rad = at_rad;
+        near->kept = det_sin_cos(at_rad);
+    }
+    const struct det_pair k = near->kept;
+    const double d = x_rad - at_rad;
+    const double z = d * d;
+    const double sin_d = d - d * z * (1.0 / 6 - z * (1.0 / 120));
+    const double versine_d = z * (0.5 - z * (1.0 / 24 - z * (1.0 / 720)));
+    return (struct det_pair){k.sin + (k.cos * sin_d - k.sin * versine_d), k.cos - (k.sin * sin_d + k.cos * versine_d)};
+}
+
 /* 0 <= t <= 1. atan t = atan c + atan((t - c)/(1 + t c)) with c the nearest quarter: |s| <= 1/8, s^19/19 is below 1e-18. */
 static double atan_unit(double t)
 {

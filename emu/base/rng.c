@@ -30,9 +30,14 @@ struct rng rng_stream(uint64_t seed, uint64_t unit, const char *source)
     return r;
 }
 
+static double uniform_of(uint64_t u)
+{
+    return ((double)(u >> 12) + 0.5) * 0x1p-52;
+}
+
 double rng_uniform(struct rng *r)
 {
-    return ((double)(rng_u64(r) >> 12) + 0.5) * 0x1p-52;
+    return uniform_of(rng_u64(r));
 }
 
 static double poly_ratio(const double *num, const double *den, double x)
@@ -74,5 +79,10 @@ static double inverse_normal(double p)
 
 double rng_gauss(struct rng *r)
 {
-    return inverse_normal(rng_uniform(r));
+    return rng_normal(rng_u64(r));
+}
+
+double rng_normal(uint64_t u)
+{
+    return inverse_normal(uniform_of(u));
 }

@@ -1,4 +1,5 @@
-/* Seeded noise: one independent stream per unit and source.
+/* Seeded streams: one independent stream per unit and source, for what is drawn once or event by event. White noise of looks
+ * has its draws by number: draws.h.
  *
  * xoshiro256** seeded by splitmix64 from (seed, unit, source); the Gaussian variate is the inverse normal distribution
  * (Wichura 1988, AS 241, PPND16) of one uniform draw, so that each call consumes exactly one number and the same seed
@@ -36,5 +37,6 @@ static inline uint64_t rng_u64(struct rng *r)
 
 double rng_uniform(struct rng *r); /* open interval (0, 1), 53 bits */
 double rng_gauss(struct rng *r);   /* mean 0, standard deviation 1 */
+double rng_normal(uint64_t u);     /* what rng_gauss() makes of the number u */
 
 #endif

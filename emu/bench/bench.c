@@ -2,6 +2,7 @@
 
 #include "gen/uds_dids.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { START_NS = 1000000, NMT_START = 1, SDO_WRITE_U8 = 0x2F, OBJECT_FRAME_FORM = 0x2020 };
@@ -45,9 +46,8 @@ static void on_start(void *ctx, int64_t t_ns)
 static void init_unit(struct bench *b, unsigned i)
 {
     const struct scenario_unit *u = &b->scenario.units[i];
-    memset(&b->unit[i], 0, sizeof b->unit[i]);
-    b->cycle[i] = (struct bench_cycle){.busy = false};
     unit_init(&b->unit[i], &u->cfg, &b->lab, &b->sched);
+    unit_trace(&b->unit[i])->group = &b->traces;
     const struct board_can_cfg cfg = {.name = u->name, .node_id = u->cfg.node, .refused = on_refused, .ctx = b};
     unit_connect(&b->unit[i], &cfg, &b->bus[u->bus], &b->sched);
     if (u->uds_ecu) uds_door_init(&b->uds[u->bus][u->uds_ecu - 1], u->uds_ecu, &uds_dids, unit_co(&b->unit[i]));
@@ -135,10 +135,13 @@ void bench_view(struct bench *b, struct control_bench *v)
     }
 }
 
-void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
+bool bench_init(struct bench *b, const struct scenario *s, unsigned watched)
 {
-    memset(b, 0, offsetof(struct bench, unit));
-    b->scenario = *s;
+    memset(b, 0, offsetof(struct bench, uds));
+    scenario_copy(&b->scenario, s);
+    b->unit = calloc(s->unit_count, sizeof *b->unit); /* pages never written take no memory */
+    b->cycle = calloc(s->unit_count, sizeof *b->cycle);
+    if (!b->unit || !b->cycle) return false;
     b->watched = watched;
     scenario_bind(&b->scenario);
     sched_init(&b->sched);
@@ -148,6 +151,15 @@ void bench_init(struct bench *b, const struct scenario *s, unsigned watched)
     for (unsigned i = 0; i < s->unit_count; i++) init_unit(b, i);
     sched_ev(&b->starter.ev, on_start, b);
     sched_ev(&b->power, on_power, b);
+    return true;
+}
+
+void bench_free(struct bench *b)
+{
+    free(b->unit);
+    free(b->cycle);
+    b->unit = NULL;
+    b->cycle = NULL;
 }
 
 bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes)
@@ -175,14 +187,12 @@ void bench_power_up(struct bench *b)
 
 void bench_follow(struct bench *b)
 {
-    for (unsigned i = 0; i < b->scenario.unit_count; i++) {
-        trace_advance(unit_trace(&b->unit[i]), b->sched.now_ns - TRACE_LAG_NS);
-    }
+    trace_advance_group(&b->traces, b->sched.now_ns - TRACE_LAG_NS);
 }
 
 void bench_finish(struct bench *b)
 {
-    for (unsigned i = 0; i < b->scenario.unit_count; i++) trace_advance(unit_trace(&b->unit[i]), b->sched.now_ns);
+    trace_advance_group(&b->traces, b->sched.now_ns);
     if (b->recording) vcd_close(&b->vcd, b->sched.now_ns);
     b->recording = false;
 }

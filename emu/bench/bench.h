@@ -5,6 +5,7 @@
 #include "canopen/uds_door.h"
 #include "command/view.h"
 #include "scenario/scenario.h"
+#include "trace/group.h"
 #include "trace/sampler.h"
 #include "trace/vcd.h"
 
@@ -27,7 +28,6 @@ struct bench_cycle {
 };
 
 struct bench {
-    struct scenario scenario;
     struct sched sched;
     struct can_bus bus[SCENARIO_BUSES_MAX];
     unsigned buses;
@@ -45,14 +45,17 @@ struct bench {
     struct vcd vcd;
     struct sampler sampler; /* of the line port */
     uint8_t line_ring[SAMPLER_RING];
-    /* last, and only those that the scenario has are written: 20 MB of address space, 0.3 MB a unit in use */
-    struct unit unit[SCENARIO_UNITS_MAX];
-    struct bench_cycle cycle[SCENARIO_UNITS_MAX];
+    struct trace_group traces; /* of all units */
+    /* As many as the scenario has, from the heap: half a megabyte of addresses each, a tenth of it in use without observers */
+    struct unit *unit;
+    struct bench_cycle *cycle;
     struct uds_door uds[SCENARIO_BUSES_MAX][UDS_ECU_MAX]; /* those that the scenario has */
+    struct scenario scenario;                             /* last: its units are, too */
 };
 
-/* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. */
-void bench_init(struct bench *b, const struct scenario *s, unsigned watched);
+/* The scenario is copied. Megabytes: take it from the heap; it never moves afterwards. False: out of memory. */
+bool bench_init(struct bench *b, const struct scenario *s, unsigned watched);
+void bench_free(struct bench *b); /* what bench_init() took; harmless after it failed */
 
 /* Index of the unit of that name, or -1. */
 int bench_find_unit(const struct scenario *s, const char *name);

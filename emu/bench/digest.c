@@ -54,7 +54,7 @@ static void add_platform(struct sha256 *s, struct platform *p, int64_t t_ns)
                            at.drift_radps[0],  at.drift_radps[1],  at.torque_radps[0], at.torque_radps[1],
                            p->setting.set_rad, p->setting.read_rad};
     for (unsigned i = 0; i < sizeof real / sizeof *real; i++) board_digest_real(s, real[i]);
-    board_digest_noise(s, &p->draws);
+    for (unsigned i = 0; i < 4; i++) board_digest_u64(s, p->draws.s[i]);
     board_digest_u64(s, (uint64_t)p->vehicle.commands << 1 | p->stuck);
     add_push(s, &p->vehicle);
 }

@@ -1,6 +1,6 @@
 #include "bench/journal.h"
 
-#include "base/can_text.h"
+#include "base/can/text.h"
 #include "base/why.h"
 #include "command/exact.h"
 
@@ -159,6 +159,8 @@ void journal_cycle(struct journal *j, unsigned unit, const struct board_cycle *c
 
 void journal_watchers(struct journal *j)
 {
+    if (j->changes == j->bench->traces.changes) return;
+    j->changes = j->bench->traces.changes;
     for (unsigned i = 0; i < j->bench->scenario.unit_count; i++) {
         const uint64_t watched = unit_trace(&j->bench->unit[i])->watched;
         if (watched == j->watched[i]) continue;

@@ -3,7 +3,7 @@
  *     {"t":1000,"bus":0,"came":1,"heir_of":0,"name":"can0","fd":false}     a program is on the bus, the first one
  *     {"t":2500,"bus":0,"from":1,"frame":"605#4018100100000000"}     it sent a frame (can-utils' notation; ## for FD)
  *     {"t":2500,"ran":true,"cmd":"head.turn","args":{"angle_deg":90}}     a command that changes the bench was carried out
- *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was rejected on the spot: even that moves noise
+ *     {"t":2500,"refused":true,"cmd":"supply.set",...}     one was rejected on the spot: it changed nothing
  *     {"t":9000,"bus":0,"went":1}     the program has left
  *     {"t":2500,"unit":0,"cycle":3,"write":true,"data":9029,"strobe_ns":800}     one on the bus of a unit, at address 3
  *     {"t":9000,"unit":0,"watch":16383}     a client observes these lines of a unit (0: none)
@@ -41,6 +41,7 @@ struct journal {
     unsigned said;    /* announcements of how full it is */
     int64_t moved_ns; /* time stood still here since it last moved */
     bool ran;         /* what is due at last_ns has run since the last entry */
+    uint64_t changes; /* of what is watched, as far as it is in `watched` */
     uint64_t watched[CONTROL_UNITS_MAX];
     struct journal_tap tap[CONTROL_BUSES_MAX];
 };

@@ -303,7 +303,7 @@ static void run_to(const struct snapshot_world *w, int64_t t_ns)
     do {
         const int64_t next_ns = sched_next_ns(s);
         const int64_t from_ns = next_ns > s->now_ns ? next_ns : s->now_ns;
-        sched_run_until(s, from_ns >= t_ns - BENCH_SLICE_NS ? t_ns : from_ns + BENCH_SLICE_NS);
+        sched_run_towards(s, from_ns >= t_ns - BENCH_SLICE_NS ? t_ns : from_ns + BENCH_SLICE_NS, t_ns);
         bench_follow(w->bench);
         journal_moved(w->journal);
     } while (s->now_ns < t_ns);

@@ -7,10 +7,9 @@
 #include <math.h>
 #include <stddef.h>
 
-#define NOMINAL_DEGC  25.0  /* tolerances are those at this temperature */
-#define SAME_DT_NS    1     /* steps of a clock that is no whole number of ns differ by this */
-#define FIRST_PULL_NS 31250 /* interval assumed before the first call: one block of the converter at 1000 SPS */
-#define TWO_PI        6.283185307179586
+#define NOMINAL_DEGC 25.0 /* tolerances are those at this temperature */
+#define SAME_DT_NS   1    /* steps of a clock that is no whole number of ns differ by this */
+#define TWO_PI       6.283185307179586
 
 struct afe_cfg afe_nominal(enum afe_input input)
 {
@@ -34,7 +33,7 @@ static struct afe_scale scale_at(const struct afe_cfg *c, double degc)
                               .divider = with_ppm(c->divider_ratio, c->divider_tol_ppm, c->divider_tc_ppm_per_k, dt_k)};
 }
 
-void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise)
+void afe_init(struct afe *a, const struct afe_cfg *cfg, struct draws noise)
 {
     *a = (struct afe){.cfg = *cfg, .scale = scale_at(cfg, NOMINAL_DEGC), .noise = noise, .t_ns = -1, .dt_ns = -10};
 }
@@ -44,50 +43,19 @@ static double clip_v(double v, double limit_v)
     return v > limit_v ? limit_v : v < -limit_v ? -limit_v : v;
 }
 
-/* Signal -> load, if it is a current -> buffer. */
-static double load_v(const struct afe_cfg *c, const struct afe_scale *s, double signal)
-{
-    return clip_v(signal * s->load + c->buffer_offset_v + s->drift_v, c->clip_v);
-}
+/* What is less is gone: two pasts of the filter do not stay apart in the last bit, even of an input at rest. */
+#define GONE_V 1e-15
 
-/* Constants of a step of dt: they change only when the converter changes its pace. */
 static void set_step(struct afe *a, int64_t dt_ns)
 {
-    const double dt_s = (double)dt_ns / (double)NS_PER_S;
-    const double x = TWO_PI * a->cfg.filter_hz * dt_s;
+    const double x = TWO_PI * a->cfg.filter_hz * ((double)dt_ns / (double)NS_PER_S);
     a->dt_ns = dt_ns;
     a->keep = a->cfg.filter_hz <= 0.0 || x > 700.0 ? 0.0 : det_exp(-x);
-    a->noise_v = a->cfg.noise_v_rthz > 0.0 ? a->cfg.noise_v_rthz * sqrt(1.0 / (2.0 * dt_s)) : 0.0;
 }
 
-static bool same_step(const struct afe *a, int64_t dt_ns)
+static bool same_step(int64_t known_ns, int64_t dt_ns)
 {
-    return dt_ns >= a->dt_ns - SAME_DT_NS && dt_ns <= a->dt_ns + SAME_DT_NS;
-}
-
-/* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). */
-static double filtered_v(struct afe *a, double v, int64_t t_ns)
-{
-    a->state_v = v + (a->state_v - v) * a->keep;
-    a->t_ns = t_ns;
-    return a->state_v;
-}
-
-/* The first sample, a new step or temperature, noise. ripple_v comes through the buffer. */
-static double step_v(struct afe *a, double signal, double ripple_v, double temp_degc, int64_t t_ns)
-{
-    const bool first = a->t_ns < 0;
-    const int64_t dt_ns = first ? FIRST_PULL_NS : t_ns - a->t_ns;
-    if (dt_ns <= 0) return a->state_v;
-    if (!same_step(a, dt_ns)) set_step(a, dt_ns);
-    if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
-    double v = load_v(&a->cfg, &a->scale, signal) + ripple_v;
-    if (a->noise_v > 0.0) v += a->noise_v * rng_gauss(&a->noise);
-    v /= a->scale.divider;
-    if (first) a->state_v = v; /* at power-on the filter has long been settled */
-    if (!first) return filtered_v(a, v, t_ns);
-    a->t_ns = t_ns;
-    return a->state_v;
+    return dt_ns >= known_ns - SAME_DT_NS && dt_ns <= known_ns + SAME_DT_NS;
 }
 
 /* ---- faults */
@@ -133,48 +101,98 @@ static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_
     return out;
 }
 
-static double any_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
+/* ---- a row */
+
+/* Signals to volts behind the buffer. Copies, which no store into the row can change. */
+static void load_row(const struct afe *a, double *row, unsigned n)
 {
-    if (!a->faults) return step_v(a, signal, 0.0, temp_degc, t_ns);
-    const struct faulty f = apply_faults(a, signal, t_ns);
-    return step_v(a, f.signal, f.ripple_v, temp_degc, t_ns) / f.reference;
+    const double load = a->scale.load, offset_v = a->cfg.buffer_offset_v, drift_v = a->scale.drift_v;
+    const double limit_v = a->cfg.clip_v;
+    for (unsigned i = 0; i < n; i++) row[i] = clip_v(row[i] * load + offset_v + drift_v, limit_v);
 }
 
-/* A step and a temperature like the last, no noise, no fault: the constants hold. */
-static bool is_quiet_step(const struct afe *a, double temp_degc, int64_t t_ns)
+/* The same with the faults that are before it. */
+static void faulty_row(const struct afe *a, double *row, const struct looks *at)
 {
-    const int64_t dt_ns = t_ns - a->t_ns;
-    return dt_ns > 0 && same_step(a, dt_ns) && temp_degc == a->scale.degc && !(a->noise_v > 0.0) && !a->faults;
-}
-
-double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns)
-{
-    if (!is_quiet_step(a, temp_degc, t_ns)) return any_out_v(a, signal, temp_degc, t_ns);
-    return filtered_v(a, load_v(&a->cfg, &a->scale, signal) / a->scale.divider, t_ns);
-}
-
-/* Usual steps from the first on; returns how many. A copy of the chain, which no store into the row can change. */
-static unsigned usual_row(struct afe *a, double *row, const int64_t *t_ns, unsigned n)
-{
-    struct afe own = *a;
-    unsigned i = 0;
-    do {
-        row[i] = filtered_v(&own, load_v(&own.cfg, &own.scale, row[i]) / own.scale.divider, t_ns[i]);
-        i++;
-    } while (i < n && t_ns[i] > own.t_ns && same_step(&own, t_ns[i] - own.t_ns));
-    a->state_v = own.state_v;
-    a->t_ns = own.t_ns;
-    return i;
-}
-
-void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const int64_t *t_ns, unsigned n)
-{
-    for (unsigned i = 0; i < n;) {
-        if (is_quiet_step(a, temp_degc, t_ns[i])) {
-            i += usual_row(a, signal_to_v + i, t_ns + i, n - i);
-        } else {
-            signal_to_v[i] = any_out_v(a, signal_to_v[i], temp_degc, t_ns[i]);
-            i++;
-        }
+    for (unsigned i = 0; i < at->n; i++) {
+        const struct faulty f = apply_faults(a, row[i], at->t_ns[i]);
+        row[i] = f.signal;
+        load_row(a, &row[i], 1);
+        row[i] += f.ripple_v;
     }
+}
+
+static void add_noise(const struct afe *a, double *row, const struct looks *at)
+{
+    const double rms_v = looks_white_rms(a->cfg.noise_v_rthz, at->every_ns);
+    for (unsigned i = 0; i < at->n; i++) row[i] += rms_v * draws_gauss(&a->noise, at->t_ns[i]);
+}
+
+/* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). At power-on it has long been
+ * settled. */
+static void filter_row(struct afe *a, double *row, const struct looks *at)
+{
+    const double divider = a->scale.divider;
+    double state_v = a->t_ns < 0 ? row[0] / divider : a->state_v;
+    double keep = a->keep;
+    int64_t last_ns = a->t_ns < 0 ? at->t_ns[0] : a->t_ns, known_ns = a->dt_ns;
+    for (unsigned i = 0; i < at->n; i++) {
+        const int64_t dt_ns = at->t_ns[i] - last_ns;
+        if (dt_ns > 0) {
+            const double v = row[i] / divider;
+            if (!same_step(known_ns, dt_ns)) {
+                set_step(a, dt_ns);
+                known_ns = dt_ns;
+                keep = a->keep;
+            }
+            const double off_v = (state_v - v) * keep;
+            state_v = fabs(off_v) < GONE_V ? v : v + off_v;
+            last_ns = at->t_ns[i];
+        }
+        row[i] = state_v;
+    }
+    a->state_v = state_v;
+    a->t_ns = last_ns;
+}
+
+void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const struct looks *at)
+{
+    if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
+    if (a->faults) faulty_row(a, signal_to_v, at);
+    else load_row(a, signal_to_v, at->n);
+    if (a->cfg.noise_v_rthz > 0.0) add_noise(a, signal_to_v, at);
+    filter_row(a, signal_to_v, at);
+    for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] /= apply_faults(a, 0.0, at->t_ns[i]).reference;
+}
+
+/* ---- rows left out */
+
+/* Of a difference in the last bit a step that keeps less leaves, by the rounding, nothing at least every other time: after the
+ * 2000 samples of a filter's memory two pasts differ once in 2^2000 times. */
+#define KEEP_MAX 0.5
+
+struct looks_range afe_range_v(const struct afe *a, struct looks_range signal, int64_t every_ns)
+{
+    const double noise_v = DRAWS_GAUSS_MAX * looks_white_rms(a->cfg.noise_v_rthz, every_ns);
+    double low_v = INFINITY, high_v = -INFINITY;
+    for (int degc = BOARD_COLDEST_DEGC; degc <= BOARD_WARMEST_DEGC; degc += BOARD_WARMEST_DEGC - BOARD_COLDEST_DEGC) {
+        const struct afe_scale s = scale_at(&a->cfg, degc);
+        const double mid_v = signal.mid * s.load + a->cfg.buffer_offset_v + s.drift_v;
+        const double off_v = signal.off * fabs(s.load) + noise_v;
+        low_v = fmin(low_v, (mid_v - off_v) / s.divider);
+        high_v = fmax(high_v, (mid_v + off_v) / s.divider);
+    }
+    return (struct looks_range){0.5 * (low_v + high_v), 0.5 * (high_v - low_v)};
+}
+
+bool afe_forgets(const struct afe *a, int64_t every_ns)
+{
+    struct afe step = {.cfg = a->cfg};
+    set_step(&step, every_ns);
+    return !a->faults && step.keep <= KEEP_MAX;
+}
+
+void afe_skip(struct afe *a, int64_t t_ns)
+{
+    a->t_ns = t_ns;
 }

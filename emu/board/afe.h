@@ -4,7 +4,8 @@
 #ifndef PSABENCH_BOARD_AFE_H
 #define PSABENCH_BOARD_AFE_H
 
-#include "base/rng.h"
+#include "base/draws.h"
+#include "base/looks.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -54,16 +55,15 @@ struct afe_scale {
 struct afe {
     struct afe_cfg cfg;
     struct afe_scale scale;
-    struct rng noise;
+    struct draws noise;
     double state_v; /* filter */
     int64_t t_ns;   /* of the state; -1 before the first call */
-    int64_t dt_ns;  /* step for which the two constants hold; negative before the first call */
+    int64_t dt_ns;  /* step for which `keep` holds; negative before the first call */
     double keep;    /* what remains of the filter's state after a step */
-    double noise_v; /* rms of one step's noise at the load */
     struct afe_fault *faults;
 };
 
-void afe_init(struct afe *a, const struct afe_cfg *cfg, struct rng noise);
+void afe_init(struct afe *a, const struct afe_cfg *cfg, struct draws noise);
 
 /* Links in as the last; the fault is filled in by the caller. Removing what is not there is harmless. */
 void afe_fault_add(struct afe *a, struct afe_fault *f);
@@ -72,11 +72,21 @@ void afe_fault_remove(struct afe *a, struct afe_fault *f);
 /* Ideal chain, all tolerances and errors zero: 1 kohm (10 V at 10 mA), 1 : 8, 10 kHz, clipping at 10.5 V. */
 struct afe_cfg afe_nominal(enum afe_input input);
 
-/* Volts at the converter for a signal (A or V by cfg.input) at a board temperature, filter and noise included; t_ns never earlier
- * than the last call, the same instant gives the same volts. The filter takes the signal as held since the last call. */
-double afe_out_v(struct afe *a, double signal, double temp_degc, int64_t t_ns);
+/* The widest that a scenario may ask for (scenario/lab.c). */
+enum { BOARD_COLDEST_DEGC = -100, BOARD_WARMEST_DEGC = 200 };
 
-/* The same for n samples in a row, in place: signals in, volts out. */
-void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const int64_t *t_ns, unsigned n);
+/* Volts at the converter for signals within a range, noise of looks every_ns apart included, at -100 to 200 degC. */
+struct looks_range afe_range_v(const struct afe *a, struct looks_range signal, int64_t every_ns);
+
+/* Whether its state is, to the bit, that of any other past after some hundred looks every_ns apart. */
+bool afe_forgets(const struct afe *a, int64_t every_ns);
+
+/* As if the last look had been at t_ns. */
+void afe_skip(struct afe *a, int64_t t_ns);
+
+/* A row of looks in place: signals in (A or V by cfg.input), volts at the converter out, at a board temperature, filter and noise
+ * included. No look is earlier than the last call's, the same instant gives the same volts. The filter takes the signal as held
+ * since the look before. */
+void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const struct looks *at);
 
 #endif

@@ -1,20 +1,28 @@
 #include "board/board.h"
 
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+
+void board_clear(struct board *b, size_t size)
+{
+    const size_t from = offsetof(struct board, trace.pending), to = from + sizeof b->trace.pending;
+    memset(b, 0, from);
+    memset((char *)b + to, 0, size - to);
+}
 
 void board_init(struct board *b, const struct board_line *lines, unsigned count, const struct board_cfg *cfg,
                 const struct board_io *io, struct sched *s)
 {
     static const char *const afe_noise[BOARD_AXES] = {"afe.x", "afe.y", "afe.z"};
-    memset(b, 0, sizeof *b);
+    board_clear(b, sizeof *b);
     b->cfg = *cfg;
     b->io = *io;
     b->sched = s;
     line_faults_init(&b->line, &b->trace);
     for (unsigned i = 0; i < count; i++) (void)trace_add(&b->trace, lines[i].name, lines[i].level);
-    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], board_noise(b, afe_noise[i]));
+    for (unsigned i = 0; i < BOARD_AXES; i++) afe_init(&b->afe[i], &cfg->afe[i], board_draws(b, afe_noise[i]));
 }
 
 void board_put_truth(board_truth_fn *put, void *ctx, double value, const char *name, ...)

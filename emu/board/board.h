@@ -85,6 +85,8 @@ struct board_type {
     bool (*ready)(const struct board *b);
     void (*sample_until)(struct board *b,
                          int64_t t_ns); /* takes its inputs up to now; the physics may change abruptly after */
+    /* Why it computes what no one looks at from t_ns on; a sentence without its end. NULL: it does not. No function: always. */
+    const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
     bool analog;                                          /* it has analog inputs; for faults: sample_until() first */
@@ -93,14 +95,24 @@ struct board_type {
                   void *ctx); /* hidden parameters of the specimen; may be NULL */
 };
 
+/* All zero, first of all in NAME_init(): no state of an earlier run. The room for pending steps, of which there are none, is
+ * left as it is: nine tenths of a board, which takes no memory until its lines are watched. size: of the whole board. */
+void board_clear(struct board *b, size_t size);
+
 /* The base of a board: its trace with these lines, its specimen's analog inputs, no faults. */
 void board_init(struct board *b, const struct board_line *lines, unsigned count, const struct board_cfg *cfg,
                 const struct board_io *io, struct sched *s);
 
-/* One of the specimen's noise sources, or what it is off by. */
+/* What the specimen is off by. */
 static inline struct rng board_noise(const struct board *b, const char *source)
 {
     return rng_stream(b->cfg.seed, b->cfg.serial, source);
+}
+
+/* The white noise of one of them. */
+static inline struct draws board_draws(const struct board *b, const char *source)
+{
+    return draws_of(b->cfg.seed, b->cfg.serial, source);
 }
 
 /* An event, a number in board_type.events. */

@@ -2,7 +2,7 @@
 #ifndef PSABENCH_BOARD_CAN_H
 #define PSABENCH_BOARD_CAN_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "base/sched.h"
 
 #include <stddef.h>

@@ -2,6 +2,7 @@
 #ifndef PSABENCH_BOARD_CFG_H
 #define PSABENCH_BOARD_CFG_H
 
+#include "base/looks.h"
 #include "board/afe.h"
 
 #include <stdint.h>
@@ -19,9 +20,12 @@ struct board_platform_io {
 /* What a board can reach of the world. */
 struct board_io {
     void *ctx;
-    /* Sensor output, A or V by the channel's afe_cfg.input; t_ns never earlier than the axis's last call. Whoever changes the
-     * physics abruptly calls sample_until() first. */
-    double (*accel)(void *ctx, unsigned axis, int64_t t_ns);
+    /* Sensor outputs at a row of looks, A or V by the channel's afe_cfg.input; none earlier than the axis's last call. Call
+     * sample_until() before an abrupt change of the physics. */
+    void (*accel)(void *ctx, unsigned axis, const struct looks *at, double *out);
+    /* What such an output stays within up to until_ns, looks every_ns apart. *why, where that is not known or the output depends on
+     * more of the past than the converters look at. NULL: nothing is known. */
+    struct looks_range (*accel_range)(void *ctx, unsigned axis, int64_t every_ns, int64_t until_ns, const char **why);
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
     void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
     void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */

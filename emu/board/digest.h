@@ -2,7 +2,7 @@
 #ifndef PSABENCH_BOARD_DIGEST_H
 #define PSABENCH_BOARD_DIGEST_H
 
-#include "base/rng.h"
+#include "base/draws.h"
 #include "base/sha256.h"
 
 #include <string.h>
@@ -21,9 +21,10 @@ static inline void board_digest_real(struct sha256 *s, double x)
     board_digest_u64(s, bits);
 }
 
-static inline void board_digest_noise(struct sha256 *s, const struct rng *r)
+static inline void board_digest_noise(struct sha256 *s, const struct draws *d)
 {
-    for (unsigned i = 0; i < 4; i++) board_digest_u64(s, r->s[i]);
+    board_digest_u64(s, d->key);
+    board_digest_u64(s, d->high);
 }
 
 #endif

@@ -1,6 +1,6 @@
 #include "board/node.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
 
 #include <assert.h>
 #include <stdio.h>

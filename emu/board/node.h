@@ -97,8 +97,8 @@ void board_node_reject(struct board_node *n, const char *why);
 void board_node_reject_stream(struct board_node *n, const char *why, int64_t t_ns);
 void board_node_accept_stream(struct board_node *n, int64_t t_ns);
 
-/* Whether the bus can carry `frames` frames that take need_ns at worst (canbits.h) and are due every have_ns; 0: whenever, not
- * judged. False with a sentence about `what` in why. */
+/* Whether the bus can carry `frames` frames that take need_ns at worst (base/can/bits.h) and are due every have_ns; 0: whenever,
+ * not judged. False with a sentence about `what` in why. */
 bool board_node_load_fits(const struct can_bus_cfg *bus, const char *what, unsigned frames, int64_t need_ns,
                           int64_t have_ns, char why[BOARD_NODE_TEXT]);
 

@@ -55,7 +55,7 @@ static void heartbeat_due(void *ctx, int64_t t_ns)
 /* ---- emergency ---- */
 
 /* Bits of 1001h. */
-static uint8_t error_register(const struct co_node *n)
+uint8_t co_node_error_register(const struct co_node *n)
 {
     uint8_t reg = 0;
     for (unsigned i = 0; i < CO_ERRORS_MAX; i++) {
@@ -77,7 +77,7 @@ static void send_emcy(struct co_node *n, uint16_t code, uint8_t source, int64_t 
     if (n->state != CO_OPERATIONAL && n->state != CO_PRE_OPERATIONAL) return;
     uint8_t data[8];
     bits_put_le(data, code, 2);
-    data[2] = error_register(n);
+    data[2] = co_node_error_register(n);
     data[3] = source;
     bits_put_le(&data[4], (uint64_t)(t_ns / NS_PER_US), 4);
     send_frame(n, (uint32_t)ID_EMCY + n->cfg.id, data, sizeof data, t_ns);
@@ -105,7 +105,7 @@ void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns)
     struct co_error *e = code ? find_error(n, code) : NULL;
     if (!e) return;
     *e = (struct co_error){0};
-    if (error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
+    if (co_node_error_register(n) == 0) send_emcy(n, 0, 0, t_ns);
 }
 
 /* CiA 301, table 26, which has no code for error warning: error-passive ends there. In bus-off the messages wait in the
@@ -139,7 +139,7 @@ static uint32_t read_object(void *ctx, const struct co_entry *e, struct co_value
     if (e->index >= TPDO_FIRST && e->index <= TPDO_LAST) return co_pdo_read(n, e, v);
     switch (e->index) {
     case ERROR_REGISTER:
-        v->number = error_register(n);
+        v->number = co_node_error_register(n);
         return CO_OK;
     case ERROR_HISTORY:
         return read_history(n, e->sub, v);
@@ -303,7 +303,7 @@ void co_node_init(struct co_node *n, const struct co_node_cfg *cfg, const struct
     n->io = *io;
     n->bus = bus;
     n->sched = sched;
-    sched_ev(&n->heartbeat, heartbeat_due, n);
+    sched_ev_inner(&n->heartbeat, heartbeat_due, n);
     const struct co_sdo_io sdo = {n, read_object, write_object, send_sdo};
     co_sdo_init(&n->sdo, cfg->od, &sdo, sched);
     n->services =

@@ -8,7 +8,7 @@
 #ifndef PSABENCH_CANOPEN_CO_NODE_H
 #define PSABENCH_CANOPEN_CO_NODE_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "base/sched.h"
 #include "canopen/co_od.h"
 #include "canopen/co_pdo.h"
@@ -106,6 +106,8 @@ void co_node_answer(struct co_node *n, uint32_t ticket, uint32_t abort, const st
 /* An error begins: 1001h, 1003h, EMCY (not in stopped) with five bytes source and time in us. An active error is not
  * reported again. */
 void co_node_error(struct co_node *n, uint16_t code, uint8_t reg, uint8_t source, int64_t t_ns);
+
+uint8_t co_node_error_register(const struct co_node *n); /* object 1001h; 0: no error is active */
 
 /* The error ends, if it was active; the last one to end sends EMCY 0000h. */
 void co_node_error_end(struct co_node *n, uint16_t code, int64_t t_ns);

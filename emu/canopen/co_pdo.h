@@ -6,7 +6,7 @@
 #ifndef PSABENCH_CANOPEN_CO_PDO_H
 #define PSABENCH_CANOPEN_CO_PDO_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "canopen/co_od.h"
 
 #define CO_TPDO_MAX    8u

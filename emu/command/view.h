@@ -2,11 +2,11 @@
 #ifndef PSABENCH_COMMAND_VIEW_H
 #define PSABENCH_COMMAND_VIEW_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "phys/lab.h"
 #include "unit/unit.h"
 
-#define CONTROL_UNITS_MAX 64u
+#define CONTROL_UNITS_MAX 1000u
 #define CONTROL_BUSES_MAX 8u
 #define CONTROL_WHY_MAX   256u
 

@@ -16,10 +16,20 @@ static enum control_outcome do_time(const struct control_call *call)
 static enum control_outcome do_run(const struct control_call *call)
 {
     if (call->control->waiting) return control_reject(call->control, "state", "another run is in progress");
-    const int64_t for_ns = (int64_t)nearbyint(call->v[0].real * 1e9);
-    if (call->bench->sim.run(call->bench->ctx, for_ns, call->v[1].count, call->control->error.why))
-        return CONTROL_LATER;
-    return control_failed(call->control, "state");
+    const struct control_value *v = call->v;
+    const int64_t for_ns = (int64_t)nearbyint(v[0].real * 1e9);
+    const int64_t every_ns = v[4].given ? (int64_t)nearbyint(v[4].real * 1e9) : 1000000;
+    const int64_t piece_ns = v[2].given && every_ns < for_ns ? every_ns : for_ns;
+    if (!call->bench->sim.run(call->bench->ctx, piece_ns, v[1].count, call->control->error.why))
+        return control_failed(call->control, "state");
+    call->control->arrival = (struct control_arrival){.active = v[2].given,
+                                                      .any = !v[3].given,
+                                                      .connection = (uint32_t)v[3].count,
+                                                      .rx = v[2].count,
+                                                      .piece_ns = piece_ns,
+                                                      .piece_end_ns = call->t_ns + piece_ns,
+                                                      .end_ns = call->t_ns + for_ns};
+    return CONTROL_LATER;
 }
 
 static enum control_outcome do_unit_reset(const struct control_call *call)
@@ -79,7 +89,10 @@ static const struct control_command rows[] = {
     {"time", "Reads the simulated time and the pace.", NULL, .run = do_time},
     {"run", "Advances the time in step pace; replies when every event up to then has run and all output is delivered to the kernel.",
      CONTROL_ARGS({"for_s", CONTROL_REAL, false, "s", 0, 86400, .what = "simulated time to run"},
-      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "wait until this many frames in all have come from CAN clients, or a client's queue of 128 is full; then run"}), .run = do_run},
+      {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "wait until this many frames in all have come from CAN clients, or a client's queue of 128 is full; then run"},
+      {"rx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "end early, at the first whole every_s at which this many frames in all have been delivered to a CAN client"},
+      {"client", CONTROL_COUNT, true, NULL, 0, 4294967295.0, .what = "that client's connection number; default: the one that has been on the bus longest"},
+      {"every_s", CONTROL_REAL, true, "s", 1e-6, 1, .what = "how often that is looked at, in simulated time; default: 0.001", .def = 0.001}), .run = do_run},
     {"frames", "Reads the frame counters of each CAN client and its connection number (came): delivered, taken (received from it), dropped, overrun (lost in the kernel), refused (rejected).", NULL, .run = do_frames},
     {"counters", "Reads the counters of pace, bus, clients, files, input log and units, or of one unit.", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_counters},
     {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = describe_units},

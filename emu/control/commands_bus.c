@@ -3,7 +3,7 @@
 #include "command/args.h"
 #include "control/commands.h"
 
-#include "base/can_text.h"
+#include "base/can/text.h"
 
 #include <string.h>
 

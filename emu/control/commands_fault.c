@@ -85,7 +85,7 @@ static enum control_outcome do_points(const struct control_call *call)
     if (call->v[0].given && !k)
         return control_reject(call->control, "range", "kind: expected a name that fault.kinds lists, got \"%.40s\"",
                               call->v[0].text);
-    for (unsigned n = 0; fault_point(call->bench, n, &p, name); n++) {
+    for (struct fault_points at = {0}; fault_point_next(call->bench, &at, &p, name);) {
         if (!k || k->places & FAULT_BIT(p.place)) cJSON_AddItemToArray(points, cJSON_CreateString(name));
     }
     return CONTROL_DONE;

@@ -7,13 +7,16 @@
 #include "control/internal.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench)
 {
-    *c = (struct control){.tables = tables, .bench = bench};
+    memset(c, 0, offsetof(struct control, reply));
+    c->tables = tables;
+    c->bench = bench;
 }
 
 /* ---- carrying out */
@@ -25,7 +28,7 @@ static enum control_outcome carry_out(struct control *c, const struct control_co
     const struct control_call call = {c, c->bench, v, result, t_ns};
     const char *missing = row->missing ? row->missing(c->bench) : NULL;
     const enum control_outcome outcome = missing ? control_reject(c, "state", "%s", missing) : row->run(&call);
-    /* Rejected by its handler, too: converters may have taken their inputs by then, which moves their noise. */
+    /* Rejected by its handler, too: replayed, it is rejected again. */
     if (row->changes && c->bench->process.journal) {
         cJSON *args = control_args_json(row, v);
         c->bench->process.journal(c->bench->ctx, row, args, outcome != CONTROL_REJECTED, t_ns);
@@ -57,8 +60,28 @@ bool control_check(const struct control_table *const *tables, const struct contr
 
 /* ---- a run */
 
+static uint64_t delivered_to(const struct control_bench *b, const struct control_arrival *a)
+{
+    struct control_client k;
+    for (unsigned i = 0; !a->any && b->clients.nth(b->ctx, i, &k); i++) {
+        if (k.connection == a->connection) return k.delivered;
+    }
+    return a->any ? b->clients.can_rx(b->ctx) : 0;
+}
+
+/* The next piece of a run that waits for frames. False: they have come, its time is over, or --for has ended. */
+static bool goes_on(struct control *c, int64_t t_ns)
+{
+    struct control_arrival *a = &c->arrival;
+    if (!a->active || t_ns >= a->end_ns || t_ns < a->piece_end_ns || delivered_to(c->bench, a) >= a->rx) return false;
+    a->piece_end_ns = a->end_ns - t_ns < a->piece_ns ? a->end_ns : t_ns + a->piece_ns;
+    return c->bench->sim.run(c->bench->ctx, a->piece_end_ns - t_ns, 0, c->error.why);
+}
+
 const char *control_run_done(struct control *c, int64_t t_ns)
 {
+    if (goes_on(c, t_ns)) return NULL;
+    c->arrival.active = false;
     cJSON *id = c->run_id;
     struct control_cycle *cycle = c->running;
     c->run_id = NULL;
@@ -75,6 +98,7 @@ const char *control_run_done(struct control *c, int64_t t_ns)
 void control_run_forget(struct control *c)
 {
     (void)control_watch_end(c);
+    c->arrival.active = false;
     cJSON_Delete(c->run_id);
     c->run_id = NULL;
     c->running = NULL;

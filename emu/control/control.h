@@ -13,7 +13,7 @@
 #include "command/args.h"
 #include "control/watch.h"
 
-#define CONTROL_REPLY_MAX  524288u /* counters of 64 units */
+#define CONTROL_REPLY_MAX  (8u << 20) /* counters or truth of 1000 units: 2 MiB */
 #define CONTROL_CYCLES_MAX 64u
 
 /* A cycle on the parallel bus of a board, bus.read or bus.write, until it is over. */
@@ -28,6 +28,14 @@ struct control_cycle {
     int64_t ended_ns;
 };
 
+/* A run that ends early, once frames have come: it goes in pieces, and looks after each. */
+struct control_arrival {
+    bool active, any; /* any: no client was named, the one that has been on the bus longest */
+    uint32_t connection;
+    uint64_t rx;
+    int64_t piece_ns, piece_end_ns, end_ns;
+};
+
 struct control {
     const struct control_table *const *tables;
     const struct control_bench *bench;
@@ -36,11 +44,12 @@ struct control {
     void *client;               /* who sent the line: the application sets it before control_line() */
     bool waiting;               /* a run is under way */
     cJSON *run_id;
+    struct control_arrival arrival;
     struct control_cycle cycle[CONTROL_CYCLES_MAX];
     struct control_cycle *started; /* by the line that is being carried out */
     struct control_cycle *running; /* for which a run is under way; NULL: it is for itself */
     struct control_watch watch;
-    char reply[CONTROL_REPLY_MAX];
+    char reply[CONTROL_REPLY_MAX]; /* last: pages beyond the longest reply so far are never touched */
 };
 
 void control_init(struct control *c, const struct control_table *const *tables, const struct control_bench *bench);
@@ -49,7 +58,7 @@ void control_init(struct control *c, const struct control_table *const *tables, 
  * control_run_done(), or through control_bench.reply() if no run was asked for. */
 const char *control_line(struct control *c, const char *line, int64_t t_ns);
 
-/* The reply to the run that has ended. */
+/* The reply to the run that has ended; NULL: it goes on, control_bench.run() was asked for its next piece. */
 const char *control_run_done(struct control *c, int64_t t_ns);
 
 void control_run_forget(struct control *c);                        /* who asked has gone */

@@ -8,7 +8,7 @@
 #ifndef PSABENCH_FAULT_FAULT_H
 #define PSABENCH_FAULT_FAULT_H
 
-#include "base/can_fault.h"
+#include "base/can/fault.h"
 #include "fault/args.h"
 #include "fault/point.h"
 #include "fault/trigger.h"

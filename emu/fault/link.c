@@ -1,4 +1,4 @@
-/* Faults of the links: what happens to frames on a bus, from a board, and on their way to a program (base/can_fault.h). */
+/* Faults of the links: what happens to frames on a bus, from a board, and on their way to a program (base/can/fault.h). */
 #include "fault/internal.h"
 
 #include <math.h>

@@ -79,8 +79,8 @@ static unsigned index_count(const struct board_type *t, enum fault_place place, 
     }
 }
 
-/* Takes from *n the points that this unit has; true when the n-th was among them. */
-static bool unit_point(const struct control_bench *b, unsigned unit, unsigned *n, struct fault_point *p, char *name)
+/* The n-th point of a unit; false past the last. */
+static bool unit_point(const struct control_bench *b, unsigned unit, unsigned n, struct fault_point *p, char *name)
 {
     const struct board_type *t = b->unit[unit]->type;
     for (unsigned row = 0; row < OF_UNIT; row++) {
@@ -89,7 +89,7 @@ static bool unit_point(const struct control_bench *b, unsigned unit, unsigned *n
         const unsigned count = index_count(t, place, &first);
         for (unsigned i = first; i < first + count; i++) {
             const char *last = point_suffix(t, place, i);
-            if (!last || (*n)-- > 0) continue;
+            if (!last || n-- > 0) continue;
             *p = (struct fault_point){.place = place, .unit = unit, .index = i};
             snprintf(name, FAULT_POINT_MAX, "%s.%s%s", b->unit_name[unit], of_unit[row].infix, last);
             return true;
@@ -124,11 +124,9 @@ static bool point_of_platform(const struct control_bench *b, unsigned n, struct 
     return true;
 }
 
-bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX])
+/* The n-th of those that are not a unit's; false past the last. */
+static bool bench_point(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
 {
-    for (unsigned i = 0; i < b->units; i++) {
-        if (unit_point(b, i, &n, p, name)) return true;
-    }
     if (n < b->buses) {
         *p = (struct fault_point){.place = FAULT_AT_BUS, .index = n};
         if (b->bus_name[n]) snprintf(name, FAULT_POINT_MAX, "bus.%s", b->bus_name[n]);
@@ -147,6 +145,18 @@ bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *
     return n == programs ? point_of_supply(p, name) : point_of_platform(b, n - programs - 1, p, name);
 }
 
+bool fault_point_next(const struct control_bench *b, struct fault_points *at, struct fault_point *p,
+                      char name[FAULT_POINT_MAX])
+{
+    for (; at->unit < b->units; at->unit++, at->n = 0) {
+        if (unit_point(b, at->unit, at->n, p, name)) {
+            at->n++;
+            return true;
+        }
+    }
+    return bench_point(b, at->n++, p, name);
+}
+
 static bool same_letters(const char *a, const char *b)
 {
     while (*a && toupper((unsigned char)*a) == toupper((unsigned char)*b)) a++, b++;
@@ -157,7 +167,7 @@ static bool same_letters(const char *a, const char *b)
 bool fault_point_find(const struct control_bench *b, const char *text, struct fault_point *p,
                       char name[FAULT_POINT_MAX])
 {
-    for (unsigned n = 0; fault_point(b, n, p, name); n++) {
+    for (struct fault_points at = {0}; fault_point_next(b, &at, p, name);) {
         if (strcmp(name, text) == 0) return true;
         if (p->place == FAULT_AT_LINE && same_letters(name, text)) return true;
     }

@@ -26,8 +26,13 @@ struct fault_point {
     unsigned unit, index; /* index: axis, part, line or bus, from 0; of a client its control_client.slot */
 };
 
-/* The n-th point of a bench with its name; false past the last. */
-bool fault_point(const struct control_bench *b, unsigned n, struct fault_point *p, char name[FAULT_POINT_MAX]);
+struct fault_points {
+    unsigned unit, n; /* all zero: before the first point of a bench */
+};
+
+/* The next point of a bench with its name; false past the last. */
+bool fault_point_next(const struct control_bench *b, struct fault_points *at, struct fault_point *p,
+                      char name[FAULT_POINT_MAX]);
 
 #define FAULT_NAMES_MAX 64u
 

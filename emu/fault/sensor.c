@@ -104,11 +104,15 @@ static double value_or(const struct fault *f, enum fault_arg arg, double otherwi
     return fault_given(f, arg) ? f->value[arg] * signal_per_v(fault_unit(f), f->point.index) : otherwise;
 }
 
+#define READING_NS 1000000 /* noise of a fault before, as in a reading at 1000 SPS */
+
 static double output_now(const struct fault *f, int64_t t_ns)
 {
     struct unit *u = fault_unit(f);
     const unsigned axis = f->point.index;
-    return sensor_fault_out(u->sensor_faults[axis], unit_sensor_out(u, axis, t_ns), t_ns);
+    double out = unit_sensor_out(u, axis, t_ns);
+    sensor_fault_row(u->sensor_faults[axis], &(struct looks){&t_ns, 1, READING_NS}, &out);
+    return out;
 }
 
 /* Value and upper value of each kind, by enum sensor_fault_kind. */
@@ -131,7 +135,7 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
                                          .value_high = values[k][1],
                                          .zero = mems ? u->mems[f->point.index].cfg.u0_v : 0.0,
                                          .from_ns = t_ns,
-                                         .noise = f->random};
+                                         .noise = draws_of(f->engine->bench->seed, f->id, "fault")};
     sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);
     return true;
 }

@@ -18,7 +18,7 @@ struct ctl_client {
     uint64_t lost; /* of them, since the last report to the client */
 };
 
-enum { OUT_MAX = 1 << 20, PUSH_HIGH = OUT_MAX / 2 };
+enum { OUT_MAX = 16 << 20, PUSH_HIGH = 1 << 19 }; /* several of the longest replies */
 
 static const char no_text[] = "\xFF"; /* for a line with a NUL in it: what is behind that would be dropped unseen */
 

@@ -30,6 +30,11 @@ static bool is_zero(const double v[3])
     return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
 }
 
+bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3])
+{
+    return is_zero(at_m) && is_zero(mounting->lever_m);
+}
+
 /* How the case is in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
 static struct pose case_in_mount(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
 {
@@ -105,7 +110,7 @@ static void mount_force_mps2(struct lab *l, const struct lab_mounting *mounting,
                              double f_mps2[3])
 {
     struct kinematics kin;
-    if (mounting->on == LAB_PLATFORM && is_zero(at_m) && is_zero(mounting->lever_m)) {
+    if (mounting->on == LAB_PLATFORM && lab_is_centred(mounting, at_m)) {
         platform_force_mps2(&l->platform, t_ns, f_mps2);
         return;
     }
@@ -121,21 +126,69 @@ static void apply_misalignment(const struct lab_mounting *mounting, double a_mps
     pose_into(&misaligned, a_mps2, a_mps2);
 }
 
+/* -f in the mount's axes. */
+static void mount_gravity_mps2(struct lab *l, const struct lab_sensor *s, int64_t t_ns, double a_mps2[3])
+{
+    mount_force_mps2(l, s->mounting, s->at_m, t_ns, a_mps2);
+    for (unsigned k = 0; k < 3; k++) a_mps2[k] = -a_mps2[k];
+    if (s->mounting->on == LAB_PLATFORM) pose_into(platform_level(&l->platform, t_ns), a_mps2, a_mps2);
+}
+
+static unsigned compute_row(struct lab *l, const struct lab_sensor *s, const int64_t *t_ns, unsigned n,
+                            double a_mps2[][3])
+{
+    if (s->mounting->on == LAB_HEAD && lab_is_centred(s->mounting, s->at_m))
+        return head_gravity_row_mps2(&l->head, t_ns, n, a_mps2);
+    if (s->mounting->on == LAB_FIXED) n = 1;
+    for (unsigned i = 0; i < n; i++) mount_gravity_mps2(l, s, t_ns[i], a_mps2[i]);
+    return n;
+}
+
+static bool is_kept(const struct lab_row *row, enum lab_mount on, const int64_t *t_ns, unsigned n)
+{
+    return row->n == n && row->on == on && memcmp(row->t_ns, t_ns, n * sizeof *t_ns) == 0;
+}
+
+static unsigned mount_row(struct lab *l, const struct lab_sensor *s, const int64_t *t_ns, unsigned n,
+                          double a_mps2[][3])
+{
+    struct lab_row *row = &l->row;
+    const enum lab_mount on = s->mounting->on;
+    const bool shared = n > 1 && n <= LAB_ROW && lab_is_centred(s->mounting, s->at_m);
+    if (shared && is_kept(row, on, t_ns, n)) {
+        memcpy(a_mps2, row->a_mps2, n * sizeof *a_mps2);
+        return n;
+    }
+    const unsigned written = compute_row(l, s, t_ns, n, a_mps2);
+    if (!shared || written < n) return written;
+    row->on = on;
+    row->n = n;
+    memcpy(row->t_ns, t_ns, n * sizeof *t_ns);
+    memcpy(row->a_mps2, a_mps2, n * sizeof *a_mps2);
+    return n;
+}
+
+unsigned lab_sensor_row_mps2(struct lab *l, const struct lab_sensor *s, const int64_t *t_ns, unsigned n,
+                             double a_mps2[][3])
+{
+    const struct lab_mounting *m = s->mounting;
+    const bool square = is_zero(m->misalignment_rad);
+    n = mount_row(l, s, t_ns, n, a_mps2);
+    for (unsigned i = 0; i < n; i++) {
+        const enum head_face face = m->on == LAB_HEAD ? head_face(&l->head, t_ns[i]) : HEAD_DIRECT;
+        head_sensor_mps2(face, s->cos_alpha0, s->sin_alpha0, a_mps2[i], a_mps2[i]);
+        if (!square) apply_misalignment(m, a_mps2[i]);
+    }
+    return n;
+}
+
 void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3])
 {
-    double mount[3];
-    const bool on_head = mounting->on == LAB_HEAD;
-    const bool square = is_zero(mounting->misalignment_rad);
-    if (on_head && square && is_zero(at_m) && is_zero(mounting->lever_m)) {
-        head_gravity_mps2(&l->head, t_ns, mount);
-    } else {
-        mount_force_mps2(l, mounting, at_m, t_ns, mount);
-        for (unsigned k = 0; k < 3; k++) mount[k] = -mount[k];
-    }
-    if (mounting->on == LAB_PLATFORM) pose_into(platform_level(&l->platform, t_ns), mount, mount);
-    head_sensor_mps2(on_head ? head_face(&l->head, t_ns) : HEAD_DIRECT, cos_alpha0, sin_alpha0, mount, a_mps2);
-    if (!square) apply_misalignment(mounting, a_mps2);
+    double row[1][3];
+    const struct lab_sensor s = {mounting, at_m, cos_alpha0, sin_alpha0};
+    (void)lab_sensor_row_mps2(l, &s, &t_ns, 1, row);
+    memcpy(a_mps2, row[0], sizeof row[0]);
 }
 
 static const char *const mounts[] = {

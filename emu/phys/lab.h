@@ -28,6 +28,17 @@ struct lab_cfg {
     struct vehicle_cfg vehicle; /* under the platform */
 };
 
+#define LAB_ROW 32u /* instants of a row that are kept */
+
+/* -f in a mount's axes at its centre, at the instants that the last row of looks asked for: three converters on one clock, and
+ * units beside each other, ask for the same ones. A row is asked for before the physics change, never after for the same instants. */
+struct lab_row {
+    enum lab_mount on;
+    unsigned n; /* 0: none */
+    int64_t t_ns[LAB_ROW];
+    double a_mps2[LAB_ROW][3];
+};
+
 struct lab {
     struct site site;
     struct head head;
@@ -36,6 +47,7 @@ struct lab {
     struct supply supply;
     struct pose bench;
     struct platform platform; /* if cfg.present */
+    struct lab_row row;
 };
 
 /* A unit's place. All zero: in the centre of the head, square. */
@@ -61,9 +73,22 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed);
 void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                     struct kinematics *out);
 
-/* What an accelerometer at at_m measures by the convention of mems.h, a = -f, if it is set in the unit with the error alpha0
- * (by cosine and sine): a turn about the mount's z before the face. On the head without lever arms it is the head's own
- * arithmetic, and the fast way. */
+/* At the centre of its mount, where lever arms play no part. */
+bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3]);
+
+/* Where an accelerometer is, and how it was set. */
+struct lab_sensor {
+    const struct lab_mounting *mounting; /* of its unit */
+    const double *at_m;                  /* from the unit's origin, its case's axes */
+    double cos_alpha0, sin_alpha0;       /* of the error of setting: a turn about the mount's z before the face */
+};
+
+/* What it measures at n instants in a row by the convention of mems.h, a = -f. Returns how many are written: 1 if the first holds
+ * for all, else n. On the head without lever arms it is the head's own arithmetic, and the fast way. */
+unsigned lab_sensor_row_mps2(struct lab *l, const struct lab_sensor *s, const int64_t *t_ns, unsigned n,
+                             double a_mps2[][3]);
+
+/* The same at one instant. */
 void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3]);
 

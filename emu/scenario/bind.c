@@ -1,4 +1,5 @@
 /* From the keys to the bench: what a scenario leaves to the seed is drawn here. */
+#include "base/detmath.h"
 #include "scenario/keys.h"
 
 #include <string.h>
@@ -36,8 +37,6 @@ static void draw_unit(const struct scenario *s, struct scenario_unit *u)
         draw_parameters(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
     }
 }
-
-#define RAD_PER_ARCSEC (0.017453292519943295 / 3600.0)
 
 void scenario_bind(struct scenario *s)
 {

@@ -225,7 +225,7 @@ static const struct field scenario_rows[] = {
     {.key = "platform", .type = FIELD_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
     {.key = "vehicle", .type = FIELD_SECTION, .offset = SCENARIO(lab.vehicle), .sub = &scenario_vehicle_fields, .present = SCENARIO(lab.platform.present), .load = scenario_load_vehicle, .what = "the vehicle that carries the platform"},
     {.key = "spread", .type = FIELD_SECTION, .offset = SCENARIO(spread), .sub = &scenario_spread_fields, .load = load_spread, .what = "production spread: standard deviations from unit to unit"},
-    {.key = "units", .type = FIELD_CUSTOM, .load = scenario_load_units, .dump = dump_units, .what = "a sequence of up to 64 units"},
+    {.key = "units", .type = FIELD_CUSTOM, .load = scenario_load_units, .dump = dump_units, .what = "a sequence of up to 1000 units"},
     {.key = "timeline", .type = FIELD_STRUCTS, .offset = SCENARIO(timeline.event), .present = SCENARIO(timeline.count), .sub = &scenario_event_fields, .load = load_timeline, .what = "a sequence of commands, each at its time"},
     {.key = "faults", .type = FIELD_CUSTOM, .load = load_faults, .dump = dump_faults, .what = "a sequence of faults: the arguments of fault.add, given before power-on"},
 };
@@ -234,13 +234,18 @@ const struct fields scenario_fields = FIELDS(scenario_rows);
 
 void scenario_default(struct scenario *s, const char *path)
 {
-    memset(s, 0, sizeof *s);
+    memset(s, 0, offsetof(struct scenario, units));
     s->seed = 1;
     s->bus_count = 1;
     s->bus[0] = (struct scenario_bus){.name = "can0", .cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
     s->lab = lab_default();
     s->site.g_mps2 = s->lab.site.g_mps2;
     snprintf(s->path, sizeof s->path, "%s", path);
+}
+
+void scenario_copy(struct scenario *to, const struct scenario *from)
+{
+    memcpy(to, from, offsetof(struct scenario, units) + from->unit_count * sizeof from->units[0]);
 }
 
 static bool load_scenario(struct yaml_file *f, struct scenario *s)

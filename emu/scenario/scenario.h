@@ -15,7 +15,7 @@
 #ifndef PSABENCH_SCENARIO_SCENARIO_H
 #define PSABENCH_SCENARIO_SCENARIO_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "base/sha256.h"
 #include "scenario/find.h"
 #include "unit/unit.h"
@@ -23,7 +23,7 @@
 #include <cjson/cJSON.h>
 #include <stdio.h>
 
-#define SCENARIO_UNITS_MAX  64u
+#define SCENARIO_UNITS_MAX  1000u
 #define SCENARIO_BUSES_MAX  8u
 #define SCENARIO_EVENTS_MAX 128u
 #define SCENARIO_ARGS_MAX   1024u
@@ -94,9 +94,9 @@ struct scenario {
     struct lab_cfg lab; /* its site: from the one above, by scenario_bind() */
     bool start;         /* units are commanded to stream by the bench itself */
     struct scenario_spread spread;
-    unsigned unit_count;
-    struct scenario_unit units[SCENARIO_UNITS_MAX];
     struct scenario_events timeline, faults; /* of faults: cmd is fault.add, given before power-on */
+    unsigned unit_count;
+    struct scenario_unit units[SCENARIO_UNITS_MAX]; /* last: those beyond unit_count are never written */
 };
 
 /* name: a path, or a scenario of proto/scenarios. False with one line in why. */
@@ -108,6 +108,9 @@ bool scenario_parse(const char *path, const char *text, size_t len, struct scena
 /* Opens the files that signals come from: once, before scenario_bind(), when the struct's copies may go anywhere. The dump has
  * their SHA-256 from then on, and refuses another file. False with one line in why. */
 bool scenario_open(struct scenario *s, char *why, size_t cap);
+
+/* What there is of it: a scenario of few units is a small part of the struct. Before scenario_bind(). */
+void scenario_copy(struct scenario *to, const struct scenario *from);
 
 /* Sets the pointers inside the units and the seed of every noise, and draws what the production spread leaves open: once,
  * when the struct stays where it is and its seed is the one to be used. */

@@ -49,7 +49,7 @@ static bool begin_unit(struct yaml_file *f, const struct yaml_node *node, const 
     set_board(u, found);
     unsigned before = 0;
     for (unsigned i = 0; i < s->unit_count; i++) before += s->units[i].cfg.type == found->type;
-    u->cfg.node = (uint8_t)(u->cfg.node + before);
+    if (u->cfg.node + before <= 127) u->cfg.node = (uint8_t)(u->cfg.node + before); /* else find_node()'s business */
     if (!profile) return !found->profile || find_profile(f, node, found->profile, u);
     const char *name = yaml_scalar(profile);
     if (!name) return yaml_file_expected(f, profile, "profile", "a name of proto/profiles or a path");

@@ -11,8 +11,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define YAML_FILE_MAX  (4 << 20) /* bytes: a dump of 64 units has a third of a megabyte */
-#define YAML_FILE_TEXT 256u      /* longest scalar that is a value */
+#define YAML_FILE_MAX  (16 << 20) /* bytes: a dump of 1000 units has 4 MB */
+#define YAML_FILE_TEXT 256u       /* longest scalar that is a value */
 #define YAML_DEPTH_MAX 48u
 
 enum yaml_kind { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING };

@@ -31,13 +31,13 @@ static void send_frame(struct lcm_bus *b, const struct can_msg *m, int64_t t_ns)
 }
 
 /* A unit joins its bus when it gets its power: that is when its place is found. */
-static uint8_t find_unit(struct lcm_bus *b, unsigned node_id)
+static uint16_t find_unit(struct lcm_bus *b, unsigned node_id)
 {
     const struct control_bench *bench = b->feed->bench;
-    uint8_t *unit = &b->unit_of[node_id];
+    uint16_t *unit = &b->unit_of[node_id];
     for (unsigned k = 0; *unit == LCM_NO_UNIT && node_id > 0 && k < bench->units; k++)
         if (bench->node[k] && bench->node[k]->bus == b->node.bus && bench->unit[k]->cfg.node == node_id)
-            *unit = (uint8_t)k;
+            *unit = (uint16_t)k;
     return *unit;
 }
 
@@ -46,7 +46,7 @@ static void on_frame(void *ctx, const struct can_msg *m, int64_t t_ns)
     struct lcm_bus *b = ctx;
     send_frame(b, m, t_ns);
     if (m->flags & (CAN_EXT | CAN_RTR | CAN_ERROR)) return;
-    const uint8_t unit = find_unit(b, m->id & NODE_BITS);
+    const uint16_t unit = find_unit(b, m->id & NODE_BITS);
     if (unit == LCM_NO_UNIT) return;
     lcm_reading_take(b->feed, &b->feed->unit[unit], m, t_ns);
     lcm_register_take(b->feed, &b->feed->unit[unit], m, t_ns);
@@ -80,7 +80,7 @@ static void init_bus(struct lcm_feed *f, unsigned i)
     else snprintf(name, sizeof name, "can%u", i % CONTROL_BUSES_MAX);
     memcpy(b->name, name, sizeof name);
     snprintf(b->frames, sizeof b->frames, "PSABENCH_CAN_%s", name);
-    memset(b->unit_of, LCM_NO_UNIT, sizeof b->unit_of);
+    memset(b->unit_of, 0xFF, sizeof b->unit_of); /* LCM_NO_UNIT */
     b->node = (struct can_node){.name = "lcm", .fd = true, .rx = on_frame, .error = on_error, .ctx = b};
     can_attach(bench->bus[i], &b->node);
 }

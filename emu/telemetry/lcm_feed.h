@@ -34,13 +34,13 @@ struct lcm_unit {
     struct lcm_request request;
 };
 
-#define LCM_NO_UNIT 0xFFu
+#define LCM_NO_UNIT 0xFFFFu
 
 struct lcm_bus {
     struct lcm_feed *feed;
     struct can_node node;
     char name[16], frames[LCM_CHANNEL_MAX + 1];
-    uint8_t unit_of[128]; /* by node id, as far as they are known; else LCM_NO_UNIT */
+    uint16_t unit_of[128]; /* by node id, as far as they are known; else LCM_NO_UNIT */
 };
 
 struct lcm_feed {

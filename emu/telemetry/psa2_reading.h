@@ -3,7 +3,7 @@
 #ifndef PSABENCH_TELEMETRY_PSA2_READING_H
 #define PSABENCH_TELEMETRY_PSA2_READING_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #define PSA2_READINGS_MAX 5u /* in one frame */
 

@@ -179,6 +179,7 @@ uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f)
     assert(f->width_ns > 0 || (f->kind != LINE_GLITCH && f->kind != LINE_EXTRA_PULSE && f->kind != LINE_NOISE));
     assert(f->kind != LINE_NOISE || (f->rate_hz > 0.0 && f->rate_hz < 1e9));
     if (!s) return 0;
+    trace_wake(l->trace);
     if (!l->trace->filter) {
         l->level = l->filter.level = l->trace->level;
         l->done_ns = l->trace->done_ns;

@@ -123,6 +123,7 @@ bool sampler_start(struct sampler *s, struct trace *t, const struct sampler_cfg 
         n.bit[sig] |= (uint16_t)(1u << i);
         mask |= TRACE_BIT(sig);
     }
+    trace_wake(t);
     n.next = clk_count_at(&n.clock, t->done_ns);
     *s = n;
     s->sink = (struct trace_sink){.mask = mask, .steps = on_steps, .advance = on_advance, .ctx = s};

@@ -1,5 +1,7 @@
 #include "trace/trace.h"
 
+#include "trace/group.h"
+
 #include <assert.h>
 #include <string.h>
 
@@ -72,6 +74,7 @@ static void deliver_until(struct trace *t, int64_t t_ns)
 
 static void watch_again(struct trace *t)
 {
+    if (t->group) t->group->changes++;
     t->watched = 0;
     for (const struct trace_sink *s = t->sinks; s; s = s->next) t->watched |= s->mask;
 }
@@ -91,8 +94,20 @@ int trace_find(const struct trace *t, const char *name)
     return -1;
 }
 
+void trace_wake(struct trace *t)
+{
+    struct trace_group *g = t->group;
+    if (t->room) return;
+    t->room = TRACE_PENDING_MAX;
+    if (!g) return;
+    if (t->done_ns < g->done_ns) t->done_ns = g->done_ns; /* there was nothing to deliver */
+    t->next_awake = g->awake;
+    g->awake = t;
+}
+
 void trace_attach(struct trace *t, struct trace_sink *s)
 {
+    trace_wake(t);
     if (t->source.wake) t->source.wake(t->source.ctx, s->mask);
     if (t->filter) deliver_until(t, t->done_ns); /* it sees levels that have moved without a step */
     struct trace_sink **end = &t->sinks;
@@ -127,12 +142,17 @@ uint64_t trace_known(const struct trace *t, int64_t t_ns)
     return level;
 }
 
+static void make_room(struct trace *t, unsigned n)
+{
+    trace_wake(t);
+    if (t->first + t->pending_count + n <= TRACE_PENDING_MAX) return;
+    memmove(t->pending, t->pending + t->first, t->pending_count * sizeof *t->pending);
+    t->first = 0;
+}
+
 struct trace_step *trace_room(struct trace *t, unsigned n)
 {
-    if (t->first + t->pending_count + n > TRACE_PENDING_MAX) {
-        memmove(t->pending, t->pending + t->first, t->pending_count * sizeof *t->pending);
-        t->first = 0;
-    }
+    if (t->first + t->pending_count + n > t->room) make_room(t, n);
     if (t->pending_count + n <= TRACE_PENDING_MAX) return t->pending + t->first + t->pending_count;
     t->dropped += n;
     return NULL;

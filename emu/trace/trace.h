@@ -74,6 +74,9 @@ struct trace {
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
     struct trace_source source;                   /* set by the board; wake may stay NULL */
+    struct trace_group *group;                    /* group.h; or NULL: its owner advances it */
+    struct trace *next_awake;                     /* of the group */
+    unsigned room;                                /* TRACE_PENDING_MAX; 0: asleep, it takes no steps before it wakes */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
     uint64_t gone; /* steps delivered */
@@ -103,6 +106,9 @@ static inline bool trace_watched(const struct trace *t, uint64_t mask)
 {
     return (t->watched & mask) != 0;
 }
+
+/* Before done_ns is read or a filter set from outside: a trace of a group has caught up, and keeps up. */
+void trace_wake(struct trace *t);
 
 /* For a filter: steps as they go to the sinks. */
 void trace_emit(const struct trace *t, const struct trace_step *s, unsigned n);

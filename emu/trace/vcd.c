@@ -216,6 +216,7 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->max_bytes = cfg->max_bytes;
     if (!put_timescale(v, cfg->unit_ns)) return false;
     put_names(v, cfg->scope, cfg->mask);
+    trace_wake(t);
     v->from_ns = cfg->from_ns > t->done_ns ? cfg->from_ns : t->done_ns;
     v->sink = (struct trace_sink){.mask = cfg->mask, .steps = present_levels, .advance = advance_before, .ctx = v};
     trace_attach(t, &v->sink);

@@ -16,62 +16,140 @@ static double temp_degc(void *ctx, unsigned channel, int64_t t_ns)
     return channel < UNIT_AXES ? chamber_element_degc(c, &u->body, t_ns) : chamber_case_degc(c, &u->body, t_ns);
 }
 
-enum { WARM_STEP_NS = 10000000 }; /* 10 mK at most in a chamber of 60 K/min, without any lag */
+#define WARM_STEP_NS INT64_C(10000000) /* 10 mK at most in a chamber of 60 K/min, without any lag */
 
-/* Temperature of the sensor's element, for a sensor that depends on it; as of the latest whole step, however often it is read. Without a
- * chamber a quartz's case is as warm as its element. */
+static bool is_quartz(const struct unit *u, unsigned axis)
+{
+    return u->cfg.axis[axis].sensor == UNIT_QUARTZ;
+}
+
+/* Without a chamber nothing changes, and not every MEMS feels it. */
+static bool feels_steps(const struct unit *u, unsigned axis)
+{
+    const struct mems_cfg *m = &u->mems[axis].cfg;
+    return is_quartz(u, axis) || m->u0_tc_v_per_k != 0.0 || m->k_tc_per_k != 0.0;
+}
+
+/* Temperature of the sensor's element, as of the latest whole step, however often it is read. Without a chamber a quartz's case is
+ * as warm as its element. */
 static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
 {
-    struct mems *m = &u->mems[axis];
     struct quartz *q = &u->quartz[axis];
     const struct chamber *c = &u->lab->chamber;
-    const bool quartz = u->cfg.axis[axis].sensor == UNIT_QUARTZ;
     const int64_t step = t_ns / WARM_STEP_NS;
-    if (!quartz && m->cfg.u0_tc_v_per_k == 0.0 && m->cfg.k_tc_per_k == 0.0) return;
     if (step == u->warm_step[axis]) return;
     u->warm_step[axis] = step;
     const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
-    m->temp_degc = q->element_degc = element_degc;
+    u->mems[axis].temp_degc = q->element_degc = element_degc;
     q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
 }
 
-/* What the sensor of a channel measures, a = -f on its own axes: at rest the projections of gravity. The face turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is
- * in the unit: at_m stays in the case's axes. */
-static void gravity_mps2(struct unit *u, unsigned axis, int64_t t_ns, double a_mps2[3])
+/* What the sensor of a channel measures at a row of instants, a = -f on its own axes: at rest the projections of gravity. The face
+ * turns the sensor's own axes; which of the unit's axes they are follows from its channel. The sensor is where it is in the
+ * unit: at_m stays in the case's axes. Returns how many are written: 1 if the first holds for all. */
+static unsigned feel_row_mps2(struct unit *u, unsigned axis, const struct looks *at, double a_mps2[][3])
 {
-    double a[3];
-    lab_sensor_mps2(u->lab, &u->cfg.mounting, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis], t_ns,
-                    a);
-    for (unsigned i = 0; i < 3; i++) a_mps2[i] = a[(i + axis) % 3];
+    const struct lab_sensor s = {&u->cfg.mounting, u->cfg.axis[axis].at_m, u->cos_alpha0[axis], u->sin_alpha0[axis]};
+    const unsigned felt = lab_sensor_row_mps2(u->lab, &s, at->t_ns, at->n, a_mps2);
+    for (unsigned i = 0; axis != 0 && i < felt; i++) {
+        const double a[3] = {a_mps2[i][0], a_mps2[i][1], a_mps2[i][2]};
+        for (unsigned k = 0; k < 3; k++) a_mps2[i][k] = a[(k + axis) % 3];
+    }
+    return felt;
 }
 
-/* Output of a sensor that feels a_mps2, and its faults. */
-static inline double felt_signal(struct unit *u, unsigned axis, const double a_mps2[3], int64_t t_ns)
+static void put_out_row(struct unit *u, unsigned axis, const double *a_mps2, unsigned felt, const struct looks *at,
+                        double *out)
 {
-    warm_sensor(u, axis, t_ns);
-    const double out = u->cfg.axis[axis].sensor == UNIT_QUARTZ ? quartz_out_a(&u->quartz[axis], a_mps2, t_ns)
-                                                               : mems_out_v(&u->mems[axis], a_mps2, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], out, t_ns) : out;
+    if (is_quartz(u, axis)) quartz_out_row_a(&u->quartz[axis], a_mps2, felt, at, out);
+    else mems_out_row_v(&u->mems[axis], a_mps2, felt, at, out);
 }
 
-static double accel_signal(void *ctx, unsigned axis, int64_t t_ns)
+/* How many of the looks from the first on are of one step of temperature. */
+static unsigned same_step(const struct looks *at)
+{
+    const int64_t end_ns = (at->t_ns[0] / WARM_STEP_NS + 1) * WARM_STEP_NS;
+    unsigned n = at->n;
+    while (at->t_ns[n - 1] >= end_ns) n--;
+    return n;
+}
+
+/* Outputs of a sensor that feels a_mps2: of one temperature at a time. */
+static void sense_row(struct unit *u, unsigned axis, const double *a_mps2, unsigned felt, const struct looks *at,
+                      double *out)
+{
+    if (!feels_steps(u, axis)) {
+        put_out_row(u, axis, a_mps2, felt, at, out);
+        return;
+    }
+    for (struct looks rest = *at; rest.n > 0;) {
+        const unsigned n = same_step(&rest), from = at->n - rest.n;
+        warm_sensor(u, axis, rest.t_ns[0]);
+        put_out_row(u, axis, felt == 1 ? a_mps2 : a_mps2 + 3 * from, felt == 1 ? 1 : n,
+                    &(struct looks){rest.t_ns, n, at->every_ns}, out + from);
+        rest.t_ns += n;
+        rest.n -= n;
+    }
+}
+
+static void accel_row(void *ctx, unsigned axis, const struct looks *at, double *out)
 {
     struct unit *u = ctx;
-    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) return 0.0;
-    double a_mps2[3];
-    gravity_mps2(u, axis, t_ns, a_mps2);
-    return felt_signal(u, axis, a_mps2, t_ns);
+    double a_mps2[LOOKS_MAX][3];
+    if (u->cfg.axis[axis].sensor == UNIT_NO_SENSOR) {
+        for (unsigned i = 0; i < at->n; i++) out[i] = 0.0;
+        return;
+    }
+    const unsigned felt = feel_row_mps2(u, axis, at, a_mps2);
+    sense_row(u, axis, a_mps2[0], felt, at, out);
+    sensor_fault_row(u->sensor_faults[axis], at, out);
 }
 
-/* The same where a series may be in place of the lab; one that has ended is no sensor. */
-static double recorded_signal(void *ctx, unsigned axis, int64_t t_ns)
+/* One look where a series is in place of the lab; one that has ended is no sensor. */
+static void recorded_look(struct unit *u, unsigned axis, const struct looks *at, double *out)
 {
-    struct unit *u = ctx;
     double value;
-    if (!u->cfg.axis[axis].series.sample) return accel_signal(u, axis, t_ns);
-    if (!series_value(&u->cfg.axis[axis].series, t_ns, &value)) return 0.0;
-    if (u->cfg.axis[axis].sensor != UNIT_RECORDED) return felt_signal(u, axis, (double[3]){-value, 0.0, 0.0}, t_ns);
-    return u->sensor_faults[axis] ? sensor_fault_out(u->sensor_faults[axis], value, t_ns) : value;
+    if (!series_value(&u->cfg.axis[axis].series, at->t_ns[0], &value)) {
+        *out = 0.0;
+        return;
+    }
+    *out = value;
+    if (u->cfg.axis[axis].sensor != UNIT_RECORDED) sense_row(u, axis, (const double[3]){-value, 0.0, 0.0}, 1, at, out);
+    sensor_fault_row(u->sensor_faults[axis], at, out);
+}
+
+static void recorded_row(void *ctx, unsigned axis, const struct looks *at, double *out)
+{
+    struct unit *u = ctx;
+    if (!u->cfg.axis[axis].series.sample) {
+        accel_row(ctx, axis, at, out);
+        return;
+    }
+    for (unsigned i = 0; i < at->n; i++)
+        recorded_look(u, axis, &(struct looks){&at->t_ns[i], 1, at->every_ns}, &out[i]);
+}
+
+/* It feels gravity alone, turned this way and that; what tables, vehicles and a head's turns on a lever arm add has no bound. */
+static bool feels_gravity(const struct unit *u, unsigned axis)
+{
+    const enum lab_mount on = u->cfg.mounting.on;
+    return on == LAB_FIXED || (on == LAB_HEAD && lab_is_centred(&u->cfg.mounting, u->cfg.axis[axis].at_m));
+}
+
+#define ROUNDED 1.001 /* turns leave a vector's length as it is, but for the last bits */
+
+/* A sensor whose output follows from the instant alone. */
+static struct looks_range accel_range(void *ctx, unsigned axis, int64_t every_ns, int64_t until_ns, const char **why)
+{
+    const struct unit *u = ctx;
+    const struct unit_axis_cfg *c = &u->cfg.axis[axis];
+    if (c->sensor == UNIT_NO_SENSOR) return (struct looks_range){0.0, 0.0};
+    if (c->series.sample) *why = "a sensor is driven from a file";
+    else if (c->sensor != UNIT_MEMS) *why = "a quartz sensor remembers";
+    else if (u->sensor_faults[axis]) *why = "a sensor has a fault";
+    else if (u->mems[axis].slow.moves) *why = "a sensor has slow noise";
+    else if (!feels_gravity(u, axis)) *why = "its mount accelerates it";
+    return mems_range_v(&u->mems[axis], ROUNDED * u->lab->site.g_mps2, every_ns, until_ns);
 }
 
 static bool is_recorded(const struct unit *u)
@@ -181,8 +259,9 @@ void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type)
 static void init_board(struct unit *u, struct sched *s)
 {
     struct board_io io = {
-        .ctx = u, .accel = accel_signal, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
-    if (is_recorded(u)) io.accel = recorded_signal;
+        .ctx = u, .accel = accel_row, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    io.accel_range = accel_range;
+    if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;
     union board_profile_store defaults;
@@ -199,6 +278,7 @@ static void init_board(struct unit *u, struct sched *s)
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
+    static const char *const slow_noise[UNIT_AXES] = {"mems.slow.x", "mems.slow.y", "mems.slow.z"};
     static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
     u->cfg = *cfg;
     u->lab = lab;
@@ -210,9 +290,10 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         u->sensor_faults[i] = NULL;
         u->warm_step[i] = -1;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
-        mems_init(&u->mems[i], &m, rng_stream(cfg->board.seed, cfg->board.serial, noise[i]));
+        mems_init(&u->mems[i], &m, draws_of(cfg->board.seed, cfg->board.serial, noise[i]),
+                  draws_of(cfg->board.seed, cfg->board.serial, slow_noise[i]));
         quartz_init(&u->quartz[i], &cfg->axis[i].quartz, lab->site.g_mps2,
-                    rng_stream(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
+                    draws_of(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
         const struct det_pair alpha0 = det_sin_cos(alpha0_rad);
@@ -248,6 +329,12 @@ void unit_sample_until(struct unit *u, int64_t t_ns)
     u->type->sample_until(u->board, t_ns);
 }
 
+const char *unit_why_eager(struct unit *u, int64_t t_ns)
+{
+    if (u->board->sched->eager) return "--eager";
+    return u->type->why_eager ? u->type->why_eager(u->board, t_ns) : "a board of this type always does";
+}
+
 struct trace *unit_trace(const struct unit *u)
 {
     return &u->board->trace;
@@ -271,8 +358,8 @@ double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
     if (sensor == UNIT_NO_SENSOR || (s->sample && !series_value(s, t_ns, &value))) return 0.0;
     if (sensor == UNIT_RECORDED) return value;
     if (s->sample) a_mps2[0] = -value;
-    else gravity_mps2(u, axis, t_ns, a_mps2);
-    warm_sensor(u, axis, t_ns);
-    if (u->cfg.axis[axis].sensor == UNIT_QUARTZ) return quartz_true_a(&u->quartz[axis], a_mps2);
+    else (void)feel_row_mps2(u, axis, &(struct looks){&t_ns, 1, 0}, &a_mps2);
+    if (feels_steps(u, axis)) warm_sensor(u, axis, t_ns);
+    if (is_quartz(u, axis)) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);
 }

@@ -258,9 +258,16 @@ class Bench(AbstractContextManager["Bench"]):
             raise BenchError(f"bench: no {name}: {self._why_absent(name)}")
         if name not in self._open:
             self._open[name] = open_instrument(name, self.addresses[name], kind, self.wait)
+            if self.pace == "step":
+                self._open[name].lasts = self._rest_in_s
         found = self._open[name]
         assert isinstance(found, kind)
         return found
+
+    def _rest_in_s(self, command: str, **args: object) -> float | None:
+        """How long a motion will last yet, by the control socket; None: it does not end, or is not the emulator's."""
+        rest_in_s = self._maybe(command, **args).get("rest_in_s")
+        return None if rest_in_s is None else float(rest_in_s)
 
     def _why_absent(self, name: str) -> str:
         if self.emulator is not None:

@@ -6,7 +6,9 @@
 The address is VISA's, so the same script runs with an instrument on a network, a serial line or a bus adapter. After
 each setting the instrument's error queue is read: a rejection is raised where it happened, and in lockstep the setting
 has been made when the call returns. Nothing blocks on `*OPC?`, which would block where time moves only
-when the host says so: the state is asked, and the bench's time moves in between. The only file that imports PyVISA.
+when the host says so: the state is asked, and the bench's time moves in between. Where an emulator says when a motion
+ends (`lasts`), the looks before that are left out; what is seen, and when, is the same. The only file that imports
+PyVISA.
 
 Angles are degrees and rates degrees a second, as on the instruments' own scales; temperatures degrees Celsius.
 """
@@ -28,15 +30,22 @@ if TYPE_CHECKING:
 REPLY_S = 10.0  # timeout for an answer, real time
 CONNECT_S = 5.0
 REST_LIMIT_S = 3600.0  # timeout for it, bench time
+NS = 1_000_000_000
 
 Value = TypeVar("Value")
 Wait = Callable[[float], None]
+Lasts = Callable[..., float | None]  # (command of the control socket, its arguments): s to the end of a motion
+
+
+def _no_one_says(_: str, **__: object) -> None:
+    """An instrument that is watched until it stands still."""
 
 
 class Instrument:
     """What all of them have: identity, raw commands, the error queue. `wait` lets the bench's time pass."""
 
     poll_s = 0.1  # bench time between looks at something that moves
+    lasts: Lasts = staticmethod(_no_one_says)
 
     def __init__(self, name: str, address: str, resource: MessageBasedResource, wait: Wait) -> None:
         self.name = name
@@ -80,14 +89,22 @@ class Instrument:
         """The answer to a query as a number, the first of several."""
         return self.numbers(command)[0]
 
-    def _until(self, done: Callable[[], bool], what: str, limit_s: float) -> None:
-        """Let the bench's time pass until done() says so."""
-        waited_s = 0.0
+    def _until(self, done: Callable[[], bool], what: str, limit_s: float, *motion: str, **args: object) -> None:
+        """Let the bench's time pass until done() says so; motion, args: what `lasts` is asked, if there is anything."""
+        waited_s = self._pass_looks(limit_s, motion, args)
         while not done():
             if waited_s >= limit_s:
                 raise TimeOut(f"{self.name}: {what} not reached within {limit_s:g} s")
             self._wait(self.poll_s)
             waited_s += self.poll_s
+
+    def _pass_looks(self, limit_s: float, motion: Sequence[str], args: Mapping[str, object]) -> float:
+        """Go in one step to the first look that can find the motion ended; returns the time that took, s."""
+        lasts_s = self.lasts(*motion, **args) if motion else None
+        looks = -(-round(min(lasts_s or 0.0, limit_s) * NS) // round(self.poll_s * NS))
+        if looks:
+            self._wait(looks * self.poll_s)
+        return looks * self.poll_s
 
     def _ask(self, message: str, command: str) -> str:
         from pyvisa.constants import StatusCode
@@ -142,7 +159,7 @@ class Head(Instrument):
         return self._rest_angle_deg()
 
     def _rest_angle_deg(self) -> float:
-        self._until(lambda: self.at_rest, "rest", REST_LIMIT_S)
+        self._until(lambda: self.at_rest, "rest", REST_LIMIT_S, "head.read")
         return self.angle_deg
 
     @property
@@ -209,7 +226,9 @@ class Table(Instrument):
 
     def wait_rest(self, *, axis: int = 1, limit_s: float = REST_LIMIT_S) -> None:
         """Let time pass until the axis stands still. Raises TimeOut after limit_s of bench time."""
-        self._until(lambda: self.number(f"AXIS{axis}:REST?") != 0.0, f"rest of axis {axis}", limit_s)
+        self._until(
+            lambda: self.number(f"AXIS{axis}:REST?") != 0.0, f"rest of axis {axis}", limit_s, "table.read", axis=axis
+        )
 
 
 class Chamber(Instrument):

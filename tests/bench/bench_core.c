@@ -7,6 +7,7 @@
  * the set-up is the same in both. The hash is over the words of all frames: a faster core says the same. */
 #include "board/psa2/psa2.h"
 #include "board/psd1/psd1.h"
+#include "looks.h"
 #include "trace/vcd.h"
 
 #include <inttypes.h>
@@ -37,6 +38,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     (void)t_ns;
     return volts[axis];
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -175,7 +178,7 @@ static const struct bench_case {
 
 static void power_up(struct bench *n, enum ads1282_chain chain)
 {
-    const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc};
+    const struct board_io io = {.ctx = n, .accel = accel_row, .temp_degc = degc};
     struct psa2_profile p;
     fields_default(&psa2_fields, &p);
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
@@ -191,7 +194,7 @@ static void power_up(struct bench *n, enum ads1282_chain chain)
 
 static void power_up_psd1(struct bench *n, enum ads1282_chain chain)
 {
-    const struct board_io io = {.ctx = n, .accel = accel, .temp_degc = degc, .rate_radps = rate};
+    const struct board_io io = {.ctx = n, .accel = accel_row, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .adc_chain = chain, .seed = 1, .serial = 1};
     struct psd1_profile p;
     fields_default(&psd1_fields, &p);

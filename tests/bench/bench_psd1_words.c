@@ -6,6 +6,7 @@
  * the lines, in the order of psd1.v: "frames N checksum H", then "line I edges M when W", with W the sum of when: half
  * periods of 1M25 since A0 rose, for SDAT and DR edges of SCLK since then. */
 #include "board/psd1/psd1.h"
+#include "looks.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -39,6 +40,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     const double v = slope_vps[axis] * (double)t_ns * 1e-9;
     return v - 19.0 * (double)(int64_t)(v / 19.0) - 9.5;
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -101,7 +104,7 @@ static void step(struct words *w)
 
 static void power_up(struct words *w)
 {
-    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .rate_radps = rate};
+    const struct board_io io = {.ctx = w, .accel = accel_row, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     struct psd1_profile p;
     fields_default(&psd1_fields, &p);

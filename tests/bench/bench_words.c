@@ -7,6 +7,7 @@
  * for Data, CLK and Int in half periods of CLK since Int fell, for DOutX/Y/Z in levels of SClk since DRD_A fell. SClk
  * counts only while CST is high: the temperature port, which the models lack, uses the same wire. */
 #include "board/psa2/psa2.h"
+#include "looks.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -49,6 +50,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     const double v = slope_vps[axis] * (double)t_ns * 1e-9;
     return v - 20.0 * (double)(int64_t)(v / 20.0) - 10.0;
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -135,7 +138,7 @@ static void frame_over(struct words *w)
 
 static void power_up(struct words *w)
 {
-    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc};
+    const struct board_io io = {.ctx = w, .accel = accel_row, .temp_degc = degc};
     struct psa2_profile p;
     fields_default(&psa2_fields, &p);
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};

@@ -31,6 +31,50 @@ MONTE_CARLO = {
 }
 
 
+FLEETS = (64, 1000)
+FLEET_MS = (1300, 2300)  # both are asleep before the end
+
+# One PSA-2 of the default scenario and no client: what a simulated second takes, at rest and while the head turns.
+ALONE = {
+    "alone-eager": ("--eager",),
+    "alone-lazy": (),
+    "alone-streams": ("--start",),
+}
+ALONE_S = {"alone-eager": (2, 4), "alone-lazy": (10, 30), "alone-streams": (2, 4)}  # after the board's set-up
+TURNS = "-turning"
+
+
+def turning_scenario() -> Path:
+    """`calibrate` with a head that turns for an hour."""
+    text = (ROOT / "proto/scenarios/calibrate.yaml").read_text(encoding="utf-8")
+    path = ROOT / "build/bench/turning.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    turn = "timeline:\n  - {at_s: 0.5, cmd: head.turn, args: {angle_deg: 100}}\n"
+    path.write_text(text.replace("turn_s: 2", "turn_s: 3600") + turn, encoding="utf-8")
+    return path
+
+
+def alone(name: str, seconds: int) -> list[str]:
+    scenario = str(turning_scenario()) if name.endswith(TURNS) else "calibrate"
+    quiet = ["--can", "none", "--pace", "free", "--quiet"]
+    return [str(ROOT / "build/psa-emu"), scenario, *ALONE[name.removesuffix(TURNS)], *quiet, "--for", f"{seconds}s"]
+
+
+def fleet_scenario(units: int) -> Path:
+    """`fleet1000` with so many units, an eighth on each bus."""
+    text = (ROOT / "proto/scenarios/fleet1000.yaml").read_text(encoding="utf-8")
+    path = ROOT / f"build/bench/fleet-{units}.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text.replace("count: 125", f"count: {units // 8}"), encoding="utf-8")
+    return path
+
+
+def fleet_for(units: int, ms: int) -> list[str]:
+    """psa-emu with a fleet that no client looks at."""
+    emulator, scenario = str(ROOT / "build/psa-emu"), str(fleet_scenario(units))
+    return [emulator, scenario, "--can", "none", "--pace", "free", "--quiet", "--for", f"{ms}ms"]
+
+
 @dataclass(slots=True)
 class Case:
     """One row: `sample(count)` measures count units of work; rates, units a second, are its results round by round."""
@@ -47,11 +91,19 @@ class Case:
     ns: list[float] = field(default_factory=list)
     edges_per_unit: float | None = None
     instructions_per_unit: float | None = None
+    facts: dict[str, int] = field(default_factory=dict)  # all that the last run printed
 
 
 def parse(output: str) -> dict[str, int]:
     """The integers of `NAME key=value ...`; of a Verilated driver's `frames N checksum H edges E ns T` too."""
     return {k: int(v) for k, v in re.findall(r"(\w+)[= ](\d+)(?= |$)", output.strip())}
+
+
+def spent(command: Callable[[int], list[str]], seconds: int) -> dict[str, int]:
+    """CPU time of a command that runs so many simulated seconds, its start included."""
+    began_ns = children_cpu_ns()
+    run(command(seconds))
+    return {"simulated_s": seconds, "ns": children_cpu_ns() - began_ns}
 
 
 def printed(command: Callable[[int], list[str]], count: int) -> dict[str, int]:
@@ -111,6 +163,16 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
         cases.append(Case(name, "runs", partial(printed, partial(python, name)), first))
     for name in ("gyro-emulator", "gyro-chain"):
         cases.append(Case(name, "runs", partial(printed, partial(python, name)), 10, fixed=True))
+    fourier = partial(printed, partial(python, "fourier"))
+    cases.append(Case("fourier", "simulated_ms", fourier, 80, fixed=True))
+    for name in (f"{n}{turns}" for n in ALONE for turns in ("", TURNS)):
+        command, counts = partial(alone, name), ALONE_S[name.removesuffix(TURNS)]
+        cases.append(Case(name, "simulated_s", partial(spent, command), 10 * counts[1], command, counts, fixed=True))
+    cases.append(Case("chamber", "simulated_s", partial(printed, partial(python, "chamber")), 60, fixed=True))
+    for units in FLEETS:
+        sample = partial(printed, partial(python, f"fleet-{units}"))
+        cases.append(Case(f"fleet-{units}", "unit_ms", sample, 1000, partial(fleet_for, units), FLEET_MS, fixed=True))
+    cases.append(Case("fleet-wall", "wall_ms", partial(printed, partial(python, "fleet-wall")), 5, fixed=True))
     cases.append(Case("start", "starts", partial(printed, partial(python, "start")), 20, fixed=True))
     return cases
 
@@ -128,7 +190,7 @@ def calibrate(case: Case, seconds: float) -> None:
 
 def measure(case: Case) -> None:
     """One more rate."""
-    got = case.sample(case.count)
+    got = case.facts = case.sample(case.count)
     case.ns.append(float(got["ns"]))
     case.rates.append(got[case.unit] * 1e9 / got["ns"])
     if got.get("edges"):

@@ -7,21 +7,29 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import resource
 import socket
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
+from psabench.link.control import Control
 from psabench.link.lineport import BLOCK, CLK, DATA, INT, LineDecoder
 from psabench.places import find_emulator
 
+from tests.bench.cases import FLEETS, ROOT, fleet_scenario
+
 SAMPLES = 8000  # of a frame period: 8 MHz, 1 ms
+SET_UP_S = 0.3  # of a PSA-2, and some
 
 
 def _sampled(words: list[int], phase: float) -> bytes:
@@ -216,7 +224,91 @@ def gyro_chain(count: int) -> str:
     return f"runs={count} ns={sum(_gyrocompassings(count))}"
 
 
+def fourier(count: int) -> str:
+    """`count` positions of `run fourier` on the realistic bench: bench time and real time, host and emulator."""
+    from psabench.bench import Bench
+    from psabench.estimate.face import Face
+    from psabench.procedures.fourier import FourierParams
+    from psabench.procedures.head_bench import Watch
+    from psabench.procedures.run_table import CONDITIONS
+    from psabench.procedures.series import measure_face
+    from psabench.procedures.wire_bench import WireBench
+
+    condition, times_ns = CONDITIONS["realistic"], []
+    with Bench.start(condition.scenario) as bench:
+        on_head = WireBench(bench.unit, bench.head, average=condition.average, g_mps2=condition.g_mps2)
+        watch = Watch(record=lambda _: times_ns.append(time.perf_counter_ns()))
+        readings = measure_face(on_head, FourierParams(realisations=1, positions=count), Face.DIRECT, watch)
+    simulated_ms = round((readings[-1].t_s - readings[0].t_s) * 1000)
+    return f"simulated_ms={simulated_ms} ns={times_ns[-1] - times_ns[0]}"
+
+
+CHAMBER = """
+chamber: {start_degc: 25, tau_case_s: 20, tau_element_s: 40}
+timeline:
+  - {at_s: 60, cmd: chamber.set, args: {temp_degc: 85}}
+"""
+
+
+def chamber(count: int) -> str:
+    """`count` minutes in a chamber that heats up: each second in sixty is recorded by the host. Real time of both."""
+    from psabench.bench import Bench
+
+    path = ROOT / "build/bench/chamber.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text((ROOT / "proto/scenarios/calibrate.yaml").read_text(encoding="utf-8") + CHAMBER, encoding="utf-8")
+    with Bench.start(path) as bench:
+        began_ns = time.perf_counter_ns()
+        for _ in range(count):
+            bench.wait_away(59.0)
+            bench.unit.stream(1000)
+        ns = time.perf_counter_ns() - began_ns
+    return f"simulated_s={60 * count} ns={ns}"
+
+
+def fleet(units: int, count: int) -> str:
+    """Units on eight buses, silent: real time from spawning to `ready all`, memory then, CPU time of `count` ms."""
+    command = [str(find_emulator()), str(fleet_scenario(units)), "--pace", "step", "--can", "none", "--quiet"]
+    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
+        control = Path(folder) / "control"
+        began_ns = time.perf_counter_ns()
+        with subprocess.Popen([*command, "--control", str(control)], stdout=subprocess.PIPE) as p:
+            assert p.stdout is not None
+            while p.stdout.readline() not in (b"ready all\n", b""):
+                pass
+            ready_ns = time.perf_counter_ns() - began_ns
+            rss_kb = int(re.findall(r"VmRSS:\s+(\d+)", Path(f"/proc/{p.pid}/status").read_text(encoding="utf-8"))[0])
+            with Control(control) as c:
+                c.call("run", for_s=SET_UP_S)
+                cpu_ns = _cpu_ns(p.pid)
+                c.call("run", for_s=count / 1000)
+                cpu_ns = _cpu_ns(p.pid) - cpu_ns
+                c.call("quit")
+    return f"unit_ms={units * count} units={units} ready_ns={ready_ns} rss_kb={rss_kb} ns={cpu_ns}"
+
+
+def fleet_wall(count: int) -> str:
+    """64 units at 1,000 frames a second on buses that take any number, in real time: the emulator's CPU time."""
+    command = [str(find_emulator()), str(fleet_scenario(64)), "--pace", "wall", "--can", "none", "--start"]
+    used_ns = children_cpu_ns()
+    done = subprocess.run(
+        [*command, "--bitrate", "0", "--for", f"{count}s"], capture_output=True, text=True, check=True
+    )
+    used_ns = children_cpu_ns() - used_ns
+    messages, late_us, slips = (
+        int(re.findall(what, done.stderr)[0]) for what in (r"(\d+) frames on", r"p99 (\d+)", r"slips: (\d+)")
+    )
+    return f"wall_ms={count * 1000} messages={messages} late_p99_us={late_us} slips={slips} ns={used_ns}"
+
+
+def _cpu_ns(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="utf-8").split()[0])
+
+
 CASES: dict[str, Callable[[int], str]] = {
+    "chamber": chamber,
+    **{f"fleet-{n}": partial(fleet, n) for n in FLEETS},
+    "fleet-wall": fleet_wall,
     "decode": decode,
     "start": start,
     "can": can,
@@ -228,6 +320,7 @@ CASES: dict[str, Callable[[int], str]] = {
     "mc-samples-all": mc_samples_all,
     "gyro-emulator": gyro_emulator,
     "gyro-chain": gyro_chain,
+    "fourier": fourier,
 }
 
 if __name__ == "__main__":

@@ -67,6 +67,7 @@ def summary(measured: list[Case], rounds: int) -> page.Result:
             "edges_per_unit": c.edges_per_unit,
             "instructions_per_unit": c.instructions_per_unit,
             "ms": statistics.median(c.ns) / 1e6,
+            "facts": c.facts,
         }
         if c.unit == "frames":
             peer = by_name[peers.PSD1 if "psd1" in c.name else PEER]

@@ -153,7 +153,7 @@ static void check_counters(struct world *w)
 static void up(struct world *w, bool watched)
 {
     memset(w, 0, offsetof(struct world, bench));
-    bench_init(&w->bench, &scenario, 0);
+    if (!bench_init(&w->bench, &scenario, 0)) abort();
     w->hub.bus = &w->bench.bus[0];
     w->view = (struct control_bench){.ctx = w,
                                      .clients.can_rx = can_rx,
@@ -184,6 +184,7 @@ static void down(struct world *w)
     snapshot_release_lines(&w->observers, &w->bench);
     control_run_forget(&w->control);
     journal_free(&w->journal);
+    bench_free(&w->bench);
 }
 
 static void run(struct world *w, int64_t for_ns)

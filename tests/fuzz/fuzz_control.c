@@ -59,8 +59,7 @@ static struct bench *make_bench(void)
     static struct scenario s;
     char why[256];
     struct bench *b = malloc(sizeof *b);
-    if (!b || !scenario_parse("fuzz", text, sizeof text - 1, &s, why, sizeof why)) abort();
-    bench_init(b, &s, 0);
+    if (!b || !scenario_parse("fuzz", text, sizeof text - 1, &s, why, sizeof why) || !bench_init(b, &s, 0)) abort();
     bench_power_up(b);
     return b;
 }

@@ -3,8 +3,10 @@
  * lifted and the power has been off and on again, board, stream and bus are as good as new. */
 #include "fuzz.h"
 #include "listener.h"
+#include "looks.h"
 
-#include "base/can_fault.h"
+#include "base/can/fault.h"
+#include "base/rng.h"
 #include "board/psa2/board.h"
 
 #include <string.h>
@@ -33,6 +35,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     (void)ctx;
     return (double)axis - 1.0;
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -248,7 +252,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct script s = script_of(data, size);
     struct psa2_profile profile;
     fields_default(&psa2_fields, &profile);
-    const struct board_io io = {.ctx = &w, .accel = accel, .temp_degc = degc};
+    const struct board_io io = {.ctx = &w, .accel = accel_row, .temp_degc = degc};
     struct board_cfg unit = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 1, .serial = 1};
     unit.adc_chain = (enum ads1282_chain)(script_byte(&s) % 3);
     for (unsigned i = 0; i < 3; i++) unit.afe[i] = afe_nominal(AFE_VOLTAGE);

@@ -2,6 +2,7 @@
  * now and then, of the other never. Readings and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
 #include "listener.h"
+#include "looks.h"
 #include "twin.h"
 
 #include "board/pmka/board.h"
@@ -41,6 +42,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     w->asked_ns[axis] = t_ns;
     return w->v[axis];
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -192,7 +195,7 @@ static void listen(struct world *w, uint8_t how)
 
 static void begin(struct world *w, const struct pmka_profile *p)
 {
-    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .event = on_event};
+    const struct board_io io = {.ctx = w, .accel = accel_row, .temp_degc = degc, .event = on_event};
     struct board_cfg cfg = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 3, .serial = 4};
     memset(w, 0, sizeof *w);
     for (unsigned i = 0; i < 3; i++) cfg.afe[i] = afe_nominal(AFE_VOLTAGE);

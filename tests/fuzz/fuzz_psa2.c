@@ -2,6 +2,7 @@
  * other never. Frames and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
 #include "listener.h"
+#include "looks.h"
 #include "twin.h"
 
 #include "base/clk.h"
@@ -41,6 +42,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     assert(axis < 3 && t_ns <= w->s.now_ns);
     return w->v[axis];
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -180,7 +183,7 @@ static void power_up(struct world *w, bool watched)
 {
     struct psa2_profile p;
     fields_default(&psa2_fields, &p);
-    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc};
+    const struct board_io io = {.ctx = w, .accel = accel_row, .temp_degc = degc};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
     for (unsigned i = 0; i < 3; i++) u.afe[i] = afe_nominal(AFE_VOLTAGE);
     memset(w, 0, sizeof *w);

@@ -2,6 +2,7 @@
  * and then, of the other never. Words, times and answers are the same, and each is what the header promises. */
 #include "fuzz.h"
 #include "listener.h"
+#include "looks.h"
 #include "twin.h"
 
 #include "board/board.h"
@@ -41,6 +42,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     assert(axis < 3 && t_ns <= w->s.now_ns);
     return w->v[axis];
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -241,7 +244,7 @@ static void step(struct world *w, struct script *s)
 
 static void power_up(struct world *w, bool watched, bool host)
 {
-    const struct board_io io = {.ctx = w, .accel = accel, .temp_degc = degc, .rate_radps = rate};
+    const struct board_io io = {.ctx = w, .accel = accel_row, .temp_degc = degc, .rate_radps = rate};
     struct board_cfg u = {.adc_noise_scale = 1.0, .temp_noise_scale = 1.0, .seed = 7, .serial = 3};
     struct psd1_profile p;
     fields_default(&psd1_fields, &p);

@@ -4,7 +4,7 @@
 
 #include "rig.h"
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "base/rng.h"
 
 /* Field by field: padding and the bytes behind len do not count. */

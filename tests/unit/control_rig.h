@@ -138,7 +138,8 @@ static inline int fresh(void **state)
     char why[256];
     (void)state;
     assert_true(scenario_parse("test.yaml", scenario_text, strlen(scenario_text), &s, why, sizeof why));
-    bench_init(bench, &s, 0);
+    bench_free(bench);
+    assert_true(bench_init(bench, &s, 0));
     bench_power_up(bench);
     memset(&asked, 0, sizeof asked);
     view = (struct control_bench){.lab = &bench->lab,

@@ -5,7 +5,7 @@
 #include "rig.h"
 
 #include "base/bits.h"
-#include "base/can.h"
+#include "base/can/can.h"
 #include "canopen/co_node.h"
 
 #include <string.h>

@@ -15,7 +15,7 @@ This unit has no parallel bus and no object 2002h: 2030h:10 and 2030h:11 stay 0.
 
 
 def worst_bits(m: Message) -> tuple[int, int]:
-    """(nominal, data) bits with a stuff bit wherever the rule allows one: sources can 3.1, emu/base/canbits.c."""
+    """(nominal, data) bits with a stuff bit wherever the rule allows one: sources can 3.1, emu/base/can/bits.c."""
     data = 8 * m.len
     if not m.fd:
         stuffed = 1 + 11 + 3 + 4 + data + 15

@@ -190,7 +190,7 @@ static void run_step(void *ctx, int64_t t_ns)
 void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s)
 {
-    memset(b, 0, sizeof *b);
+    board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, gyro_lines, GYRO_LINES, cfg, io, s);
     sched_ev(&b->step, run_step, b);

@@ -60,7 +60,7 @@ static void look_at_inputs(void *ctx, int64_t t_ns)
         b->warm_ns = t_ns + WARM_NS;
     }
     for (unsigned i = 0; b->noise_v > 0.0 && i < PIK_AXES; i++)
-        b->channel[i].noise_v = b->noise_v * rng_gauss(&b->channel[i].noise);
+        b->channel[i].noise_v = b->noise_v * draws_gauss(&b->channel[i].noise, t_ns);
     notify_saturation(b, saturated, t_ns);
     b->look_tick += pace;
     sched_at(b->base.sched, &b->look, pik_tick_ns(b, b->look_tick));
@@ -72,13 +72,13 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
               struct sched *s)
 {
     static const char *const noise[PIK_AXES] = {"pik.x", "pik.y", "pik.z"};
-    memset(b, 0, sizeof *b);
+    board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, pik_lines, PIK_LINES, cfg, io, s);
     b->specimen = pik_specimen_draw(p, cfg->seed, cfg->serial);
     set_clock(b, 0, 0);
     pik_warm(b, 25.0);
-    for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = board_noise(&b->base, noise[i]);
+    for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = board_draws(&b->base, noise[i]);
     sched_ev(&b->look, look_at_inputs, b);
     pik_lines_init(b);
     pik_latch_init(b);

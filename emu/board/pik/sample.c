@@ -18,10 +18,9 @@ static void integrate_input(struct pik *b, unsigned i, int64_t t_ns)
     const int64_t within_ns = (int64_t)(span_ns * (0.5 - GAUSS));
     const int64_t node_ns[2] = {b->fed_ns + within_ns, t_ns - 1 - within_ns};
     double v[2];
-    for (unsigned n = 0; n < 2; n++) {
-        const double signal = b->base.io.accel(b->base.io.ctx, i, node_ns[n]);
-        v[n] = afe_out_v(&b->base.afe[i], signal, b->degc, node_ns[n]);
-    }
+    const struct looks at = {node_ns, 2, (t_ns - b->fed_ns + 1) / 2};
+    b->base.io.accel(b->base.io.ctx, i, &at, v);
+    afe_out_row_v(&b->base.afe[i], v, b->degc, &at);
     c->due_vs += 0.5 * (v[0] + v[1]) * span_ns * 1e-9;
     c->slope_v_per_s = (v[1] - v[0]) / (2.0 * GAUSS * 1e-9 * span_ns);
 }

@@ -11,7 +11,7 @@ struct pik_specimen {
 
 struct pik_channel {
     struct pik_axis axis;
-    struct rng noise;
+    struct draws noise;
     double due_vs;                  /* of the input, that no tick has got yet */
     double slope_v_per_s;           /* of the input, when it was last taken */
     double noise_v;                 /* until the next look */

@@ -92,11 +92,11 @@ static void burn_rom(struct pmka *b)
 
 /* ---- a period ---- */
 
-static int16_t temp_code(struct pmka *b)
+static int16_t temp_code(const struct pmka *b, int64_t t_ns)
 {
     double k = b->board_degc + b->specimen.temp_offset_k;
     if (b->profile.temp_noise_k > 0.0 && b->base.cfg.temp_noise_scale > 0.0)
-        k += b->profile.temp_noise_k * b->base.cfg.temp_noise_scale * rng_gauss(&b->temp_noise);
+        k += b->profile.temp_noise_k * b->base.cfg.temp_noise_scale * draws_gauss(&b->temp_noise, t_ns);
     const double code = floor(128.0 * k + 0.5);
     return (int16_t)(code > 32767.0 ? 32767.0 : code < -32768.0 ? -32768.0 : code);
 }
@@ -110,7 +110,7 @@ static void begin_set(struct pmka *b, int64_t t_ns)
     b->next.cal = b->rotation.cal;
     b->next.tau = (uint8_t)b->rotation.tau;
     b->next.autonomous = b->rotation.mode == PMKA_AUTONOMOUS;
-    b->next.temp_code = temp_code(b);
+    b->next.temp_code = temp_code(b, t_ns);
     pmka_rotation_next(b);
 }
 
@@ -183,7 +183,7 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
-    memset(b, 0, sizeof *b);
+    board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, pmka_lines, PMKA_LINES, cfg, io, s);
     init_trace(b);
@@ -193,8 +193,8 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
     draw_integrators(b);
     draw_specimen(b);
     burn_rom(b);
-    b->adc_noise = board_noise(&b->base, "adc");
-    b->temp_noise = board_noise(&b->base, "temp");
+    b->adc_noise = board_draws(&b->base, "adc");
+    b->temp_noise = board_draws(&b->base, "temp");
     pmka_rotation_start(b);
     for (unsigned i = 0; i < PMKA_INTS; i++) b->channel[i].axis = b->channel[i].said_axis = i < PMKA_K ? (int)i : -1;
 }

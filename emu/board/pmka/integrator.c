@@ -66,6 +66,12 @@ void pmka_nodes(int64_t from_ns, int64_t to_ns, int64_t t_ns[PMKA_NODES])
     t_ns[2] = to_ns - off_ns;
 }
 
+/* The sum of the squared weights: white noise then has the integral that it has in time. */
+int64_t pmka_node_ns(int64_t span_ns)
+{
+    return (span_ns * (5 * 5 + 8 * 8 + 5 * 5) + 18 * 18 - 1) / (18 * 18);
+}
+
 double pmka_integral_vs(const double v[PMKA_NODES], int64_t span_ns)
 {
     return (5.0 * (v[0] + v[2]) + 8.0 * v[1]) / 18.0 * ((double)span_ns * S_PER_NS);

@@ -50,6 +50,7 @@ double pmka_int_zero_v(const struct pmka_int_cfg *cfg, double degc);
 
 /* Gauss's rule of three nodes over [from_ns, to_ns]: exact for polynomials up to the fifth degree. Nodes ascend. */
 void pmka_nodes(int64_t from_ns, int64_t to_ns, int64_t t_ns[PMKA_NODES]);
+int64_t pmka_node_ns(int64_t span_ns); /* interval of a node, for white noise */
 double pmka_integral_vs(const double v[PMKA_NODES], int64_t span_ns);
 
 #endif

@@ -22,10 +22,9 @@ static double cell_vs(struct pmka *b, unsigned axis, int64_t t_ns)
     int64_t node_ns[PMKA_NODES];
     double v[PMKA_NODES];
     pmka_nodes(a->at_ns, t_ns, node_ns);
-    for (unsigned n = 0; n < PMKA_NODES; n++) {
-        const double signal = b->base.io.accel(b->base.io.ctx, axis, node_ns[n]);
-        v[n] = afe_out_v(&b->base.afe[axis], signal, b->board_degc, node_ns[n]);
-    }
+    const struct looks at = {node_ns, PMKA_NODES, pmka_node_ns(t_ns - a->at_ns)};
+    b->base.io.accel(b->base.io.ctx, axis, &at, v);
+    afe_out_row_v(&b->base.afe[axis], v, b->board_degc, &at);
     const double vs = pmka_integral_vs(v, t_ns - a->at_ns);
     a->integral_vs += vs;
     a->at_ns = t_ns;
@@ -121,12 +120,12 @@ static void check_comparators(struct pmka *b, unsigned i, double out_v, int64_t 
 
 /* ---- converter ---- */
 
-static int16_t to_code(struct pmka *b, double out_v, bool *clipped)
+static int16_t to_code(struct pmka *b, double out_v, int64_t t_ns, bool *clipped)
 {
     const struct pmka_profile *p = &b->profile;
     double code = out_v * b->specimen.adc_gain / p->adc_range_v * 32768.0 + b->specimen.adc_offset_lsb;
     if (p->adc_noise_lsb > 0.0 && b->base.cfg.adc_noise_scale > 0.0)
-        code += p->adc_noise_lsb * b->base.cfg.adc_noise_scale * rng_gauss(&b->adc_noise);
+        code += p->adc_noise_lsb * b->base.cfg.adc_noise_scale * draws_gauss(&b->adc_noise, t_ns);
     code = floor(code + 0.5);
     *clipped = code > 32767.0 || code < -32768.0;
     if (b->adc_stuck) return b->adc_stuck_level ? -1 : 0;
@@ -189,7 +188,7 @@ void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
     struct pmka_reading *r = &b->next;
     pmka_integrate(b, i, t_ns);
     const double out_v = pmka_int_out_v(&c->integrator, t_ns);
-    r->code[i] = to_code(b, out_v, &r->clipped[i]);
+    r->code[i] = to_code(b, out_v, t_ns, &r->clipped[i]);
     r->reset[i] = c->done;
     r->serves[i] = (uint8_t)c->served;
     r->saturated[i] = c->integrator.saturated;

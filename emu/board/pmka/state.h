@@ -67,7 +67,7 @@ struct pmka {
     struct pmka_host host; /* set by the receiver */
     struct pmka_specimen specimen;
     uint16_t rom[PMKA_ROM_WORDS];
-    struct rng adc_noise, temp_noise;
+    struct draws adc_noise, temp_noise;
     bool adc_stuck, adc_stuck_level;
     struct pmka_counters counters;
 

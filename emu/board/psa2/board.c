@@ -2,6 +2,7 @@
 
 #include "board/digest.h"
 #include "board/life.h"
+#include "board/psa2/internal.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -108,6 +109,11 @@ static bool ready(const struct board *board)
     return psa2_ready((const struct psa2 *)board);
 }
 
+static const char *why_eager(struct board *board, int64_t t_ns)
+{
+    return psa2_why_eager((struct psa2 *)board, t_ns);
+}
+
 static void truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct board_cfg *c = &board->cfg;
@@ -174,5 +180,6 @@ const struct board_type psa2_board = {
     .pulse_line = PSA2_LINE_CLK,
     .pulses = pulses,
     .analog = true,
+    .why_eager = why_eager,
     .truth = truth,
 };

@@ -405,13 +405,22 @@ struct psa2_can_port psa2_can_port(struct psa2 *b)
     return (struct psa2_can_port){b, board_submit, board_info};
 }
 
+/* A node that streams nothing, has no error that a frame would end, and on its bus no frame that it might have to answer. */
+static bool ignores_frames(void *ctx)
+{
+    const struct psa2_can *c = ctx;
+    return !c->node.bus->step.queued && c->node.node.state != CO_OPERATIONAL &&
+           co_node_error_register(&c->node.node) == 0 && info_of(c).period_ns == c->checked_period_ns;
+}
+
 static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
                      struct sched *s)
 {
     struct psa2 *b = (struct psa2 *)board;
     const struct psa2_can_port port = psa2_can_port(b);
     psa2_can_init(can, cfg, &port, bus, s);
-    b->host = (struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault};
+    b->host =
+        (struct psa2_host){.ctx = can, .frame = psa2_can_frame, .fault = psa2_can_fault, .ignores = ignores_frames};
 }
 
 const struct board_can psa2_can = {.size = sizeof(struct psa2_can),

@@ -1,6 +1,6 @@
 #include "board/psa2/board.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
 #include "gen/psabench_can.h"
 
 #include <stdio.h>

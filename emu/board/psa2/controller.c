@@ -152,7 +152,7 @@ static void serve_port(struct psa2 *b, int64_t t_ns)
         return;
     }
     if (b->request && psa2_request_start(b, t_ns)) return;
-    (void)psa2_temp_start(b, t_ns);
+    if (!psa2_temp_start(b, t_ns)) psa2_lazy_sleep(b);
 }
 
 static void sample_due(struct psa2 *b, int64_t t_ns)
@@ -175,6 +175,7 @@ static void on_accel_timeout(void *ctx, int64_t t_ns)
     struct psa2 *b = ctx;
     if (t_ns < b->timeout_ns) {
         sched_at(b->base.sched, &b->timeout, b->timeout_ns);
+        psa2_lazy_sleep(b);
         return;
     }
     b->counters.timeouts++;
@@ -243,22 +244,16 @@ static void temp_drdy(void *ctx, bool level, int64_t t_ns)
 }
 
 /* Input pair 1 carries the channel; pair 2 is not connected. */
-static double accel_vin_v(void *ctx, unsigned mux, int64_t t_ns)
+static void accel_vin_row_v(void *ctx, unsigned mux, const struct looks *at, double *vin_v)
 {
     const struct psa2_port *port = ctx;
     struct psa2 *b = port->b;
-    if (mux != 0 && mux != 3) return 0.0;
-    const double signal = b->base.io.accel(b->base.io.ctx, port->axis, t_ns);
-    return afe_out_v(&b->base.afe[port->axis], signal, b->board_degc, t_ns);
-}
-
-static void accel_vin_row_v(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v)
-{
-    const struct psa2_port *port = ctx;
-    struct psa2 *b = port->b;
-    const bool connected = mux == 0 || mux == 3;
-    for (unsigned i = 0; i < n; i++) vin_v[i] = connected ? b->base.io.accel(b->base.io.ctx, port->axis, t_ns[i]) : 0.0;
-    if (connected) afe_out_row_v(&b->base.afe[port->axis], vin_v, b->board_degc, t_ns, n);
+    if (mux != 0 && mux != 3) {
+        for (unsigned i = 0; i < at->n; i++) vin_v[i] = 0.0;
+        return;
+    }
+    b->base.io.accel(b->base.io.ctx, port->axis, at, vin_v);
+    afe_out_row_v(&b->base.afe[port->axis], vin_v, b->board_degc, at);
 }
 
 /* ---- life ---- */
@@ -286,9 +281,8 @@ static void init_accel(struct psa2 *b)
                                     .chain = (enum ads1282_chain)b->base.cfg.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
         b->port[i] = (struct psa2_port){b, i};
-        const struct ads1282_io io = {
-            .ctx = &b->port[i], .vin_v = accel_vin_v, .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
-        ads1282_init(&b->adc[i], &cfg, &io, b->base.sched, board_noise(&b->base, adc_noise[i]));
+        const struct ads1282_io io = {.ctx = &b->port[i], .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
+        ads1282_init(&b->adc[i], &cfg, &io, b->base.sched, board_draws(&b->base, adc_noise[i]));
     }
 }
 
@@ -301,7 +295,7 @@ static void init_temp(struct psa2 *b)
                                     .gain_error = b->base.cfg.temp_adc_gain_error,
                                     .strict_timing = true};
     const struct ads1256_io io = {.ctx = b, .ain_v = psa2_temp_ain_v, .drdy = temp_drdy};
-    ads1256_init(&b->tadc, &cfg, &io, b->base.sched, board_noise(&b->base, "adc.t"));
+    ads1256_init(&b->tadc, &cfg, &io, b->base.sched, board_draws(&b->base, "adc.t"));
 }
 
 static void res_up(void *ctx, int64_t t_ns)
@@ -317,18 +311,18 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
-    memset(b, 0, sizeof *b); /* no state of an earlier run */
+    board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, psa2_lines, PSA2_LINES, cfg, io, s);
     b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
     init_trace(b);
     psa2_port_init(b);
-    sched_ev(&b->res_up, res_up, b);
-    sched_ev(&b->timeout, on_accel_timeout, b);
+    sched_ev_inner(&b->res_up, res_up, b);
+    sched_ev_inner(&b->timeout, on_accel_timeout, b);
     psa2_spi_init(b);
     init_read(b);
-    sched_ev(&b->temp.timeout, on_temp_timeout, b);
+    sched_ev_inner(&b->temp.timeout, on_temp_timeout, b);
     psa2_temp_restart(b);
     psa2_out_init(b);
     init_accel(b);
@@ -342,6 +336,7 @@ static void stop_all(struct psa2 *b, int64_t t_ns)
     b->seq = 0;
     b->drd_a_seen = b->fault_notified = false;
     b->sample = (struct psa2_sample){.due = false};
+    psa2_lazy_stop(b);
     sched_cancel(b->base.sched, &b->timeout);
     psa2_spi_stop(b, t_ns);
     psa2_out_stop(b, t_ns);

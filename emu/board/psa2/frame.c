@@ -130,6 +130,7 @@ static void int_rise(void *ctx, int64_t t_ns)
     b->counters.frames++;
     board_notify(&b->base, PSA2_EV_INT_RISE, t_ns);
     if (b->host.frame) b->host.frame(b->host.ctx, &b->out.f, t_ns);
+    psa2_lazy_frame(b, t_ns);
 }
 
 static void int_fall(void *ctx, int64_t t_ns)
@@ -147,9 +148,9 @@ void psa2_out_init(struct psa2 *b)
     o->word_gap = clk_step(&o->half, 2 * (int64_t)(b->profile.word_bits + PSA2_GAP_CLK));
     o->frame = clk_step(&o->half, 2 * (int64_t)psa2_frame_clks(&b->profile));
     o->watched_words = -1;
-    sched_ev(&o->rise, int_rise, b);
-    sched_ev(&o->word, word_event, b);
-    sched_ev(&o->fall, int_fall, b);
+    sched_ev_inner(&o->rise, int_rise, b);
+    sched_ev_inner(&o->word, word_event, b);
+    sched_ev_inner(&o->fall, int_fall, b);
 }
 
 void psa2_out_start(struct psa2 *b, int64_t t_ns)

@@ -18,7 +18,10 @@ void psa2_port_init(struct psa2 *b);
 void psa2_pulse_stop(struct psa2 *b, int64_t t_ns);
 /* Whether span_ns from now on end before the next DRD_A, or no period is long enough for them, or no data come. */
 bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns);
-bool psa2_flowing(const struct psa2 *b, int64_t t_ns); /* DRD_A came within the last two periods */
+bool psa2_in_time(const struct psa2 *b, int64_t drd_a_ns, int64_t end_ns); /* before the next DRD_A, and its margin */
+bool psa2_fits(const struct psa2 *b, int64_t span_ns);                     /* a period is long enough for them */
+int64_t psa2_sync_t_ns(const struct psa2 *b, int64_t t_ns); /* a pulse on SYNC_T that is asked for now is over */
+bool psa2_flowing(const struct psa2 *b, int64_t t_ns);      /* DRD_A came within the last two periods */
 void psa2_arm_timeout(struct psa2 *b, int64_t t_ns);
 void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 *b, int64_t t_ns), int64_t t_ns);
 
@@ -29,7 +32,10 @@ bool psa2_spi_busy(const struct psa2 *b);
 int32_t psa2_tclk_ns(const struct psa2 *b, int32_t periods); /* of the accelerometer converters' clock, rounded up */
 int32_t psa2_tau_ns(const struct psa2 *b, int32_t periods);  /* of the temperature converter's clock */
 void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns);
-int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns);   /* an upper bound */
+int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_spi_past *past, const struct psa2_xfer *x,
+                         int64_t t_ns); /* an upper bound */
+/* When psa2_spi_start() would be done: the instants alone, from a past that moves on. */
+int64_t psa2_spi_pass(const struct psa2 *b, struct psa2_spi_past *past, const struct psa2_xfer *x, int64_t t_ns);
 struct psa2_xfer psa2_xfer_accel(const struct psa2 *b, const uint8_t *tx, unsigned count); /* gaps of 24 tCLK */
 struct psa2_xfer psa2_xfer_temp(const struct psa2 *b, const uint8_t *tx, unsigned count); /* gap of 24 tau at the end */
 
@@ -42,12 +48,28 @@ void psa2_temp_ready(struct psa2 *b);                   /* DRD_T fell while the 
 void psa2_temp_timeout(struct psa2 *b, int64_t t_ns);   /* it did not */
 void psa2_temp_disturbed(struct psa2 *b, int64_t t_ns); /* a request changed the converter */
 bool psa2_temp_free(const struct psa2 *b); /* the converter has answered and is not converting for the scan */
+struct psa2_xfer psa2_temp_write_mux(const struct psa2 *b, unsigned channel);
+struct psa2_xfer psa2_temp_read_data(const struct psa2 *b);
+uint8_t psa2_temp_mux(unsigned channel);
+double psa2_temp_v(const struct psa2 *b, double temp_degc); /* at the input of the converter */
 double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns);
+
+/* psa2/temp_skip.c */
+/* Conversions that no one looks at before until_ns, from where on codes are true. */
+void psa2_temp_skip(struct psa2 *b, int64_t until_ns);
 
 /* psa2/request.c */
 enum psa2_result psa2_request_accept(struct psa2 *b, struct psa2_request *r); /* PSA2_OK: it is due */
 bool psa2_request_start(struct psa2 *b, int64_t t_ns);
 void psa2_request_fail(struct psa2 *b, enum psa2_group group, bool all, int64_t t_ns); /* PSA2_TIMEOUT */
+
+/* psa2/lazy.c */
+void psa2_lazy_frame(struct psa2 *b,
+                     int64_t t_ns); /* a frame has ended: the board may fall asleep, skip frames, wake up */
+void psa2_lazy_sleep(
+    struct psa2 *b); /* between two frames it has done something else: if it sleeps, it may skip frames */
+void psa2_lazy_stop(struct psa2 *b);                      /* a reset: nothing to be awake for */
+const char *psa2_why_eager(struct psa2 *b, int64_t t_ns); /* NULL: what no one looks at need not be computed */
 
 /* psa2/frame.c */
 void psa2_out_init(struct psa2 *b);

@@ -96,6 +96,7 @@ struct psa2_host {
     void *ctx;
     void (*frame)(void *ctx, const struct psa2_frame *f, int64_t t_ns); /* INT has risen; may be NULL */
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns);              /* enum psa2_fault; may be NULL */
+    bool (*ignores)(void *ctx); /* frames change nothing there, but for the latest; NULL: they do */
 };
 
 struct psa2_counters {

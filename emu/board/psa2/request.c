@@ -168,7 +168,7 @@ bool psa2_request_start(struct psa2 *b, int64_t t_ns)
     }
     struct psa2_xfer x = r->group == PSA2_ACCEL ? accel_xfer(b, r) : temp_xfer(b, r);
     x.done = carried_out;
-    if (!may_start(b, r, psa2_spi_span_ns(b, &x, t_ns), t_ns)) return false;
+    if (!may_start(b, r, psa2_spi_span_ns(b, &b->spi.past, &x, t_ns), t_ns)) return false;
     psa2_spi_start(b, &x, t_ns);
     return true;
 }

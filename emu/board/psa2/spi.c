@@ -55,7 +55,7 @@ bool psa2_spi_busy(const struct psa2 *b)
 /* From the first rising edge of the byte under way. */
 static int64_t after_ns(const struct psa2_spi *s, const struct clk_step *way)
 {
-    return clk_on(s->first, way).t_ns;
+    return clk_on(s->past.first, way).t_ns;
 }
 
 static bool clocks_accel(const struct psa2 *b)
@@ -72,17 +72,31 @@ static void arm_phase(struct psa2 *b, enum psa2_spi_phase phase, int64_t t_ns)
 }
 
 /* The first edge at or after t_ns that is not inside the byte before, from whose end on no division is needed. */
-static struct clk_pos edge_at(const struct psa2_spi *s, int64_t t_ns)
+static struct clk_pos edge_at(const struct psa2_spi *s, struct clk_pos byte, int64_t t_ns)
 {
-    const struct clk_pos after = clk_on(s->first, &s->byte);
+    const struct clk_pos after = clk_on(byte, &s->byte);
     return t_ns <= after.t_ns ? after : clk_pos_at(&s->half, t_ns);
 }
 
-static void begin_byte(struct psa2 *b, struct clk_pos from)
+static struct clk_pos rise_from(const struct psa2_spi *s, struct clk_pos from)
 {
-    struct psa2_spi *s = &b->spi;
-    s->first = from.k & 1 ? clk_on(from, &s->one) : from;
-    arm_phase(b, PSA2_SPI_FIRST, after_ns(s, &s->fall));
+    return from.k & 1 ? clk_on(from, &s->one) : from;
+}
+
+/* The first rising edge of a burst that starts at t_ns, after the byte before. One SClk period first: DOut is valid within
+ * 100 ns of DRD_A, DIn needs its set-up. */
+static struct clk_pos burst_from(const struct psa2_spi *s, const struct psa2_spi_past *past, enum psa2_group group,
+                                 int64_t t_ns)
+{
+    const struct clk_pos lead = clk_on(edge_at(s, past->first, t_ns), &s->period);
+    const int64_t ready_ns = past->ready_ns[group];
+    return rise_from(s, ready_ns > lead.t_ns ? edge_at(s, past->first, ready_ns) : lead);
+}
+
+static void begin_byte(struct psa2 *b, struct clk_pos first)
+{
+    b->spi.past.first = first;
+    arm_phase(b, PSA2_SPI_FIRST, after_ns(&b->spi, &b->spi.fall));
 }
 
 void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
@@ -96,14 +110,30 @@ void psa2_spi_start(struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
         trace_set(&b->base.trace, PSA2_LINE_CST, false, t_ns);
         ads1256_cs_pin(&b->tadc, false, t_ns);
     }
-    /* One SClk period first: DOut is valid within 100 ns of DRD_A, DIn needs its set-up. */
-    const struct clk_pos lead = clk_on(edge_at(s, t_ns), &s->period);
-    begin_byte(b, s->ready_ns[x->group] > lead.t_ns ? edge_at(s, s->ready_ns[x->group]) : lead);
+    begin_byte(b, burst_from(s, &s->past, x->group, t_ns));
 }
 
-int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
+int64_t psa2_spi_pass(const struct psa2 *b, struct psa2_spi_past *past, const struct psa2_xfer *x, int64_t t_ns)
 {
-    const int64_t wait_ns = b->spi.ready_ns[x->group] - t_ns;
+    const struct psa2_spi *s = &b->spi;
+    const bool temp = x->group == PSA2_TEMP;
+    struct clk_pos first = burst_from(s, past, x->group, t_ns);
+    for (unsigned i = 0;; i++) {
+        const int64_t end_ns = clk_on(first, temp ? &s->sample_t : &s->sample_a).t_ns;
+        past->ready_ns[x->group] = end_ns + x->gap_ns[i];
+        if (i + 1u < x->count) {
+            first = rise_from(s, edge_at(s, first, past->ready_ns[x->group]));
+            continue;
+        }
+        past->first = first;
+        return temp ? end_ns + psa2_tau_ns(b, CST_TAU) : clk_on(first, &s->byte).t_ns;
+    }
+}
+
+int64_t psa2_spi_span_ns(const struct psa2 *b, const struct psa2_spi_past *past, const struct psa2_xfer *x,
+                         int64_t t_ns)
+{
+    const int64_t wait_ns = past->ready_ns[x->group] - t_ns;
     int64_t span_ns = (wait_ns > 0 ? wait_ns : 0) + periods_ns(b->profile.sclk_hz, 2);
     for (unsigned i = 0; i < x->count; i++)
         span_ns += periods_ns(b->profile.sclk_hz, 9) + (i + 1u < x->count ? x->gap_ns[i] : 0);
@@ -159,7 +189,7 @@ static void report_byte(struct psa2 *b, uint32_t next)
     struct trace_step *const step = trace_room(&b->base.trace, HALF_BYTE + 2), *p = step;
     if (!step) return;
     const struct clk_step one = s->one;
-    struct clk_pos at = clk_on(s->first, &s->back);
+    struct clk_pos at = clk_on(s->past.first, &s->back);
     *p++ = (struct trace_step){at.t_ns, on_fall, bit_of_each(accel, 7) << PSA2_LINE_DIN};
     for (int shift = 7; shift >= 0; shift--) {
         at = clk_on(at, &one);
@@ -206,10 +236,10 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
     else keep_levels(b, t_ns);
     const int64_t next_ns = t_ns + s->x.gap_ns[s->at];
     if (++s->at < s->x.count) {
-        begin_byte(b, edge_at(s, next_ns));
+        begin_byte(b, rise_from(s, edge_at(s, s->past.first, next_ns)));
         return;
     }
-    s->ready_ns[s->x.group] = next_ns;
+    s->past.ready_ns[s->x.group] = next_ns;
     if (s->x.group == PSA2_TEMP) arm_phase(b, PSA2_SPI_CST_UP, t_ns + psa2_tau_ns(b, CST_TAU));
     else arm_phase(b, PSA2_SPI_REST, after_ns(s, &s->byte)); /* SClk is low again before CST may move */
 }
@@ -218,7 +248,7 @@ static void end_byte(struct psa2 *b, int64_t t_ns)
 static void pass_bytes(struct psa2 *b)
 {
     struct psa2_spi *s = &b->spi;
-    for (; s->at + 1u < s->x.count; s->at++, s->first = clk_on(s->first, &s->byte)) {
+    for (; s->at + 1u < s->x.count; s->at++, s->past.first = clk_on(s->past.first, &s->byte)) {
         if (!trace_watched(&b->base.trace, accel_lines)) continue;
         uint32_t next = 0;
         for (unsigned i = 0; i < 3; i++) next |= (uint32_t)s->rx[i][s->at + 1] >> 7 << i;
@@ -311,7 +341,7 @@ void psa2_spi_init(struct psa2 *b)
     s->sample_t = clk_step(&s->half, HALF_SAMPLE_T);
     s->byte = clk_step(&s->half, HALF_BYTE);
     s->read = clk_step(&s->half, HALF_BYTE * (b->profile.read_bits / 8 - 1) + HALF_SAMPLE_A);
-    sched_ev(&b->spi.ev, on_event, b);
+    sched_ev_inner(&b->spi.ev, on_event, b);
 }
 
 void psa2_spi_stop(struct psa2 *b, int64_t t_ns)

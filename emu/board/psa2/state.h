@@ -26,6 +26,12 @@ enum psa2_spi_phase {
     PSA2_SPI_CST_UP
 };
 
+/* What the instants of a burst depend on beside its start. */
+struct psa2_spi_past {
+    struct clk_pos first; /* rising edge of the byte under way or last */
+    int64_t ready_ns[2];  /* per group: gap after its last burst is over */
+};
+
 /* Serial port engine: SClk edges from a count of half periods, two instants a byte. */
 struct psa2_spi {
     struct clk half;                                /* edge k: rising for even k, falling for odd */
@@ -35,11 +41,10 @@ struct psa2_spi {
     struct psa2_xfer x;
     uint8_t rx[4][PSA2_XFER_MAX]; /* X, Y, Z, T */
     enum psa2_spi_phase phase;
-    uint8_t at;           /* byte under way */
-    struct clk_pos first; /* its first rising edge */
-    int64_t ready_ns[2];  /* per group: gap after its last burst is over */
-    int64_t due_ns;       /* of the phase */
-    bool stepping;        /* inside the event: it arms itself when it can go no further */
+    uint8_t at; /* byte under way */
+    struct psa2_spi_past past;
+    int64_t due_ns; /* of the phase */
+    bool stepping;  /* inside the event: it arms itself when it can go no further */
     struct sched_ev ev;
 };
 
@@ -89,6 +94,18 @@ struct psa2_sample {
     int64_t due_ns, t_ns;
 };
 
+enum psa2_sleep { PSA2_AWAKE, PSA2_ASLEEP, PSA2_WAKING };
+
+/* Frames that no one looks at (psa2/lazy.c). */
+struct psa2_lazy {
+    enum psa2_sleep sleep;
+    unsigned left;    /* WAKING: frames until all is as if it had never slept */
+    int64_t span_ns;  /* ASLEEP: from data-ready to the end of its frame, at most */
+    int64_t ask_ns;   /* AWAKE: not before is it asked whether it may sleep */
+    int64_t bound_ns; /* ASLEEP: not known to be harmless for longer */
+    int64_t temp_ns;  /* ASLEEP: until then codes of conversions that were skipped are left */
+};
+
 struct psa2_port { /* which converter a callback came from */
     struct psa2 *b;
     unsigned axis;
@@ -115,6 +132,7 @@ struct psa2 {
     struct psa2_temp temp;
     struct psa2_out out;
     struct psa2_sample sample;
+    struct psa2_lazy lazy;
     void (*idle)(struct psa2 *b, int64_t t_ns); /* the controller: a transfer or a pulse has ended */
     struct sched_ev res_up, timeout;
     bool fault_notified; /* no DRD_A has come since the fault */

@@ -7,13 +7,22 @@
 #define KELVIN   273.15
 #define SENSORS  4u
 
+uint8_t psa2_temp_mux(unsigned channel)
+{
+    return (uint8_t)(channel << 4 | AINCOM);
+}
+
 /* A current proportional to absolute temperature on the load RTD: unipolar volts (E0, as an AD590 would give). */
+double psa2_temp_v(const struct psa2 *b, double temp_degc)
+{
+    return b->profile.temp_sensor_a_per_k * (temp_degc + KELVIN) * b->profile.temp_load_ohm;
+}
+
 double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns)
 {
     const struct psa2 *b = ctx;
     if (ain >= SENSORS || ain >= b->profile.temp_channels) return 0.0;
-    const double temp_k = b->base.io.temp_degc(b->base.io.ctx, ain, t_ns) + KELVIN;
-    return b->profile.temp_sensor_a_per_k * temp_k * b->profile.temp_load_ohm;
+    return psa2_temp_v(b, b->base.io.temp_degc(b->base.io.ctx, ain, t_ns));
 }
 
 void psa2_temp_await(struct psa2 *b, int64_t t_ns)
@@ -63,21 +72,32 @@ static void read_done(struct psa2 *b, int64_t t_ns)
 /* KPSA keeps a burst out of the way of the next DRD_A; the profile without gates shows what happens if it does not. */
 static bool may_start(const struct psa2 *b, const struct psa2_xfer *x, int64_t t_ns)
 {
-    return !b->profile.gate_sclk || psa2_window(b, psa2_spi_span_ns(b, x, t_ns), t_ns);
+    return !b->profile.gate_sclk || psa2_window(b, psa2_spi_span_ns(b, &b->spi.past, x, t_ns), t_ns);
+}
+
+struct psa2_xfer psa2_temp_write_mux(const struct psa2 *b, unsigned channel)
+{
+    const uint8_t bytes[] = {WREG_MUX, 0x00, psa2_temp_mux(channel)};
+    struct psa2_xfer x = psa2_xfer_temp(b, bytes, sizeof bytes);
+    x.done = mux_written;
+    return x;
+}
+
+struct psa2_xfer psa2_temp_read_data(const struct psa2 *b)
+{
+    static const uint8_t bytes[] = {RDATA, 0x00, 0x00, 0x00};
+    struct psa2_xfer x = psa2_xfer_temp(b, bytes, sizeof bytes);
+    x.gap_ns[0] = psa2_tau_ns(b, T6_TAU);
+    x.done = read_done;
+    return x;
 }
 
 bool psa2_temp_start(struct psa2 *b, int64_t t_ns)
 {
     const struct psa2_temp *m = &b->temp;
-    const uint8_t write_mux[] = {WREG_MUX, 0x00, (uint8_t)(m->channel << 4 | AINCOM)};
-    const uint8_t read_data[] = {RDATA, 0x00, 0x00, 0x00};
     if (b->profile.temp_channels == 0 || m->hold) return false;
     if (m->stage != PSA2_SCAN_MUX && m->stage != PSA2_SCAN_READ) return false;
-    const bool read = m->stage == PSA2_SCAN_READ;
-    struct psa2_xfer x =
-        read ? psa2_xfer_temp(b, read_data, sizeof read_data) : psa2_xfer_temp(b, write_mux, sizeof write_mux);
-    if (read) x.gap_ns[0] = psa2_tau_ns(b, T6_TAU);
-    x.done = read ? read_done : mux_written;
+    const struct psa2_xfer x = m->stage == PSA2_SCAN_READ ? psa2_temp_read_data(b) : psa2_temp_write_mux(b, m->channel);
     if (!may_start(b, &x, t_ns)) return false;
     psa2_spi_start(b, &x, t_ns);
     return true;

@@ -61,7 +61,8 @@ static void integrate_to(struct psd1 *b, int64_t t_ns)
 static void walk_step(struct psd1_gyros *g)
 {
     for (unsigned i = 0; i < 3; i++)
-        if (g->axis[i].arw_rad > 0.0) g->axis[i].angle_rad += g->axis[i].arw_rad * rng_gauss(&g->axis[i].noise);
+        if (g->axis[i].arw_rad > 0.0)
+            g->axis[i].angle_rad += g->axis[i].arw_rad * draws_gauss(&g->axis[i].noise, g->grid_ns);
 }
 
 /* Always at the points of the grid, independent of readers. */
@@ -170,7 +171,7 @@ static void draw_gyro(const struct psd1 *b, struct psd1_gyro *g, const char *of,
     g->rate_offset_radps = rng_gauss(&r) * p->rate_offset_sd_dps * RAD_PER_DEG;
     g->rate_scale = 1.0 + 1e-6 * rng_gauss(&r) * p->rate_scale_sd_ppm;
     g->arw_rad = b->base.cfg.adc_noise_scale * p->gyro_arw_deg_rth * RAD_PER_DEG * sqrt(step_h);
-    g->noise = board_noise(&b->base, noise);
+    g->noise = board_draws(&b->base, noise);
 }
 
 void psd1_aux_init(struct psd1 *b)

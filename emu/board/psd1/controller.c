@@ -133,16 +133,16 @@ static void on_drdy(void *ctx, bool level, int64_t t_ns)
 }
 
 /* The signal is on the profile's input; the other one is not connected. The reference's error is its inverse on the input. */
-static void vin_row_v(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v)
+static void vin_row_v(void *ctx, unsigned channel, const struct looks *at, double *vin_v)
 {
     const struct psd1_port *port = ctx;
     struct psd1 *b = port->b;
-    struct afe *const afe = &b->base.afe[port->axis];
     const bool connected = channel + 1 == b->profile.adc_input;
-    for (unsigned i = 0; i < n; i++) {
-        const double signal = connected ? b->base.io.accel(b->base.io.ctx, port->axis, t_ns[i]) : 0.0;
-        vin_v[i] = connected ? afe_out_v(afe, signal, b->board_degc, t_ns[i]) * b->per_vref : 0.0;
+    if (connected) {
+        b->base.io.accel(b->base.io.ctx, port->axis, at, vin_v);
+        afe_out_row_v(&b->base.afe[port->axis], vin_v, b->board_degc, at);
     }
+    for (unsigned i = 0; i < at->n; i++) vin_v[i] = connected ? vin_v[i] * b->per_vref : 0.0;
 }
 
 /* ---- life ---- */
@@ -202,7 +202,7 @@ static void init_adc(struct psd1 *b)
         b->port[i] = (struct psd1_port){b, i};
         const bool heard = i == 0 || b->profile.dr != PSD1_DR_X; /* else its DRDY is not connected */
         const struct ad7712_io io = {.ctx = &b->port[i], .vin_row_v = vin_row_v, .drdy = heard ? on_drdy : NULL};
-        ad7712_init(&b->adc[i], &cfg, &io, b->base.sched, board_noise(&b->base, adc_noise[i]));
+        ad7712_init(&b->adc[i], &cfg, &io, b->base.sched, board_draws(&b->base, adc_noise[i]));
         b->drdy[i] = true;
     }
 }
@@ -211,7 +211,7 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
                struct sched *s)
 {
     assert(io->accel && io->temp_degc);
-    memset(b, 0, sizeof *b); /* no state of an earlier run */
+    board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, psd1_lines, PSD1_LINES, cfg, io, s);
     b->due_ns = SCHED_NEVER;

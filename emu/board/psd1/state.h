@@ -57,7 +57,7 @@ struct psd1_gyro {                     /* one laser gyro and its rate sensor */
     double rate_offset_radps, rate_scale;
     double angle_rad; /* up to psd1_gyros.t_ns */
     double w_radps;   /* then */
-    struct rng noise;
+    struct draws noise;
 };
 
 struct psd1_gyros {

@@ -10,7 +10,7 @@
 
 #include "base/chip_fault.h"
 #include "base/clk.h"
-#include "base/rng.h"
+#include "base/draws.h"
 #include "base/sched.h"
 #include "chip/ad7712/cfg.h"
 #include "chip/ad7712/filter.h"
@@ -60,7 +60,7 @@ struct ad7712 {
     struct ad7712_io io;
     struct chip_fault fault;
     struct sched *sched;
-    struct rng noise;
+    struct draws noise;
     struct clk clkin;
     struct ad7712_counters n;
 
@@ -87,7 +87,7 @@ struct ad7712 {
 };
 
 void ad7712_init(struct ad7712 *a, const struct ad7712_cfg *cfg, const struct ad7712_io *io, struct sched *s,
-                 struct rng noise);
+                 struct draws noise);
 
 /* Supplies are good: control word and coefficients to default, conversions begin. */
 void ad7712_power_up(struct ad7712 *a, int64_t t_ns);

@@ -2,6 +2,8 @@
 #ifndef PSABENCH_CHIP_AD7712_CFG_H
 #define PSABENCH_CHIP_AD7712_CFG_H
 
+#include "base/looks.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -72,8 +74,8 @@ struct ad7712_io {
      * source_ohm is there. Asked late, when an output period ends, each look for its own instant and never for an earlier
      * one than before; who changes the input abruptly calls ad7712_sample_until() first. NULL where rows are asked. */
     double (*vin_v)(void *ctx, unsigned channel, int64_t t_ns);
-    /* The same for n looks in a row, up to AD7712_CELLS_MAX; NULL: one by one. Not asked where source_ohm is there. */
-    void (*vin_row_v)(void *ctx, unsigned channel, const int64_t *t_ns, unsigned n, double *vin_v);
+    /* The same for a row of up to AD7712_CELLS_MAX looks; NULL: one by one. Not asked where source_ohm is there. */
+    void (*vin_row_v)(void *ctx, unsigned channel, const struct looks *at, double *vin_v);
     /* Resistance behind it, INFINITY: nothing connected. NULL: 0, loads and currents do not matter. */
     double (*source_ohm)(void *ctx, unsigned channel, int64_t t_ns);
     /* DRDY pin, active low; called on changes only. NULL: not connected; inside it then rises as soon as a word is taken. */

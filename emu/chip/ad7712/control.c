@@ -40,7 +40,7 @@ void ad7712_follow_pins(struct ad7712 *a, int64_t t_ns)
 }
 
 void ad7712_init(struct ad7712 *a, const struct ad7712_cfg *cfg, const struct ad7712_io *io, struct sched *s,
-                 struct rng noise)
+                 struct draws noise)
 {
     assert(cfg->clkin_hz >= 400000 && cfg->clkin_hz <= 10000000 && cfg->vref_v > 0.0);
     assert((cfg->cells_max & (cfg->cells_max - 1)) == 0 && cfg->cells_max <= AD7712_CELLS_MAX);

@@ -81,7 +81,7 @@ static void take_rows(struct ad7712 *a, int64_t t_ns)
         unsigned n = 0;
         for (; a->look.t_ns <= t_ns && n < AD7712_CELLS_MAX; a->look = clk_on(a->look, &a->look_step))
             at_ns[n++] = a->look.t_ns;
-        a->io.vin_row_v(a->io.ctx, ad7712_channel(a), at_ns, n, v);
+        a->io.vin_row_v(a->io.ctx, ad7712_channel(a), &(struct looks){at_ns, n, a->look_step.ns}, v);
         for (unsigned i = 0; i < n; i++) v[i] = path_x(a, v[i]);
         ad7712_sinc3_row(&a->filter, v, n);
     }
@@ -235,7 +235,7 @@ static void on_ready(void *ctx, int64_t t_ns)
     if (a->begin_ev.queued && a->begin_ev.due_ns == t_ns) return; /* the filter is reset at this very edge */
     ad7712_sample_until(a, t_ns);
     double x = a->quiet ? a->still : a->filter.out;
-    if (a->noise_x > 0.0) x += a->noise_x * rng_gauss(&a->noise);
+    if (a->noise_x > 0.0) x += a->noise_x * draws_gauss(&a->noise, t_ns);
     if (phases[a->phase].use == WORD) use_word(a, x, t_ns);
     else use_coef(a, x);
     go_on(a);
@@ -274,8 +274,8 @@ int64_t ad7712_period_ns(const struct ad7712 *a)
 
 void ad7712_conv_init(struct ad7712 *a)
 {
-    sched_ev(&a->ready_ev, on_ready, a);
-    sched_ev(&a->pulse_ev, on_pulse, a);
-    sched_ev(&a->rise_ev, on_rise, a);
-    sched_ev(&a->begin_ev, on_begin, a);
+    sched_ev_inner(&a->ready_ev, on_ready, a);
+    sched_ev_inner(&a->pulse_ev, on_pulse, a);
+    sched_ev_inner(&a->rise_ev, on_rise, a);
+    sched_ev_inner(&a->begin_ev, on_begin, a);
 }

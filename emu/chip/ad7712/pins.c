@@ -196,5 +196,5 @@ static void on_clock(void *ctx, int64_t t_ns)
 
 void ad7712_pins_init(struct ad7712 *a)
 {
-    sched_ev(&a->clock_ev, on_clock, a);
+    sched_ev_inner(&a->clock_ev, on_clock, a);
 }

@@ -220,6 +220,6 @@ void ad7712_port_init(struct ad7712 *a)
 {
     a->port = (struct ad7712_port){.rfs = true, .tfs = true, .sync = true, .standby = true, .clock = true};
     a->port.a0_ns = a->port.rise_ns = a->port.fall_ns = a->port.sdata_ns = -NS_PER_S; /* no edge yet */
-    sched_ev(&a->load_ev, on_load, a);
-    sched_ev(&a->sdata_ev, on_sdata, a);
+    sched_ev_inner(&a->load_ev, on_load, a);
+    sched_ev_inner(&a->sdata_ev, on_sdata, a);
 }

@@ -10,8 +10,8 @@
 
 #include "base/chip_fault.h"
 #include "base/clk.h"
+#include "base/draws.h"
 #include "base/reg.h"
-#include "base/rng.h"
 #include "base/sched.h"
 #include "base/spi.h"
 #include "chip/ads1256/cfg.h"
@@ -50,7 +50,7 @@ struct ads1256 {
     struct chip_fault fault;
     void (*notify_drdy)(void *ctx, bool level, int64_t t_ns); /* io.drdy, which is ignored while DRDY is stuck */
     struct sched *sched;
-    struct rng noise;
+    struct draws noise;
     struct clk clkin;
     struct ads1256_counters n;
     uint8_t refused_opcode; /* the latest one, for the shell */
@@ -91,7 +91,7 @@ struct ads1256 {
 };
 
 void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct ads1256_io *io, struct sched *s,
-                  struct rng noise);
+                  struct draws noise);
 
 /* Supplies are good: after the time of cfg.start registers to default, self-calibration at default settings, then DRDY
  * falls. */
@@ -121,6 +121,24 @@ uint32_t ads1256_clkout_hz(const struct ads1256 *a); /* 0: D0 is no clock. Its e
 
 bool ads1256_drdy(const struct ads1256 *a);
 int64_t ads1256_settle_ns(const struct ads1256 *a); /* t18 of the present DRATE */
+
+/* ---- Words that no one looks at ---- */
+
+/* One conversion after another, each begun by SYNC/PDWN and read before the next is there. */
+struct ads1256_run {
+    int64_t start_tau; /* CLKIN count */
+    int64_t ready_ns;  /* the first word */
+    int64_t again_ns;  /* t17 before the second */
+};
+
+/* The present run may be replaced by a later one: its first word is still to come, and with volts of the inputs between these
+ * no counter would move but those of conversions and restarts. */
+bool ads1256_may_skip(const struct ads1256 *a, double low_v, double high_v);
+struct ads1256_run ads1256_run_now(const struct ads1256 *a);
+struct ads1256_run ads1256_run_from(const struct ads1256 *a, int64_t t_ns); /* SYNC/PDWN rises at t_ns */
+
+/* n runs have passed, each of one word that was read; the last has just begun, with that MUX. It may lie ahead. */
+void ads1256_skip(struct ads1256 *a, uint32_t n, uint8_t mux, const struct ads1256_run *last);
 
 /* ---- Faults ---- */
 

@@ -22,10 +22,16 @@ static double path_fs(const struct ads1256 *a, double vin_v)
     return gain * (vin_v + a->cfg.offset_v) / (2.0 * a->cfg.vref_v);
 }
 
-static double noise_fs(struct ads1256 *a)
+/* Noise of a draw of so many standard deviations. */
+static double draw_fs(const struct ads1256 *a, double draw)
 {
     const double rms_v = a->cfg.noise_scale * ads1256_noise_v(a->rate, ads1256_pga_log2(a));
-    return (double)(1u << ads1256_pga_log2(a)) * rms_v * rng_gauss(&a->noise) / (2.0 * a->cfg.vref_v);
+    return (double)(1u << ads1256_pga_log2(a)) * rms_v * draw / (2.0 * a->cfg.vref_v);
+}
+
+static double noise_fs(const struct ads1256 *a, int64_t t_ns)
+{
+    return draw_fs(a, draws_gauss(&a->noise, t_ns));
 }
 
 static int64_t run_edge_ns(const struct ads1256 *a, int64_t tau)
@@ -48,8 +54,7 @@ static void await_ready(struct ads1256 *a)
     sched_at(a->sched, &a->ready_ev, run_edge_ns(a, ready_tau(a, a->ready)));
 }
 
-/* A run of conversions that began at CLKIN count start_tau: the first DRDY is t18 later. */
-static void start_run(struct ads1256 *a, int64_t start_tau)
+void ads1256_start_run(struct ads1256 *a, int64_t start_tau)
 {
     a->mode = ADS1256_RUNNING;
     a->rate = a->rate_next;
@@ -92,7 +97,7 @@ void ads1256_restart(struct ads1256 *a, int64_t extra_tau, int64_t t_ns)
 {
     ads1256_halt(a, ADS1256_RUNNING, t_ns);
     a->n.restarts++;
-    start_run(a, clk_count_at(&a->clkin, t_ns) + extra_tau);
+    ads1256_start_run(a, clk_count_at(&a->clkin, t_ns) + extra_tau);
 }
 
 static void on_cell(void *ctx, int64_t t_ns)
@@ -103,13 +108,27 @@ static void on_cell(void *ctx, int64_t t_ns)
     await_cell(a);
 }
 
-static int32_t convert_mean(struct ads1256 *a)
+static int32_t code_of(const struct ads1256 *a, double fs, bool *clipped)
+{
+    return ads1256_code(a->rate->alpha * fs, get_ofc(a), reg_peek24(&a->regs, ADS1256_FSC0), clipped);
+}
+
+static int32_t convert_mean(struct ads1256 *a, int64_t t_ns)
 {
     bool clipped = false;
-    const double raw = a->rate->alpha * (a->mean.out + noise_fs(a));
-    const int32_t code = ads1256_code(raw, get_ofc(a), reg_peek24(&a->regs, ADS1256_FSC0), &clipped);
+    const int32_t code = code_of(a, a->mean.out + noise_fs(a, t_ns), &clipped);
     a->n.clipped += clipped;
     return code;
+}
+
+/* The mean of looks lies between them, and the code follows it one way. */
+bool ads1256_in_range(const struct ads1256 *a, double low_v, double high_v)
+{
+    const double noise = draw_fs(a, DRAWS_GAUSS_MAX);
+    bool clipped = false;
+    (void)code_of(a, path_fs(a, low_v) - noise, &clipped);
+    (void)code_of(a, path_fs(a, high_v) + noise, &clipped);
+    return !clipped;
 }
 
 /* The serial port's side of a new word: a read in progress goes on with the new one's bytes, each RDATAC word starts over. */
@@ -132,7 +151,7 @@ static void on_ready(void *ctx, int64_t t_ns)
     struct ads1256 *a = ctx;
     a->n.conversions++;
     a->updating = a->after_sdatac = false;
-    a->word = convert_mean(a);
+    a->word = convert_mean(a, t_ns);
     offer_word(a);
     a->ready++;
     if (a->rate != a->rate_next) change_rate(a, a->start_tau + ready_tau(a, a->ready - 1));
@@ -197,21 +216,21 @@ static void store_fsc(struct ads1256 *a, double raw)
 }
 
 /* The self-gain calibration is without noise (E0). */
-static void store_result(struct ads1256 *a)
+static void store_result(struct ads1256 *a, int64_t t_ns)
 {
     const double alpha = a->rate->alpha;
     const bool pins = steps[a->cal].pins;
-    if (steps[a->cal].ofc) store_ofc(a, alpha * ((pins ? a->mean.out : path_fs(a, 0.0)) + noise_fs(a)));
+    if (steps[a->cal].ofc) store_ofc(a, alpha * ((pins ? a->mean.out : path_fs(a, 0.0)) + noise_fs(a, t_ns)));
     if (!steps[a->cal].fsc) return;
-    store_fsc(a, pins ? alpha * (a->mean.out + noise_fs(a)) - get_ofc(a) : alpha * (1.0 + a->cfg.gain_error));
+    store_fsc(a, pins ? alpha * (a->mean.out + noise_fs(a, t_ns)) - get_ofc(a) : alpha * (1.0 + a->cfg.gain_error));
 }
 
 static void on_cal(void *ctx, int64_t t_ns)
 {
     struct ads1256 *a = ctx;
     a->n.calibrations++;
-    store_result(a);
-    if (a->sync) start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
+    store_result(a, t_ns);
+    if (a->sync) ads1256_start_run(a, a->start_tau + ads1256_settle_tau(a->rate));
     else ads1256_halt(a, ADS1256_SYNC_LOW, t_ns);
 }
 
@@ -226,8 +245,8 @@ void ads1256_retime(struct ads1256 *a)
 
 void ads1256_conv_init(struct ads1256 *a)
 {
-    sched_ev(&a->cell_ev, on_cell, a);
-    sched_ev(&a->ready_ev, on_ready, a);
-    sched_ev(&a->pulse_ev, on_pulse, a);
-    sched_ev(&a->cal_ev, on_cal, a);
+    sched_ev_inner(&a->cell_ev, on_cell, a);
+    sched_ev_inner(&a->ready_ev, on_ready, a);
+    sched_ev_inner(&a->pulse_ev, on_pulse, a);
+    sched_ev_inner(&a->cal_ev, on_cal, a);
 }

@@ -2,11 +2,10 @@
 
 #include <math.h>
 
-#define RMUX_OHM    25.0 /* of each side, SBAS288 p. 15 */
-#define AVDD_LESS_V 2.0  /* range of the buffer, and the clamp of the sensor-detect current: 3 V of 5 */
-#define BEYOND_V    0.1  /* range of the pins outside the supplies */
-#define NOMINAL_HZ  7.68e6
-#define OPEN_OHM    1e12
+#define RMUX_OHM   25.0 /* of each side, SBAS288 p. 15 */
+#define BEYOND_V   0.1  /* range of the pins outside the supplies */
+#define NOMINAL_HZ 7.68e6
+#define OPEN_OHM   1e12
 
 /* Effective impedance without buffer at 7.68 MHz, by log2 of the gain: of each pin to AVDD/2, and between the two.
  * SBAS288 p. 17, table 10. Both together are the 150 kohm / PGA of the electrical characteristics. */
@@ -50,7 +49,7 @@ static double source_ohm(const struct ads1256 *a, unsigned select, int64_t t_ns)
 
 static double buffer_v(struct ads1256 *a, double v)
 {
-    const double max_v = a->cfg.avdd_v - AVDD_LESS_V;
+    const double max_v = a->cfg.avdd_v - ADS1256_AVDD_LESS_V;
     if (v >= 0.0 && v <= max_v) return v;
     a->n.buffer_clipped++;
     return v < 0.0 ? 0.0 : max_v;

@@ -12,6 +12,8 @@
 
 enum { ADS1256_POWER_DOWN_PERIODS = 20, ADS1256_WAKE_TAU = 256 /* more after standby: modulator up, SBAS288 p. 22 */ };
 
+#define ADS1256_AVDD_LESS_V 2.0 /* range of the buffer, and the clamp of the sensor-detect current: 3 V of 5 */
+
 static inline uint8_t ads1256_value(const struct ads1256 *a, enum ads1256_reg r)
 {
     return a->value[r];
@@ -80,6 +82,12 @@ double ads1256_input_v(struct ads1256 *a, int64_t t_ns);
 
 void ads1256_conv_init(struct ads1256 *a);
 void ads1256_retime(struct ads1256 *a); /* the clock's rate has changed */
+
+/* A run of conversions that began at CLKIN count start_tau: the first DRDY is t18 later. */
+void ads1256_start_run(struct ads1256 *a, int64_t start_tau);
+
+/* No code of these volts reaches a limit, whatever the noise draws. */
+bool ads1256_in_range(const struct ads1256 *a, double low_v, double high_v);
 
 /* Moves the pin and the DRDY bit of STATUS. */
 void ads1256_set_drdy(struct ads1256 *a, bool level, int64_t t_ns);

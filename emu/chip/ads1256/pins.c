@@ -31,7 +31,7 @@ void ads1256_pins_refresh(struct ads1256 *a, int64_t t_ns)
 
 void ads1256_pins_init(struct ads1256 *a)
 {
-    sched_ev(&a->pins.hiz_ev, on_hiz, a);
+    sched_ev_inner(&a->pins.hiz_ev, on_hiz, a);
     a->pins.rise_ns = a->pins.fall_ns = a->pins.din_ns = -NS_PER_S; /* no edge yet */
 }
 

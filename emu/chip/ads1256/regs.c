@@ -98,7 +98,7 @@ static void on_power_down(void *ctx, int64_t t_ns)
 /* ---- pins ---- */
 
 void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct ads1256_io *io, struct sched *s,
-                  struct rng noise)
+                  struct draws noise)
 {
     *a = (struct ads1256){.cfg = *cfg, .io = *io, .sched = s, .noise = noise};
     assert(cfg->clkin_hz >= 100000 && cfg->clkin_hz <= 10000000 && cfg->vref_v > 0.0);
@@ -107,8 +107,8 @@ void ads1256_init(struct ads1256 *a, const struct ads1256_cfg *cfg, const struct
     a->clkin = (struct clk){.hz = cfg->clkin_hz, .div = 1};
     a->regs = (struct reg_file){.map = map, .count = ADS1256_REGS, .value = a->value, .chip = a};
     a->cs = a->sync = a->reset = a->drdy = true;
-    sched_ev(&a->start_ev, on_start, a);
-    sched_ev(&a->power_down_ev, on_power_down, a);
+    sched_ev_inner(&a->start_ev, on_start, a);
+    sched_ev_inner(&a->power_down_ev, on_power_down, a);
     ads1256_serial_init(a);
     ads1256_pins_init(a);
     ads1256_conv_init(a);

@@ -9,7 +9,7 @@
 #ifndef PSABENCH_CHIP_ADS1282_ADS1282_H
 #define PSABENCH_CHIP_ADS1282_ADS1282_H
 
-#include "base/rng.h"
+#include "base/draws.h"
 #include "base/sched.h"
 #include "chip/ads1282/cfg.h"
 #include "chip/ads1282/state.h"
@@ -18,7 +18,7 @@
 #include <stdint.h>
 
 void ads1282_init(struct ads1282 *a, const struct ads1282_cfg *cfg, const struct ads1282_io *io, struct sched *s,
-                  struct rng noise);
+                  struct draws noise);
 
 /* Supplies and clock are good at t_ns: registers to default, RDATAC, first settled DRDY after cfg.power_up_tclk and t_DR. */
 void ads1282_power_up(struct ads1282 *a, int64_t t_ns);
@@ -60,6 +60,21 @@ void ads1282_shift(struct ads1282 *a, uint8_t *out, unsigned n, int64_t t_ns);
 /* Samples the input up to and including t_ns. For a caller about to change the input abruptly: it is otherwise sampled,
  * each sample at its own instant, when a data period ends. */
 void ads1282_sample_until(struct ads1282 *a, int64_t t_ns);
+
+/* ---- Words that no one looks at ---- */
+
+/* Why each word has to be computed, for volts at the input within a range; NULL: it need not. A sentence's end. */
+const char *ads1282_why_eager(const struct ads1282 *a, struct looks_range vin_v);
+
+bool ads1282_rests(const struct ads1282 *a); /* settled, its last word read, nothing under way: put_off() may come */
+
+void ads1282_put_off(struct ads1282 *a);          /* words are 0 from here on, no samples are taken */
+void ads1282_skip(struct ads1282 *a, uint32_t n); /* n data periods pass, each word read in time; between two ends */
+
+/* Words are computed again. The samples that the filter still holds are to be taken by ads1282_sample_until() the ends of
+ * the data periods from the returned one to the last; *before_ns: of the sample before these. */
+int64_t ads1282_resume(struct ads1282 *a, int64_t *before_ns);
+int64_t ads1282_end_ns(const struct ads1282 *a, int64_t period); /* DRDY falls, if the word is settled */
 
 /* CONFIG0 gives one settled FIR word a data period and nothing else: pulse sync, sinc + FIR, a published rate. What a
  * controller can read that knows no other mode. */

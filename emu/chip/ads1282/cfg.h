@@ -2,6 +2,8 @@
 #ifndef PSABENCH_CHIP_ADS1282_CFG_H
 #define PSABENCH_CHIP_ADS1282_CFG_H
 
+#include "base/looks.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -58,14 +60,14 @@ struct ads1282_cfg {
     enum ads1282_chain chain;
 };
 
-/* Everything the chip can reach. Only vin_v must be there. */
+/* Everything the chip can reach. Only the input must be there. */
 struct ads1282_io {
     void *ctx;
     /* Differential input of multiplexer code mux (0 AIN1, 1 AIN2, 3 both, 4 AINN2 short; code 2 is shorted inside), volts,
      * at t_ns: up to one data period ago, never earlier than the last call. */
     double (*vin_v)(void *ctx, unsigned mux, int64_t t_ns);
-    /* The same for n samples in a row, if that is cheaper; may be NULL. */
-    void (*vin_row_v)(void *ctx, unsigned mux, const int64_t *t_ns, unsigned n, double *vin_v);
+    /* The same for a row of samples, in place of vin_v; may be NULL. */
+    void (*vin_row_v)(void *ctx, unsigned mux, const struct looks *at, double *vin_v);
     void (*drdy)(void *ctx, bool level, int64_t t_ns);  /* DRDY pin, active low; called on changes only */
     void (*mflag)(void *ctx, bool level, int64_t t_ns); /* MFLAG pin; costs an event for each input sample */
     /* Pins M0 and M1 at each MCLK (CLK/4) while CONFIG0 FILTR = 00; not given: the bits are not computed. */

@@ -60,33 +60,46 @@ static int64_t saturate_input(struct ads1282 *a, double x)
 
 /* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
  * leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
-static inline double draw_noise(struct rng *r)
+static inline double sum_draw(uint64_t u)
 {
-    const uint64_t u = rng_u64(r);
-    const uint32_t sum =
-        (uint32_t)(u & 0xFFFF) + (uint32_t)(u >> 16 & 0xFFFF) + (uint32_t)(u >> 32 & 0xFFFF) + (uint32_t)(u >> 48);
-    return (double)sum - 131070.0;
-}
-
-static double input_v(const struct ads1282 *a)
-{
-    return a->mux == 2 || a->mux > 4 ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, a->next.t_ns);
+    const uint64_t pairs = (u & UINT64_C(0x0000FFFF0000FFFF)) + (u >> 16 & UINT64_C(0x0000FFFF0000FFFF));
+    return (double)(int32_t)((pairs & 0xFFFFFFFF) + (pairs >> 32)) - 131070.0;
 }
 
 static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
 {
     const bool shorted = a->mux == 2 || a->mux > 4;
     if (a->io.vin_row_v && !shorted) {
-        a->io.vin_row_v(a->io.ctx, a->mux, t_ns, n, vin_v);
+        a->io.vin_row_v(a->io.ctx, a->mux, &(struct looks){t_ns, n, a->step.ns}, vin_v);
         return;
     }
     for (unsigned i = 0; i < n; i++) vin_v[i] = shorted ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, t_ns[i]);
 }
 
+static double input_v(const struct ads1282 *a)
+{
+    double v;
+    input_row_v(a, &a->next.t_ns, 1, &v);
+    return v;
+}
+
+/* The samples of one step's grid count from CLK edge 0: the noise of a sample is that of its instant, whatever went before.
+ * Each step has draws of its own, else a slower rate would use numbers again. */
+static int64_t draw_number(const struct ads1282 *a, int64_t edge)
+{
+    return edge / a->step.k;
+}
+
+static struct draws step_draws(const struct ads1282 *a)
+{
+    return (struct draws){a->noise.key, a->noise.high + (uint64_t)a->step.k};
+}
+
 static int64_t noisy_input(struct ads1282 *a)
 {
     double x = input_v(a) * a->lsb_per_v;
-    if (a->noise_lsb > 0.0) x += a->noise_lsb * draw_noise(&a->noise);
+    const struct draws noise = step_draws(a);
+    if (a->noise_lsb > 0.0) x += a->noise_lsb * sum_draw(draws_u64(&noise, draw_number(a, a->next.k)));
     return saturate_input(a, x);
 }
 
@@ -99,30 +112,59 @@ static void next_sample(struct ads1282 *a)
 
 /* ---- Ideal modulator, sinc by held blocks ---- */
 
-/* As noisy_input(), for n samples whose volts are known: the generator's state stays in registers. */
-static void modulate_block(struct ads1282 *a, const double *vin_v, unsigned n, int64_t *lsb)
+/* As noisy_input(), for n samples from CLK edge `edge` on whose volts are known. */
+static void modulate_block(struct ads1282 *a, int64_t edge, const double *vin_v, unsigned n, int64_t *lsb)
 {
+    uint64_t u[ADS1282_BLOCKS];
     const double lsb_per_v = a->lsb_per_v, noise_lsb = a->noise_lsb;
-    struct rng noise = a->noise;
+    const bool noisy = noise_lsb > 0.0;
+    const struct draws noise = step_draws(a);
+    int64_t last = a->last_lsb;
+    if (noisy) draws_row(&noise, draw_number(a, edge), n, u);
     for (unsigned i = 0; i < n; i++) {
         double x = vin_v[i] * lsb_per_v;
-        if (noise_lsb > 0.0) x += noise_lsb * draw_noise(&noise);
-        lsb[i] = saturate_lsb(x);
+        if (noisy) x += noise_lsb * sum_draw(u[i]);
+        lsb[i] = last = saturate_lsb(x);
     }
-    a->noise = noise;
-    a->last_lsb = lsb[n - 1];
+    a->last_lsb = last;
 }
 
-/* The instants of the next samples up to until_ns, at most n; returns how many. */
+/* n instants from next on; the one after them. */
+static inline struct clk_pos even_times(struct clk_pos next, const struct clk_step *step, unsigned n, int64_t *t_ns)
+{
+    const int64_t step_ns = step->ns;
+    int64_t at_ns = next.t_ns;
+#pragma GCC unroll 8
+    for (unsigned i = 0; i < n; i++, at_ns += step_ns) t_ns[i] = at_ns;
+    return (struct clk_pos){next.k + n * step->k, at_ns, next.rest};
+}
+
+static inline struct clk_pos uneven_times(struct clk_pos next, const struct clk_step *by, unsigned n, int64_t *t_ns)
+{
+    const struct clk_step step = *by;
+    int64_t at_ns = next.t_ns, left = next.rest - step.hz; /* below 0 */
+#pragma GCC unroll 4
+    for (unsigned i = 0; i < n; i++) {
+        t_ns[i] = at_ns;
+        at_ns += step.ns;
+        left += step.rest;
+        if (left < 0) continue;
+        left -= step.hz;
+        at_ns++;
+    }
+    return (struct clk_pos){next.k + n * step.k, at_ns, left + step.hz};
+}
+
+/* The instants of the next samples up to until_ns, at most n; returns how many, which need not yet be all. The next one is
+ * due. How many surely are follows from the longest that a step may take: none needs to be looked at. */
 static unsigned sample_times(struct ads1282 *a, int64_t until_ns, unsigned n, int64_t *t_ns)
 {
-    const struct clk_step step = a->step;
-    struct clk_pos next = a->next;
-    unsigned i = 0;
-    for (; i < n && next.t_ns <= until_ns; next = clk_on(next, &step)) t_ns[i++] = next.t_ns;
-    a->next = next;
-    a->index += i;
-    return i;
+    const bool uneven = a->step.rest > 0;
+    const int64_t due = (until_ns - a->next.t_ns) / (a->step.ns + uneven) + 1;
+    if (due < n) n = (unsigned)due;
+    a->next = uneven ? uneven_times(a->next, &a->step, n, t_ns) : even_times(a->next, &a->step, n, t_ns);
+    a->index += n;
+    return n;
 }
 
 /* Blocks up to the end of their data period at a time. */
@@ -133,9 +175,10 @@ static void sample_fir(struct ads1282 *a, int64_t until_ns)
         const unsigned period = (unsigned)(a->index / ADS1282_BLOCKS);
         int64_t t_ns[ADS1282_BLOCKS];
         double vin_v[ADS1282_BLOCKS];
+        const int64_t edge = a->next.k;
         const unsigned n = sample_times(a, until_ns, ADS1282_BLOCKS - slot, t_ns);
         input_row_v(a, t_ns, n, vin_v);
-        modulate_block(a, vin_v, n, a->sinc + slot);
+        modulate_block(a, edge, vin_v, n, a->sinc + slot);
         if (slot + n == ADS1282_BLOCKS)
             a->result[period % ADS1282_RESULTS] = ads1282_filter_period(&a->filter, a->sinc);
     }
@@ -180,15 +223,30 @@ static void take_sinc(struct ads1282 *a, int64_t lsb)
         a->result[k / ADS1282_BLOCKS % ADS1282_RESULTS] = ads1282_filter_fir(&a->filter, a->sinc);
 }
 
+/* Before the first decoded clock, and it is not yet one. */
+static bool fill_delay(struct ads1282 *a)
+{
+    if (a->index >= ADS1282_MOD_DELAY) return false;
+    ads1282_mod_step(&a->mod, noisy_input(a));
+    next_sample(a);
+    if (a->index == ADS1282_MOD_DELAY) ads1282_mod_start(&a->mod, &a->cic);
+    return true;
+}
+
+/* Samples up to the end of their sinc block, or as many as a run takes. */
 static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
 {
     while (a->next.t_ns <= until_ns) {
-        const bool decoded = a->index >= ADS1282_MOD_DELAY;
-        int64_t y;
-        ads1282_mod_step(&a->mod, noisy_input(a));
-        next_sample(a);
-        if (decoded && ads1282_cic_take(&a->cic, ads1282_mod_decode(&a->mod), &y))
-            take_sinc(a, sinc_lsb(y, a->cic.ratio));
+        int64_t t_ns[ADS1282_MOD_RUN], lsb[ADS1282_MOD_RUN], y;
+        double vin_v[ADS1282_MOD_RUN];
+        if (fill_delay(a)) continue;
+        const int64_t edge = a->next.k;
+        const unsigned left = a->cic.ratio - a->cic.n;
+        const unsigned n = sample_times(a, until_ns, left < ADS1282_MOD_RUN ? left : ADS1282_MOD_RUN, t_ns);
+        input_row_v(a, t_ns, n, vin_v);
+        modulate_block(a, edge, vin_v, n, lsb);
+        ads1282_mod_run(&a->mod, &a->cic, lsb, n);
+        if (ads1282_cic_output(&a->cic, &y)) take_sinc(a, sinc_lsb(y, a->cic.ratio));
     }
 }
 
@@ -245,10 +303,11 @@ static int64_t direct_delay_tclk(const struct ads1282 *a)
 
 static void sample_direct(struct ads1282 *a, int64_t until_ns)
 {
+    const struct draws noise = step_draws(a);
     while (a->next.t_ns <= until_ns) {
         const unsigned k = (unsigned)a->index;
         double y = (double)saturate_input(a, input_v(a) * a->lsb_per_v) * a->direct_gain;
-        if (a->noise_lsb > 0.0) y += a->noise_lsb * rng_gauss(&a->noise);
+        if (a->noise_lsb > 0.0) y += a->noise_lsb * draws_gauss(&noise, draw_number(a, a->next.k));
         a->result[k % ADS1282_RESULTS] = (int64_t)(y + 0x1p36 + 0.5) - (INT64_C(1) << 36);
         next_sample(a);
     }
@@ -289,6 +348,27 @@ static sample_fn *chain_of(const struct ads1282 *a)
     if (bit_true(a)) return sample_bit_true;
     if (a->cfg.chain == ADS1282_CHAIN_DIRECT) return sample_direct;
     return ads1282_sinc_only(a) ? sample_sinc : sample_fir;
+}
+
+/* What its results depend on: 1971 blocks at most (filter.h), and the volts before them. */
+bool ads1282_chain_forgets(const struct ads1282 *a)
+{
+    return a->running && chain_of(a) == sample_fir;
+}
+
+void ads1282_put_off(struct ads1282 *a)
+{
+    a->sample = sample_nothing;
+    memset(a->result, 0, sizeof a->result);
+}
+
+void ads1282_chain_resume(struct ads1282 *a, int64_t index)
+{
+    a->sample = chain_of(a);
+    ads1282_filter_clear(&a->filter);
+    memset(a->sinc, 0, sizeof a->sinc);
+    a->index = index;
+    a->next = clk_pos(&a->clk, a->sync_count + a->timing.origin_tclk + index * a->timing.step_tclk);
 }
 
 void ads1282_chain_configure(struct ads1282 *a)

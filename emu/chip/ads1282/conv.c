@@ -135,11 +135,6 @@ static void notify_mflag(struct ads1282 *a, int64_t t_ns)
 
 /* ---- Data periods ---- */
 
-static int64_t due_tclk(const struct ads1282 *a, int64_t p)
-{
-    return a->timing.first_tclk + p * a->timing.period_tclk;
-}
-
 static int32_t get_ofc(const struct ads1282 *a)
 {
     return bits_sign_extend(reg_peek24(&a->regs, ADS1282_OFC0), 24);
@@ -254,7 +249,7 @@ static void restart_at(struct ads1282 *a, int64_t edge, int64_t t_ns)
     if (!a->alive) return;
     a->sync_count = edge;
     a->period = 0;
-    a->ended = clk_pos(&a->clk, edge + due_tclk(a, 0));
+    a->ended = clk_pos(&a->clk, edge + ads1282_due_tclk(a, 0));
     a->period_step = clk_step(&a->clk, a->timing.period_tclk);
     a->pulse_step = clk_step(&a->clk, a->timing.period_tclk - ADS1282_PULSE_TCLK);
     sched_at(a->sched, &a->due, a->ended.t_ns);
@@ -342,7 +337,7 @@ int64_t ads1282_period_ns(const struct ads1282 *a)
 void ads1282_conv_init(struct ads1282 *a)
 {
     a->clk = (struct clk){.hz = a->cfg.clk_hz, .div = 1};
-    sched_ev(&a->due, on_due, a);
-    sched_ev(&a->pulse, on_pulse, a);
-    sched_ev(&a->watch, on_watch, a);
+    sched_ev_inner(&a->due, on_due, a);
+    sched_ev_inner(&a->pulse, on_pulse, a);
+    sched_ev_inner(&a->watch, on_watch, a);
 }

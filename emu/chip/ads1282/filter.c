@@ -1,13 +1,11 @@
 #include "chip/ads1282/filter.h"
 
 #include "base/bits.h"
+#include "chip/ads1282/decimate.h"
 
 #include <assert.h>
 #include <math.h>
 #include <string.h>
-
-/* Bits dropped after stages 1..4: the published scale, and 1 and 3 bits of word width after stages 3 and 4. */
-static const unsigned fir_shift[ADS1282_FIR_STAGES] = {9, 23, 28, 30};
 
 /* (m N + 4 choose 5) / N: the sum of the first m N samples of the impulse response of five integrators, over N. */
 static int64_t ramp5(int64_t m, int64_t n)
@@ -54,21 +52,36 @@ static double noise_gain(const struct ads1282_filter *f)
     return sqrt(power);
 }
 
+/* The stage's taps as a window of samples meets them: oldest first. What the window leaves out is zero. */
+static void turn_taps(const struct ads1282_fir *fir, int32_t *tap, unsigned window)
+{
+    for (unsigned i = window; i < fir->taps; i++) assert(fir->tap[i] == 0);
+    for (unsigned i = 0; i < window; i++) tap[window - 1 - i] = i < fir->taps ? fir->tap[i] : 0;
+}
+
 void ads1282_filter_init(struct ads1282_filter *f, unsigned sinc_ratio, enum ads1282_phase phase)
 {
     assert(sinc_ratio >= 8 && sinc_ratio <= 128 && (sinc_ratio & (sinc_ratio - 1)) == 0);
     *f = (struct ads1282_filter){.sinc_ratio = sinc_ratio, .phase = phase};
     compute_taps(sinc_ratio, f->sinc_tap);
+    turn_taps(&ads1282_fir[phase][2], f->tap3, ADS1282_WINDOW_3);
+    turn_taps(&ads1282_fir[phase][3], f->tap4, ADS1282_WINDOW_4);
     f->noise_gain = noise_gain(f);
+    f->decimator = ads1282_decimator();
 }
 
 void ads1282_filter_clear(struct ads1282_filter *f)
 {
     memset(f->sinc, 0, sizeof f->sinc);
-    memset(f->fir1, 0, sizeof f->fir1);
-    memset(f->fir2, 0, sizeof f->fir2);
+    memset(f->odd1, 0, sizeof f->odd1);
+    memset(f->even1, 0, sizeof f->even1);
+    memset(f->odd2, 0, sizeof f->odd2);
+    memset(f->even2, 0, sizeof f->even2);
     memset(f->fir3, 0, sizeof f->fir3);
     memset(f->fir4, 0, sizeof f->fir4);
+    memset(f->high3, 0, sizeof f->high3);
+    memset(f->high4, 0, sizeof f->high4);
+    f->wandered = 0;
 }
 
 double ads1282_filter_noise_gain(const struct ads1282_filter *f)
@@ -76,88 +89,14 @@ double ads1282_filter_noise_gain(const struct ads1282_filter *f)
     return f->noise_gain;
 }
 
-/* The stages run over one data period. A line holds the taps - 1 newest samples of the past and then the new ones; x points
- * at the newest sample of an output. Sums of integers, in whatever order is cheap. */
-
-static void shift_line(int64_t *line, unsigned fresh, unsigned taps)
-{
-    memmove(line, line + fresh, (taps - 1) * sizeof *line);
-}
-
-static void sinc_stage(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS], int64_t out[ADS1282_BLOCKS])
-{
-    const int64_t t0 = f->sinc_tap[0], t1 = f->sinc_tap[1], t2 = f->sinc_tap[2], t3 = f->sinc_tap[3],
-                  t4 = f->sinc_tap[4];
-    const unsigned shift = 4 * bits_log2(f->sinc_ratio);
-    const int64_t *x = f->sinc + ADS1282_SINC_TAPS - 1;
-    memcpy(f->sinc + ADS1282_SINC_TAPS - 1, block, ADS1282_BLOCKS * sizeof *block);
-    for (unsigned n = 0; n < 32; n++, x++)
-        out[n] = bits_round_shift(t0 * x[0] + t1 * x[-1] + t2 * x[-2] + t3 * x[-3] + t4 * x[-4], shift);
-    shift_line(f->sinc, 32, ADS1282_SINC_TAPS);
-}
-
-/* Half-band: symmetric, every second tap zero but the middle one. */
-static void stage_1(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
-{
-    const int64_t t0 = fir->tap[0], t2 = fir->tap[2], t4 = fir->tap[4], t5 = fir->tap[5];
-    const int64_t *x = line + 11;
-    for (unsigned n = 0; n < 16; n++, x += 2) {
-        const int64_t sum = t0 * (x[0] + x[-10]) + t2 * (x[-2] + x[-8]) + t4 * (x[-4] + x[-6]) + t5 * x[-5];
-        out[n] = bits_round_shift(sum, fir_shift[0]);
-    }
-    shift_line(line, 32, 11);
-}
-
-static void stage_2(const struct ads1282_fir *fir, int64_t *line, int64_t *out)
-{
-    const int64_t t0 = fir->tap[0], t2 = fir->tap[2], t4 = fir->tap[4], t6 = fir->tap[6], t7 = fir->tap[7];
-    const int64_t *x = line + 15;
-    for (unsigned n = 0; n < 8; n++, x += 2) {
-        const int64_t sum =
-            t0 * (x[0] + x[-14]) + t2 * (x[-2] + x[-12]) + t4 * (x[-4] + x[-10]) + t6 * (x[-6] + x[-8]) + t7 * x[-7];
-        out[n] = bits_round_shift(sum, fir_shift[1]);
-    }
-    shift_line(line, 16, 15);
-}
-
-static int64_t dot_product(const int32_t *tap, unsigned taps, const int64_t *x)
-{
-    int64_t sum = 0;
-    for (; taps >= 4; taps -= 4, tap += 4, x -= 4)
-        sum += tap[0] * x[0] + tap[1] * x[-1] + tap[2] * x[-2] + tap[3] * x[-3];
-    for (; taps > 0; taps--) sum += *tap++ * *x--;
-    return sum;
-}
-
-static void decimate_stage(const struct ads1282_fir *fir, unsigned shift, int64_t *line, unsigned fresh, int64_t *out)
-{
-    for (unsigned end = fir->decim; end <= fresh; end += fir->decim)
-        *out++ = bits_round_shift(dot_product(fir->tap, fir->taps, &line[fir->taps + end - 2]), shift);
-    shift_line(line, fresh, fir->taps);
-}
-
-/* The data period's sinc outputs stand behind the past in f->fir1. */
-static int64_t fir_stages(struct ads1282_filter *f)
-{
-    const struct ads1282_fir *fir = ads1282_fir[f->phase];
-    int64_t out = 0;
-    stage_1(&fir[0], f->fir1, f->fir2 + fir[1].taps - 1);
-    stage_2(&fir[1], f->fir2, f->fir3 + fir[2].taps - 1);
-    decimate_stage(&fir[2], fir_shift[2], f->fir3, 8, f->fir4 + fir[3].taps - 1);
-    decimate_stage(&fir[3], fir_shift[3], f->fir4, 2, &out);
-    return out;
-}
-
 int64_t ads1282_filter_fir(struct ads1282_filter *f, const int64_t sinc[ADS1282_BLOCKS])
 {
-    memcpy(f->fir1 + ads1282_fir[f->phase][0].taps - 1, sinc, ADS1282_BLOCKS * sizeof *sinc);
-    return fir_stages(f);
+    return f->decimator->fir(f, sinc);
 }
 
 int64_t ads1282_filter_period(struct ads1282_filter *f, const int64_t block[ADS1282_BLOCKS])
 {
-    sinc_stage(f, block, f->fir1 + ads1282_fir[f->phase][0].taps - 1);
-    return fir_stages(f);
+    return f->decimator->period(f, block);
 }
 
 int64_t ads1282_correct(int64_t y_lsb, int32_t ofc, uint32_t fsc)
@@ -184,7 +123,14 @@ bool ads1282_cic_take(struct ads1282_cic *c, int64_t x, int64_t *y)
 {
     uint64_t sum = (uint64_t)x;
     for (int s = 0; s < 5; s++) sum = c->integrator[s] += sum;
-    if (++c->n < c->ratio) return false;
+    c->n++;
+    return ads1282_cic_output(c, y);
+}
+
+bool ads1282_cic_output(struct ads1282_cic *c, int64_t *y)
+{
+    if (c->n < c->ratio) return false;
+    uint64_t sum = c->integrator[4];
     c->n = 0;
     for (int s = 0; s < 5; s++) {
         const uint64_t was = c->comb[s];

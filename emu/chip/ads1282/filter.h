@@ -20,19 +20,35 @@
 #define ADS1282_BLOCK_LOG2   34u                /* input full scale: 2^34 */
 #define ADS1282_FS_LSB       (INT64_C(1) << 30) /* full scale of the 31-bit result */
 #define ADS1282_SATURATION   1.06               /* of full scale; the modulator clips there (103..106 %, E1/M70) */
+#define ADS1282_OVERSHOOT    3.1                /* output to input at most: above the sum of the absolute weights */
 #define ADS1282_SINC_TAPS    5
+#define ADS1282_WINDOW_3     52 /* samples that an output of stage 3 depends on, of stage 4: whole groups of four */
+#define ADS1282_WINDOW_4     112
+#define ADS1282_WANDER       8u
+#define ADS1282_LINE_3       (ADS1282_WINDOW_3 + 4 + 8 * (ADS1282_WANDER - 1))
+#define ADS1282_LINE_4       (ADS1282_WINDOW_4 + 2 * (ADS1282_WANDER - 1))
 #define ADS1282_CAL_READINGS 16 /* M80 */
 
 enum ads1282_phase { ADS1282_LINEAR, ADS1282_MINIMUM };
 
-/* A delay line holds the taps - 1 newest samples of the past, then those of the present data period. */
+struct ads1282_decimator; /* how the stages are computed: decimate.h */
+
+/* A delay line holds samples of the past, then those of the present data period. Stages 1 and 2, half-band filters, have
+ * two: the samples at odd places, which all outer taps weigh, and those at even places for the middle one. */
 struct ads1282_filter {
     unsigned sinc_ratio; /* N: 8, 16, 32, 64, 128 */
     enum ads1282_phase phase;
     /* The five weights of a held block, divided by N (they all are multiples of it); newest first; their sum is N^4. */
     int32_t sinc_tap[ADS1282_SINC_TAPS];
     double noise_gain;
-    int64_t sinc[4 + 32], fir1[10 + 32], fir2[14 + 16], fir3[52 + 8], fir4[108 + 2];
+    const struct ads1282_decimator *decimator;
+    int32_t tap3[ADS1282_WINDOW_3 + 4], tap4[ADS1282_WINDOW_4]; /* of stages 3 and 4: oldest first, zeros at the ends */
+    int64_t sinc[4 + 32], odd1[5 + 16], even1[2 + 16], odd2[7 + 8], even2[3 + 8];
+    /* Windows of the last two stages; they wander up and begin again after ADS1282_WANDER periods. And x / 2^32 of the same
+     * samples, rounded to nearest. */
+    unsigned wandered;
+    int64_t fir3[ADS1282_LINE_3], fir4[ADS1282_LINE_4];
+    int32_t high3[ADS1282_LINE_3 + 4], high4[ADS1282_LINE_4];
 };
 
 /* Chooses the decimation and clears the past. */
@@ -73,6 +89,9 @@ void ads1282_cic_init(struct ads1282_cic *c, unsigned ratio); /* 8, 16, 32, 64, 
 
 /* One sample. True each N: *y is the output, of gain N^5; |x| N^5 < 2^63. */
 bool ads1282_cic_take(struct ads1282_cic *c, int64_t x, int64_t *y);
+
+/* Its second half, for who feeds the integrators otherwise and counts n. */
+bool ads1282_cic_output(struct ads1282_cic *c, int64_t *y);
 
 /* One-pole high-pass (FILTR = 11), the last filter of the chain. Sources 1.7.
  *

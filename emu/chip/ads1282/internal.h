@@ -14,6 +14,12 @@ static inline unsigned ads1282_rate(const struct ads1282 *a)
     return (a->config0 & ADS1282_CONFIG0_DR) >> 3;
 }
 
+/* tCLK from the restart to the end of data period p. */
+static inline int64_t ads1282_due_tclk(const struct ads1282 *a, int64_t p)
+{
+    return a->timing.first_tclk + p * a->timing.period_tclk;
+}
+
 /* ---- Serial column ---- */
 
 void ads1282_serial_init(struct ads1282 *a);
@@ -41,6 +47,8 @@ void ads1282_retime(struct ads1282 *a); /* the clock's rate has changed */
 
 void ads1282_chain_configure(struct ads1282 *a); /* origin, step, lag, sample function and filter of the present mode */
 void ads1282_chain_restart(struct ads1282 *a);   /* from sync_count on */
+bool ads1282_chain_forgets(const struct ads1282 *a);         /* its past is finite */
+void ads1282_chain_resume(struct ads1282 *a, int64_t index); /* samples again, from this one on, without a past */
 double ads1282_chain_noise_lsb(const struct ads1282 *a, double output_lsb); /* scale of its draws */
 
 unsigned ads1282_sinc_ratio(const struct ads1282 *a); /* N of the present rate; of 1000 words/s where it is reserved */

@@ -8,6 +8,8 @@
 #ifndef PSABENCH_CHIP_ADS1282_MOD_H
 #define PSABENCH_CHIP_ADS1282_MOD_H
 
+#include "chip/ads1282/filter.h"
+
 #include <stdint.h>
 
 #define ADS1282_MOD_DELAY 4                  /* clocks from x to y */
@@ -24,6 +26,13 @@ void ads1282_mod_clear(struct ads1282_mod *m);
 
 /* One clock: input x of full scale 2^34, |x| <= 1.06 of it; the bits then are m->m0 & 1 and m->m1 & 1. */
 void ads1282_mod_step(struct ads1282_mod *m, int64_t x);
+
+/* n clocks at once, n <= ADS1282_MOD_RUN, and their bits through the decode formula into the integrators of c, which
+ * ads1282_mod_start() has readied for those after the present clock and which do not pass the end of its block: what
+ * ads1282_mod_step(), ads1282_mod_decode() and the integrators of ads1282_cic_take() make of them one by one. */
+#define ADS1282_MOD_RUN 32u
+void ads1282_mod_start(const struct ads1282_mod *m, struct ads1282_cic *c);
+void ads1282_mod_run(struct ads1282_mod *m, struct ads1282_cic *c, const int64_t *x, unsigned n);
 
 /* The decode formula over the last five clocks: units in which full scale is 2/3. */
 int32_t ads1282_mod_decode(const struct ads1282_mod *m);

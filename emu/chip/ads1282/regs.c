@@ -167,9 +167,9 @@ void ads1282_mode_pins(struct ads1282 *a, const struct ads1282_mode_pins *pins, 
 }
 
 void ads1282_init(struct ads1282 *a, const struct ads1282_cfg *cfg, const struct ads1282_io *io, struct sched *s,
-                  struct rng noise)
+                  struct draws noise)
 {
-    assert(cfg->clk_hz > 0 && cfg->vref_v > 0.0 && cfg->noise_scale >= 0.0 && io->vin_v);
+    assert(cfg->clk_hz > 0 && cfg->vref_v > 0.0 && cfg->noise_scale >= 0.0 && (io->vin_v || io->vin_row_v));
     assert(!cfg->pin_mode || cfg->part == ADS1282_PART_1281);
     *a = (struct ads1282){.cfg = *cfg, .io = *io, .sched = s, .noise = noise, .drdy = true};
     a->notify_drdy = io->drdy;
@@ -181,7 +181,7 @@ void ads1282_init(struct ads1282 *a, const struct ads1282_cfg *cfg, const struct
                                 .value = a->reg_value,
                                 .chip = a};
     ads1282_conv_init(a);
-    sched_ev(&a->wake, on_wake, a);
+    sched_ev_inner(&a->wake, on_wake, a);
     ads1282_serial_init(a);
     ads1282_reset(a, s->now_ns);
 }

@@ -4,8 +4,8 @@
 
 #include "base/chip_fault.h"
 #include "base/clk.h"
+#include "base/draws.h"
 #include "base/reg.h"
-#include "base/rng.h"
 #include "base/sched.h"
 #include "base/spi.h"
 #include "chip/ads1282/cfg.h"
@@ -87,7 +87,7 @@ struct ads1282 {
     struct ads1282_hpf hpf;
     struct ads1282_cal cal;
     struct clk clk;
-    struct rng noise;
+    struct draws noise;
     void (*sample)(struct ads1282 *a, int64_t until_ns); /* the chain: input samples up to until_ns */
     int64_t sync_count;                                  /* CLK edge at which modulator and filter were restarted */
     int64_t period;                                      /* data periods ended since the restart */

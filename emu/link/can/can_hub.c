@@ -1,6 +1,6 @@
 #include "link/can/can_hub.h"
 
-#include "base/can_fault.h"
+#include "base/can/fault.h"
 
 #include <stdio.h>
 #include <stdlib.h>

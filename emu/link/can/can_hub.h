@@ -8,7 +8,7 @@
 #ifndef PSABENCH_LINK_CAN_CAN_HUB_H
 #define PSABENCH_LINK_CAN_CAN_HUB_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "link/link.h"
 
 struct can_hub;

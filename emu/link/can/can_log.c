@@ -1,6 +1,6 @@
 #include "link/can/can_log.h"
 
-#include "base/can_text.h"
+#include "base/can/text.h"
 #include "link/own_file.h"
 
 #include <errno.h>

@@ -8,7 +8,7 @@
 #ifndef PSABENCH_LINK_CAN_CAN_LOG_H
 #define PSABENCH_LINK_CAN_CAN_LOG_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #define CAN_LOG_BUFFER 65536u
 

@@ -1,6 +1,6 @@
 #include "link/can/slcan.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
 #include "base/hex.h"
 
 #include <string.h>

@@ -8,7 +8,7 @@
 #ifndef PSABENCH_LINK_CAN_SLCAN_H
 #define PSABENCH_LINK_CAN_SLCAN_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #include <stddef.h>
 

@@ -9,7 +9,7 @@
 #ifndef PSABENCH_LINK_CAN_SOCKETCAND_H
 #define PSABENCH_LINK_CAN_SOCKETCAND_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #include <stddef.h>
 #include <stdint.h>

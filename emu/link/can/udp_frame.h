@@ -6,7 +6,7 @@
 #ifndef PSABENCH_LINK_CAN_UDP_FRAME_H
 #define PSABENCH_LINK_CAN_UDP_FRAME_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #include <stddef.h>
 #include <stdint.h>

@@ -7,7 +7,7 @@
 
 void head_init(struct head *h, const struct head_cfg *cfg, const struct site *site, struct rng error)
 {
-    *h = (struct head){.cfg = *cfg, .site = *site, .error = error, .cached_to_ns = -1};
+    *h = (struct head){.cfg = *cfg, .site = *site, .error = error};
 }
 
 static double quantise_rad(const struct head_cfg *c, double angle_rad)
@@ -43,7 +43,7 @@ void head_turn(struct head *h, double angle_deg, int64_t t_ns)
     h->to_rad = h->scale_rad + h->setting_rad + periodic_rad(&h->cfg, h->scale_rad);
     h->start_ns = t_ns;
     h->end_ns = t_ns + (int64_t)(h->cfg.turn_s * (double)NS_PER_S + 0.5);
-    h->cached_to_ns = -1;
+    h->rest_known = false;
 }
 
 void head_mount(struct head *h, enum head_face face, int64_t t_ns)
@@ -53,7 +53,7 @@ void head_mount(struct head *h, enum head_face face, int64_t t_ns)
     h->face = face;
     h->face_ns = t_ns;
     h->mount_rad = draw_rad(h, h->cfg.mount_error_arcsec_rms);
-    h->cached_to_ns = -1;
+    h->rest_known = false;
 }
 
 enum head_face head_face(const struct head *h, int64_t t_ns)
@@ -101,17 +101,32 @@ static bool holds_from(const struct head *h, int64_t t_ns)
     return t_ns >= h->end_ns && t_ns >= h->face_ns;
 }
 
+static void set_gravity(const struct head *h, struct det_pair alpha, double a_m_mps2[3])
+{
+    a_m_mps2[0] = -h->site.g_mps2 * alpha.sin;
+    a_m_mps2[1] = -h->site.g_mps2 * alpha.cos;
+    a_m_mps2[2] = 0.0;
+}
+
+/* Exact where it rests, by way of the nearest kept angle where it moves: a function of the instant either way. */
 void head_gravity_mps2(struct head *h, int64_t t_ns, double a_m_mps2[3])
 {
-    if (t_ns < h->cached_from_ns || t_ns > h->cached_to_ns) {
-        const struct det_pair alpha = det_sin_cos(head_angle_rad(h, t_ns));
-        h->cached_g_mps2[0] = -h->site.g_mps2 * alpha.sin;
-        h->cached_g_mps2[1] = -h->site.g_mps2 * alpha.cos;
-        h->cached_g_mps2[2] = 0.0;
-        h->cached_from_ns = t_ns;
-        h->cached_to_ns = holds_from(h, t_ns) ? INT64_MAX : t_ns;
+    if (!holds_from(h, t_ns)) {
+        set_gravity(h, det_sin_cos_near(&h->near, head_angle_rad(h, t_ns)), a_m_mps2);
+        return;
     }
-    memcpy(a_m_mps2, h->cached_g_mps2, sizeof h->cached_g_mps2);
+    if (!h->rest_known) {
+        set_gravity(h, det_sin_cos(head_angle_rad(h, t_ns)), h->rest_g_mps2);
+        h->rest_known = true;
+    }
+    memcpy(a_m_mps2, h->rest_g_mps2, sizeof h->rest_g_mps2);
+}
+
+unsigned head_gravity_row_mps2(struct head *h, const int64_t *t_ns, unsigned n, double a_m_mps2[][3])
+{
+    if (holds_from(h, t_ns[0])) n = 1;
+    for (unsigned i = 0; i < n; i++) head_gravity_mps2(h, t_ns[i], a_m_mps2[i]);
+    return n;
 }
 
 /* Rows: which mount axis a sensor axis lies along, and its sense. A face is a rotation about Ox: determinant +1. */

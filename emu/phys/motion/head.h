@@ -8,6 +8,7 @@
 #ifndef PSABENCH_PHYS_MOTION_HEAD_H
 #define PSABENCH_PHYS_MOTION_HEAD_H
 
+#include "base/detmath.h"
 #include "base/rng.h"
 #include "phys/motion/earth.h"
 #include "phys/motion/motion.h"
@@ -39,14 +40,15 @@ struct head {
     struct site site;
     struct rng error;
     enum head_face face, face_before;
-    int64_t face_ns;                      /* of the latest mounting */
-    double scale_rad;                     /* what the operator set */
-    double from_rad, to_rad;              /* true angle of the mount before and after the turn */
-    double setting_rad;                   /* error drawn at the last turn */
-    double mount_rad, mount_before_rad;   /* error drawn at the latest mounting and the one before */
-    int64_t start_ns, end_ns;             /* of the turn */
-    int64_t cached_from_ns, cached_to_ns; /* gravity is kept while it holds: for an instant, or from the rest on */
-    double cached_g_mps2[3];
+    int64_t face_ns;                    /* of the latest mounting */
+    double scale_rad;                   /* what the operator set */
+    double from_rad, to_rad;            /* true angle of the mount before and after the turn */
+    double setting_rad;                 /* error drawn at the last turn */
+    double mount_rad, mount_before_rad; /* error drawn at the latest mounting and the one before */
+    int64_t start_ns, end_ns;           /* of the turn */
+    bool rest_known;                    /* gravity at rest, until the next command */
+    double rest_g_mps2[3];
+    struct det_near near; /* of an angle in motion */
 };
 
 void head_init(struct head *h, const struct head_cfg *cfg, const struct site *site, struct rng error);
@@ -72,6 +74,9 @@ double head_read_deg(const struct head *h, int64_t t_ns);
 
 /* Projections of gravity on the mount's axes, alpha0 = 0. Cached at rest: the hot path of a resting head is a copy. */
 void head_gravity_mps2(struct head *h, int64_t t_ns, double a_m_mps2[3]);
+
+/* The same for n instants in a row; returns how many are written: 1 if it rests throughout, else n. */
+unsigned head_gravity_row_mps2(struct head *h, const int64_t *t_ns, unsigned n, double a_m_mps2[][3]);
 
 /* Projections on the axes of a sensor that was set with error alpha0 (given by cosine and sine) and mounted with the face. */
 void head_sensor_mps2(enum head_face face, double cos_alpha0, double sin_alpha0, const double a_m_mps2[3],

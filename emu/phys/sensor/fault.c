@@ -6,14 +6,10 @@
 #include <math.h>
 #include <stddef.h>
 
-#define FIRST_PULL_NS 31250 /* interval assumed before the first pull: one block of the converter at 1000 SPS */
-
 void sensor_fault_add(struct sensor_fault **list, struct sensor_fault *f)
 {
     assert(f->kind < SENSOR_FAULTS);
     while (*list) list = &(*list)->next;
-    f->held = 0.0;
-    f->held_ns = -1;
     f->next = NULL;
     *list = f;
 }
@@ -24,18 +20,12 @@ void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f)
     if (*list) *list = f->next;
 }
 
-/* White noise of one-sided density d, averaged over dt, has the variance d^2 / (2 dt), as in phys/sensor/mems.c. */
-static double apply_noise(struct sensor_fault *f, double out, int64_t t_ns)
+static double noise_at(const struct sensor_fault *f, int64_t t_ns, int64_t every_ns)
 {
-    const int64_t dt_ns = f->held_ns < 0 ? FIRST_PULL_NS : t_ns - f->held_ns;
-    if (dt_ns > 0) {
-        f->held = f->value * sqrt((double)NS_PER_S / (2.0 * (double)dt_ns)) * rng_gauss(&f->noise);
-        f->held_ns = t_ns;
-    }
-    return out + f->held;
+    return looks_white_rms(f->value, every_ns) * draws_gauss(&f->noise, t_ns);
 }
 
-static double apply_fault(struct sensor_fault *f, double out, int64_t t_ns)
+static double apply_fault(const struct sensor_fault *f, double out, int64_t t_ns, int64_t every_ns)
 {
     switch (f->kind) {
     case SENSOR_STUCK:
@@ -47,16 +37,15 @@ static double apply_fault(struct sensor_fault *f, double out, int64_t t_ns)
     case SENSOR_SCALE:
         return out + f->value * (out - f->zero);
     case SENSOR_NOISE:
-        return apply_noise(f, out, t_ns);
+        return out + noise_at(f, t_ns, every_ns);
     default: /* SENSOR_SATURATION */
         return out < f->value ? f->value : out > f->value_high ? f->value_high : out;
     }
 }
 
-double sensor_fault_out(struct sensor_fault *list, double out, int64_t t_ns)
+void sensor_fault_row(const struct sensor_fault *list, const struct looks *at, double *out)
 {
-    for (struct sensor_fault *f = list; f; f = f->next) {
-        if (t_ns >= f->from_ns) out = apply_fault(f, out, t_ns);
-    }
-    return out;
+    for (const struct sensor_fault *f = list; f; f = f->next)
+        for (unsigned i = 0; i < at->n; i++)
+            if (at->t_ns[i] >= f->from_ns) out[i] = apply_fault(f, out[i], at->t_ns[i], at->every_ns);
 }

@@ -1,12 +1,12 @@
 /* Sensor faults: a list, each working on the output of those added before it.
  *
  * The output is volts or amperes, as the sensor gives it, and so are the values. A fault is a plain struct owned by
- * its injector, linked in while it lasts; an empty list costs one comparison. Pure but for the noise's stream. One
- * thread. */
+ * its injector, linked in while it lasts; an empty list costs one comparison. Pure. */
 #ifndef PSABENCH_PHYS_SENSOR_FAULT_H
 #define PSABENCH_PHYS_SENSOR_FAULT_H
 
-#include "base/rng.h"
+#include "base/draws.h"
+#include "base/looks.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -26,18 +26,15 @@ struct sensor_fault {
     double value, value_high;
     double zero;     /* output of the sensor without acceleration: a wrong scale turns about it */
     int64_t from_ns; /* before it no effect */
-    struct rng noise;
-    /* read-only outside sensor/fault.c */
-    double held;     /* noise of the present pull */
-    int64_t held_ns; /* of held; negative before the first pull */
-    struct sensor_fault *next;
+    struct draws noise;
+    struct sensor_fault *next; /* read-only outside sensor/fault.c */
 };
 
 /* Links in as the last. kind, value, value_high, zero, from_ns and noise are filled in by the caller. */
 void sensor_fault_add(struct sensor_fault **list, struct sensor_fault *f);
 void sensor_fault_remove(struct sensor_fault **list, struct sensor_fault *f); /* harmless if it is not linked */
 
-/* The faulty output for the output `out`; t_ns never earlier than the last call. */
-double sensor_fault_out(struct sensor_fault *list, double out, int64_t t_ns);
+/* Makes a row of outputs the faulty ones. */
+void sensor_fault_row(const struct sensor_fault *list, const struct looks *at, double *out);
 
 #endif

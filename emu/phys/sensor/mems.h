@@ -3,14 +3,14 @@
  *   u = u0 + kx ax + ky ay + kz az + kxy ax ay + kxx ax^2 + kyy ay^2 + drift t + n,
  *
  * a = projection of gravity on the sensor's axes (an axis pointing down has a = +g, sources instruments 2.1), m/s^2. The last
- * three terms are ours. n is white noise of a one-sided density: each pull draws one value for the interval since the pull
- * before it, so that what the converter's filter passes does not depend on how often it looks. Zero and scale follow the
+ * three terms are ours. n is white noise of a one-sided density, one draw for each instant (looks.h). Zero and scale follow the
  * temperature of the element, slow noise is added (noise.h), and the output stays within its limits and is a multiple of its
  * resolution: each only where its parameters are not zero. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_MEMS_H
 #define PSABENCH_PHYS_SENSOR_MEMS_H
 
-#include "base/rng.h"
+#include "base/draws.h"
+#include "base/looks.h"
 #include "phys/sensor/noise.h"
 
 #include <stdint.h>
@@ -49,15 +49,15 @@ struct mems {
     struct mems_cfg cfg;
     double temp_degc; /* of the element: its owner keeps it up; the reference temperature from mems_init() on */
     struct noise slow;
-    struct rng noise;
-    double held_v; /* noise of the present pull: a second look at the same instant sees the same */
-    int64_t t_ns;  /* of the last pull; -1 before the first */
-    int64_t dt_ns; /* interval for which scale_v was computed */
-    double scale_v;
+    struct draws noise;
 };
 
 /* g is the site's: a sensitivity per g means per this g. */
 struct mems_cfg mems_cfg_si(const struct mems_g *p, double g_mps2);
+
+/* Volts that its output stays within, for accelerations up to a_max_mps2 on each axis, looks every_ns apart, up to
+ * until_ns, at -100 to 200 degC. Not finite: its slow noise knows no limit. */
+struct looks_range mems_range_v(const struct mems *m, double a_max_mps2, int64_t every_ns, int64_t until_ns);
 
 /* Density that gives readings of rms reading_noise_v: a settled reading at fDATA passes MEMS_ENBW * fDATA of white noise
  * (from the published FIR coefficients, minimum phase; linear phase differs by 0.2 %). Neighbouring readings of one stream
@@ -65,12 +65,13 @@ struct mems_cfg mems_cfg_si(const struct mems_g *p, double g_mps2);
 #define MEMS_ENBW 0.4138
 double mems_density_v_rthz(double reading_noise_v, double data_hz);
 
-void mems_init(struct mems *m, const struct mems_cfg *cfg, struct rng noise);
+void mems_init(struct mems *m, const struct mems_cfg *cfg, struct draws noise, struct draws slow);
 
 /* The model at the temperature of the element, within the limits of the output: what it would give without noise. */
 double mems_true_v(const struct mems *m, const double a_mps2[3], int64_t t_ns);
 
-/* Output voltage; t_ns never earlier than the last call. */
-double mems_out_v(struct mems *m, const double a_mps2[3], int64_t t_ns);
+/* Output voltage at a row of looks; a_mps2 holds three numbers a look, or, if `felt` is 1, three for all. Slow noise goes
+ * on with time: no look is earlier than the last one by more than its step. */
+void mems_out_row_v(struct mems *m, const double *a_mps2, unsigned felt, const struct looks *at, double *out_v);
 
 #endif

@@ -11,11 +11,19 @@
 #define LN_SPACING 1.6094379124341003
 #define STEP_S     ((double)NOISE_STEP_NS / (double)NS_PER_S)
 
+#define PER_STEP 16 /* draws set aside for a step: one a process, one for the walk */
+_Static_assert(NOISE_MARKOVS < PER_STEP, "no draw belongs to two steps");
+
+static double step_draw(const struct noise *n, unsigned which)
+{
+    return draws_gauss(&n->draws, n->step * PER_STEP + which);
+}
+
 /* Processes of equal variance v and times a factor r apart add up to the PSD v / (2 f ln r): B^2 / (2 pi f) wants
  * v = B^2 ln r / pi. */
-void noise_init(struct noise *n, const struct noise_cfg *cfg, struct rng rng)
+void noise_init(struct noise *n, const struct noise_cfg *cfg, struct draws draws)
 {
-    *n = (struct noise){.cfg = *cfg, .rng = rng};
+    *n = (struct noise){.cfg = *cfg, .draws = draws};
     n->moves = cfg->bias_instability_u > 0.0 || cfg->walk_u_rts > 0.0;
     n->walk_kick_u = cfg->walk_u_rts * sqrt(STEP_S);
     const double sd_u = cfg->bias_instability_u * sqrt(LN_SPACING / PI);
@@ -23,20 +31,20 @@ void noise_init(struct noise *n, const struct noise_cfg *cfg, struct rng rng)
     for (unsigned i = 0; i < NOISE_MARKOVS; i++) {
         n->keep[i] = det_exp(-STEP_S / time_s);
         n->kick_u[i] = sd_u * sqrt(1.0 - n->keep[i] * n->keep[i]);
-        n->markov_u[i] = sd_u > 0.0 ? sd_u * rng_gauss(&n->rng) : 0.0;
+        n->markov_u[i] = sd_u > 0.0 ? sd_u * step_draw(n, i) : 0.0;
         time_s *= SPACING;
     }
 }
 
 static void step_noise(struct noise *n)
 {
+    n->step++;
     if (n->cfg.bias_instability_u > 0.0) {
         for (unsigned i = 0; i < NOISE_MARKOVS; i++) {
-            n->markov_u[i] = n->keep[i] * n->markov_u[i] + n->kick_u[i] * rng_gauss(&n->rng);
+            n->markov_u[i] = n->keep[i] * n->markov_u[i] + n->kick_u[i] * step_draw(n, i);
         }
     }
-    if (n->walk_kick_u > 0.0) n->walk_u += n->walk_kick_u * rng_gauss(&n->rng);
-    n->step++;
+    if (n->walk_kick_u > 0.0) n->walk_u += n->walk_kick_u * step_draw(n, NOISE_MARKOVS);
 }
 
 double noise_slow_u(struct noise *n, int64_t t_ns)

@@ -12,7 +12,7 @@
 #ifndef PSABENCH_PHYS_SENSOR_NOISE_H
 #define PSABENCH_PHYS_SENSOR_NOISE_H
 
-#include "base/rng.h"
+#include "base/draws.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -29,7 +29,7 @@ struct noise_cfg {
 
 struct noise {
     struct noise_cfg cfg;
-    struct rng rng;
+    struct draws draws;
     int64_t step; /* of the values below */
     double markov_u[NOISE_MARKOVS];
     double keep[NOISE_MARKOVS], kick_u[NOISE_MARKOVS]; /* of one step */
@@ -38,7 +38,7 @@ struct noise {
 };
 
 /* Flicker starts in its stationary state, the walk at zero. */
-void noise_init(struct noise *n, const struct noise_cfg *cfg, struct rng rng);
+void noise_init(struct noise *n, const struct noise_cfg *cfg, struct draws draws);
 
 /* Flicker, walk and ramp at t_ns; never earlier than the last call by more than its step. */
 double noise_slow_u(struct noise *n, int64_t t_ns);

@@ -25,7 +25,7 @@ struct quartz_g quartz_default(void)
     };
 }
 
-void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct rng noise)
+void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct draws noise)
 {
     *q = (struct quartz){.cfg = *cfg,
                          .g_mps2 = g_mps2,
@@ -85,7 +85,6 @@ static void set_step(struct quartz *q, int64_t dt_ns)
     const double wt = TURN_RAD * q->cfg.natural_hz * dt_s;
     const double d = sqrt(1.0 - z * z);
     q->dt_ns = dt_ns;
-    q->noise_scale_a = q->cfg.noise_a_rthz * sqrt(1.0 / (2.0 * dt_s));
     if (z * wt > GONE) {
         q->step[0][0] = q->step[0][1] = q->step[1][0] = q->step[1][1] = 0.0;
         return;
@@ -100,6 +99,9 @@ static void set_step(struct quartz *q, int64_t dt_ns)
     q->step[1][1] = keep * (c - z / d * s);
 }
 
+/* What is less is gone: without it, two pasts could differ in the last bit of a loop at rest for good. */
+#define GONE_G 1e-15
+
 /* Deflection in g of a loop whose input has been `load` since the last look. */
 static double answer_g(struct quartz *q, double load)
 {
@@ -108,10 +110,11 @@ static double answer_g(struct quartz *q, double load)
     q->input_g = load;
     q->loop_g[0] = q->step[0][0] * off_g + q->step[0][1] * rate;
     q->loop_g[1] = q->step[1][0] * off_g + q->step[1][1] * rate;
+    if (fabs(q->loop_g[0]) < GONE_G && fabs(q->loop_g[1]) < GONE_G) q->loop_g[0] = q->loop_g[1] = 0.0;
     return load + q->loop_g[0];
 }
 
-double quartz_out_a(struct quartz *q, const double a_mps2[3], int64_t t_ns)
+static double quiet_a(struct quartz *q, const double a_mps2[3], int64_t t_ns)
 {
     const bool first = q->t_ns < 0;
     const int64_t dt_ns = first ? FIRST_LOOK_NS : t_ns - q->t_ns;
@@ -122,8 +125,15 @@ double quartz_out_a(struct quartz *q, const double a_mps2[3], int64_t t_ns)
     if (first) q->input_g = load; /* it has been at rest */
     q->t_ns = t_ns;
     if (q->cfg.natural_hz > 0.0) load = answer_g(q, load);
-    q->held_a = current_a(q, load);
-    if (q->cfg.noise_a_rthz > 0.0) q->held_a += q->noise_scale_a * rng_gauss(&q->noise);
-    q->held_a = limited_a(q, q->held_a);
-    return q->held_a;
+    return q->held_a = current_a(q, load);
+}
+
+void quartz_out_row_a(struct quartz *q, const double *a_mps2, unsigned felt, const struct looks *at, double *out_a)
+{
+    const double rms_a = looks_white_rms(q->cfg.noise_a_rthz, at->every_ns);
+    for (unsigned i = 0; i < at->n; i++) {
+        double a = quiet_a(q, a_mps2 + (felt == 1 ? 0 : 3 * i), at->t_ns[i]);
+        if (rms_a > 0.0) a += rms_a * draws_gauss(&q->noise, at->t_ns[i]);
+        out_a[i] = limited_a(q, a);
+    }
 }

@@ -6,12 +6,13 @@
  *   y(T) = zero + curve x exp((1 - x^2) / 2) + slope (T - 30),   x = (T - centre) / width,
  *
  * T with a play, plus gradient (case - element). The loop answers as one oscillator of second order, exactly for an input held
- * since the look before. Then the white noise, each look over its own interval, and the limits. a = projection of gravity
+ * since the look before. Then the white noise, one draw for each instant (looks.h), and the limits. a = projection of gravity
  * on the sensor's axes as in mems.h, m/s^2; output in amperes. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_QUARTZ_H
 #define PSABENCH_PHYS_SENSOR_QUARTZ_H
 
-#include "base/rng.h"
+#include "base/draws.h"
+#include "base/looks.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -38,26 +39,26 @@ struct quartz {
     double g_mps2;
     double case_degc, element_degc; /* its owner keeps them up; the reference temperature from quartz_init() on */
     double felt_degc;               /* element with play */
-    struct rng noise;
+    struct draws noise;
     int64_t t_ns;     /* of the last look; -1 before the first */
     int64_t dt_ns;    /* for which the coefficients of the loop hold */
     double loop_g[2]; /* deflection off the present input, and its rate times the step's unit */
     double input_g;
     double step[2][2]; /* (deviation, rate / w) of the loop over dt_ns */
-    double noise_scale_a;
-    double held_a; /* output of the last look */
+    double held_a;     /* of the last look, without noise */
 };
 
 /* Plausible figures (E0): 1.28 mA/g, 350 Hz with 0.7, zero 60 ug with a curve of 300 ug, 55 K wide about 12 degC. */
 struct quartz_g quartz_default(void);
 
 /* g is the site's: a scale per g means per this g. */
-void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct rng noise);
+void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct draws noise);
 
 /* What it would give at rest without noise: truth. */
 double quartz_true_a(const struct quartz *q, const double a_mps2[3]);
 
-/* Output current; t_ns never earlier than the last call; the same instant gives the same current. */
-double quartz_out_a(struct quartz *q, const double a_mps2[3], int64_t t_ns);
+/* Output current at a row of looks; a_mps2 holds three numbers a look, or, if `felt` is 1, three for all. No look is
+ * earlier than the last call's; the same instant gives the same current. */
+void quartz_out_row_a(struct quartz *q, const double *a_mps2, unsigned felt, const struct looks *at, double *out_a);
 
 #endif

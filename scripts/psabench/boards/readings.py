@@ -119,6 +119,10 @@ class ReadingReader:
         """Readings that `take` would return."""
         return len(self._kept)
 
+    def least(self, count: int) -> int:
+        """CAN frames that must come yet before `len` can be count."""
+        return (count - len(self)) * len(self.layout.messages) - len(self._begun)
+
     def forget(self) -> None:
         """Drop what has arrived and is not taken; the counting starts again."""
         self._begun, self._kept, self._t_s, self._count, self._seen = [], [], [], None, False

@@ -150,7 +150,9 @@ class Unit:
     def _gather(self, count: int, timeout_s: float) -> None:
         self.frames.forget()
         self.start()
-        came = self.host.pump_until(lambda: len(self.frames) >= count, timeout_s + count * self.reading_s)
+        frames = self.frames
+        limit_s = timeout_s + count * self.reading_s
+        came = self.host.pump_until(lambda: len(frames) >= count, limit_s, lambda: frames.least(count))
         self.stop()
         if not came:
             raise LinkError(

@@ -137,7 +137,7 @@ class Dut:
     def _of_the_link(self) -> set[str]:
         """What this link to the bus can carry and tell: FD frames, remote frames, time stamps of the bus itself."""
         kind = type(self.host.bus).__name__
-        seen = {"fd", "rtr"} if kind != "SocketCanDaemonBus" else set()
+        seen = {"fd", "rtr"} if kind != "SocketcandBus" else set()
         return seen if kind in BY_THE_HOST_S_CLOCK else seen | {"stamps"}
 
     def wait_ready(self) -> None:

@@ -8,6 +8,7 @@ the wall clock's and a wait is spent receiving.
 
 from __future__ import annotations
 
+import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +23,7 @@ from can.interfaces.socketcan import SocketcanBus
 from psabench.errors import BadInput, LinkError, expected
 from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
+from psabench.link.socketcand_bus import SocketcandBus
 from psabench.link.udp_bus import LocalUdpBus, group_of
 
 BARRIER_S = 10.0  # timeout for a frame that the emulator says it has sent
@@ -29,6 +31,8 @@ GREETING_S = 10.0  # timeout for the first words of a socketcand server
 LOOK_S = 0.2  # real time between looks whether a silent link is still there
 OTHERS_S = 0.005  # real time between looks at the other buses
 QUANTUM_S = 0.001  # step of simulated time while waiting for an answer
+BULK_QUANTA = 1000  # at most in one command, so that Ctrl-C is heard
+NS = 1_000_000_000
 SO_RCVBUFFORCE, RCVBUF = 33, 4 << 20  # asm-generic/socket.h; bytes
 
 Message = can.Message
@@ -81,12 +85,29 @@ class StepClock:
         self._base_tx = sum(int(c["taken"]) for c in clients)
         self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
+        self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
 
     def now_s(self) -> float:
         return self._t_ns * 1e-9
 
     def advance(self, host: CanHost, dwell_s: float) -> None:
         self.command(host, "run", for_s=dwell_s)
+
+    def advance_until(self, host: CanHost, frames: int, deadline_s: float) -> None:
+        """Let whole quanta pass, at least one, until so many more frames have come for host, or deadline_s.
+
+        The emulator looks after each quantum, so that time is where quantum after quantum would have brought it.
+        """
+        quantum_ns = round(QUANTUM_S * NS)
+        quanta = max(1, math.ceil((deadline_s - self.now_s()) / QUANTUM_S) + 1)
+        while quanta > 1 and (self._t_ns + (quanta - 1) * quantum_ns) * 1e-9 >= deadline_s:
+            quanta -= 1
+        args: dict[str, object] = {"for_s": min(quanta, BULK_QUANTA) * quantum_ns / NS}
+        if frames > 0 and quanta > 1:
+            k = self._hosts.index(host) if self._hosts else 0
+            args |= {"rx": self._base_rx[k] + host.received + frames}
+            args |= {"client": self._mine[k]} if self._mine else {}
+        self.command(host, "run", **args)
 
     def command(self, host: CanHost | None, name: str, **args: object) -> Reply:
         """A command that moves time, `run` or `run.until`; returns when every frame of that time has come."""
@@ -109,6 +130,7 @@ def _receive_all(host: CanHost, sent: int) -> None:
     while (missing := sent - host.received) > 0:
         if not host.receive(BARRIER_S):
             raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
+        host.receive_taken()
     while host.shared and host.receive(0.0):
         pass  # frames of others were counted for the emulator's; all of its own are with our kernel by now
 
@@ -123,6 +145,7 @@ class CanHost(AbstractContextManager["CanHost"]):
         self.bus = bus
         self.clock = clock
         self.shared = isinstance(bus, SocketcanBus | LocalUdpBus)
+        self.counted = isinstance(bus, SocketcandBus)  # what it delivers are the emulator's frames, and TCP holds many
         self.received = self.sent = 0
         self.listeners: list[Listener] = []
 
@@ -143,10 +166,19 @@ class CanHost(AbstractContextManager["CanHost"]):
         message = self._take(min(timeout_s, LOOK_S)) or self._wait(timeout_s - LOOK_S)
         if message is None:
             return False
+        self._hand_on(message)
+        return True
+
+    def receive_taken(self) -> None:
+        """What came together with the last frame, where the bus takes many at once."""
+        if isinstance(self.bus, SocketcandBus) and self.bus.filters is None:
+            for message in self.bus.taken():
+                self._hand_on(message)
+
+    def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus
         for listener in self.listeners:
             listener(message)
-        return True
 
     def _wait(self, left_s: float) -> Message | None:
         """A frame within left_s, after a look at the link and one each LOOK_S."""
@@ -187,14 +219,24 @@ class CanHost(AbstractContextManager["CanHost"]):
     def advance(self, dwell_s: float) -> None:
         self.clock.advance(self, dwell_s)
 
-    def pump_until(self, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Let time pass until done() is true; False after timeout_s of bench time."""
+    def pump_until(self, done: Callable[[], bool], timeout_s: float, least: Callable[[], int] = lambda: 1) -> bool:
+        """Let time pass until done() is true; False after timeout_s of bench time.
+
+        done() is asked after each frame that came, or later: least() is how many more must come, at the least, before
+        it can be true. In step pace the emulator takes time there in one go.
+        """
         deadline_s = self.clock.now_s() + timeout_s
         while not done():
             if self.clock.now_s() >= deadline_s:
                 return False
-            self.advance(QUANTUM_S)
+            self._advance_until(least(), deadline_s)
         return True
+
+    def _advance_until(self, frames: int, deadline_s: float) -> None:
+        if isinstance(self.clock, StepClock) and self.clock.in_bulk:
+            self.clock.advance_until(self, frames, deadline_s)
+        else:
+            self.advance(QUANTUM_S)
 
 
 def open_bus(spec: str | None) -> can.BusABC:
@@ -225,7 +267,11 @@ def open_bus(spec: str | None) -> can.BusABC:
 
 
 def _open_interface(arguments: dict[str, Any]) -> can.BusABC:
-    own: dict[Any, type[can.BusABC]] = {"udp": LocalUdpBus, "cannelloni": CannelloniBus}
+    own: dict[Any, type[can.BusABC]] = {
+        "udp": LocalUdpBus,
+        "cannelloni": CannelloniBus,
+        "socketcand": SocketcandBus,
+    }
     if bus := own.get(arguments.get("interface")):
         return bus(**{k: v for k, v in arguments.items() if k != "interface"})
     return can.Bus(**arguments)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import queue
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,12 @@ def _described(v: Any) -> Described:
     )
 
 
+@cache
+def _dictionary(eds: Path, node_id: int) -> Any:
+    """Read once for all buses: it takes 35 ms."""
+    return canopen.import_od(str(eds), node_id)
+
+
 class CanopenNode:
     """One node: objects by index and subindex, and its NMT state.
 
@@ -130,7 +137,7 @@ class CanopenNode:
         self.host = host
         self.node_id = node_id
         network = _Network(host)
-        remote = canopen.RemoteNode(node_id, canopen.import_od(str(eds), node_id))
+        remote = canopen.RemoteNode(node_id, _dictionary(eds, node_id))
         network.add_node(remote)
         self._od = remote.object_dictionary
         self._sdo = _Sdo(node_id, self._od, host, timeout_s)

@@ -17,6 +17,7 @@ from pathlib import Path
 import can
 import pytest
 from psabench.emulator import Emulator
+from psabench.errors import ControlError
 from psabench.link.can_host import CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.record import record
@@ -46,9 +47,16 @@ def record_free(path: Path, *, seed: int = 1, count: int = 1000) -> None:
     assert (got.counters.lost, got.counters.torn) == (0, 0)
 
 
-def record_step(path: Path, *, seed: int = 1, extra: tuple[str | Path, ...] = ()) -> None:
+def record_step(
+    path: Path,
+    *,
+    scenario: str | Path = NOISY,
+    seed: int = 1,
+    extra: tuple[str | Path, ...] = (),
+    between: Callable[[Control], None] = lambda control: None,
+) -> None:
     """Record half a second in steps of changing length."""
-    with Emulator(NOISY, pace="step", seed=seed, extra=extra) as emulator, ExitStack() as watching:
+    with Emulator(scenario, pace="step", seed=seed, extra=extra) as emulator, ExitStack() as watching:
         assert emulator.control_path is not None
         if "--line" in extra:
             watching.enter_context(reading(emulator.endpoint(line="sampled")["pty"]))
@@ -58,6 +66,7 @@ def record_step(path: Path, *, seed: int = 1, extra: tuple[str | Path, ...] = ()
             host.clock = StepClock(control)
             for k in range(50):
                 host.advance(1e-3 * (1 + k % 19))
+                between(control)
             assert host.received > 500
 
 
@@ -203,6 +212,54 @@ def test_frames_are_the_same_whether_somebody_watches_the_lines_or_not(tmp_path:
     record_step(tmp_path / "watched.log", extra=("--vcd", tmp_path / "lines.vcd", "--line", "-"))
     assert (tmp_path / "lines.vcd").stat().st_size > 100_000
     assert (tmp_path / "alone.log").read_bytes() == (tmp_path / "watched.log").read_bytes()
+
+
+# A unit of each type; sensor and analog chain with white and slow noise, which the integrators take as they come.
+BOARDS = """
+seed: 3
+start: true
+chamber: {start_degc: 20}
+supply: {volt_v: 12}
+table: {axes: 1}
+units:
+  - name: a
+    node: 5
+    serial: 11
+    axes:
+      x: &noisy
+        sensor: mems
+        u0_v: 0.2
+        kx_v_per_g: 1
+        noise_v_rthz: 0.001
+        bias_instability_v: 0.01
+        afe: {noise_v_rthz: 0.001}
+  - {name: d, board: psd1, node: 6, serial: 12, axes: {x: *noisy}}
+  - {name: m, board: pmka, node: 7, serial: 13, axes: {x: *noisy}}
+  - {name: p, board: pik, node: 8, serial: 14, axes: {x: *noisy}}
+"""
+REFUSED: list[tuple[str, dict[str, float | str]]] = [
+    ("fault.add", {"kind": "sensor.noise", "point": "m.sensor.x", "rms_v": 2.5e-6}),
+    ("fault.add", {"kind": "sensor.saturation", "point": "p.sensor.x", "high_v": 14.0}),
+    ("supply.set", {"volt_v": 900.0}),
+    ("chamber.set", {"temp_degc": 290.0}),
+    ("table.rate", {"axis": 1.0, "rate_dps": 5e4}),
+]
+
+
+def refuse(control: Control) -> None:
+    for command, arguments in REFUSED:
+        with pytest.raises(ControlError):
+            control.call(command, **arguments)
+
+
+def test_looks_and_refused_commands_move_no_noise(tmp_path: Path) -> None:
+    """Somebody looks at the truth each 0.7 ms, and asks for what is not done."""
+    scenario = tmp_path / "boards.yaml"
+    scenario.write_text(BOARDS, encoding="utf-8")
+    record_step(tmp_path / "alone.log", scenario=scenario)
+    truth = ("--truth-log", tmp_path / "truth", "--truth-every", "0.7ms")
+    record_step(tmp_path / "asked.log", scenario=scenario, extra=truth, between=refuse)
+    assert (tmp_path / "alone.log").read_bytes() == (tmp_path / "asked.log").read_bytes()
 
 
 # ---- lines, frames and truth of one run

@@ -11,6 +11,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 from rig import EDS, TIMEOUT_S, MakeRig, Rig, over, until
 
 NODE = 5
+BOOT_UP = 0  # heartbeat state
 OPERATIONAL, STOPPED, PRE_OPERATIONAL = "OPERATIONAL", "STOPPED", "PRE-OPERATIONAL"
 
 every_link = over("socketcand", "vcan", "slc0")
@@ -80,8 +81,10 @@ def test_nmt_moves_the_node_and_its_heartbeat_says_so(node: Any) -> None:
         node.nmt.state = state
         heartbeats = (node.nmt.wait_for_heartbeat(TIMEOUT_S) for _ in range(3))  # one may have been on its way
         assert state in heartbeats
+    heard: list[int] = []
+    node.nmt.add_heartbeat_callback(heard.append)  # wait_for_bootup() misses a message that comes before it is called
     node.nmt.state = "RESET"
-    node.nmt.wait_for_bootup(TIMEOUT_S)
+    until(lambda: BOOT_UP in heard, "the boot-up message")
     assert node.nmt.wait_for_heartbeat(TIMEOUT_S) == PRE_OPERATIONAL
 
 

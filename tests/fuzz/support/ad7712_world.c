@@ -104,7 +104,7 @@ void w7712_init(struct w7712 *w, struct script *s, enum w7712_drive drive, bool 
     w->fall_ns = -NS_PER_S;
     const struct ad7712_io io = {
         .ctx = w, .vin_v = vin_v, .source_ohm = c & 8 ? source_ohm : NULL, .drdy = on_drdy, .sclk = on_sclk};
-    ad7712_init(&w->a, &cfg, &io, &w->s, rng_stream(c, 1, "adc"));
+    ad7712_init(&w->a, &cfg, &io, &w->s, draws_of(c, 1, "adc"));
     ad7712_power_up(&w->a, 0);
     check(w);
 }

@@ -336,7 +336,7 @@ void w1256_init(struct w1256 *w, struct script *s, enum w1256_drive drive)
     sched_init(&w->s);
     const struct ads1256_io io = {
         .ctx = w, .ain_v = input, .source_ohm = strict & 32 ? source_ohm : NULL, .drdy = on_drdy, .gpio = on_gpio};
-    ads1256_init(&w->a, &cfg, &io, &w->s, rng_stream(1, 1, "adc"));
+    ads1256_init(&w->a, &cfg, &io, &w->s, draws_of(1, 1, "adc"));
     ads1256_power_up(&w->a, 0);
     ads1256_cs_pin(&w->a, false, 0);
     check(w);

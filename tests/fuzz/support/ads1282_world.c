@@ -296,7 +296,7 @@ void w1282_init(struct w1282 *w, struct script *s, enum w1282_drive drive)
                                   .drdy = on_drdy,
                                   .mflag = more & 32 ? on_mflag : NULL,
                                   .modulator = more & 64 ? on_modulator : NULL};
-    ads1282_init(&w->a, &cfg, &io, &w->s, rng_stream(1, 1, "adc"));
+    ads1282_init(&w->a, &cfg, &io, &w->s, draws_of(1, 1, "adc"));
     ads1282_power_up(&w->a, 0);
     check(w);
 }

@@ -139,6 +139,18 @@ def test_the_head_returns_its_scale_when_it_stands_still() -> None:
     assert waits == [Head.poll_s] * 2  # time of the bench passes between the looks, and only there
 
 
+@pytest.mark.parametrize(("lasts_s", "waits_s"), [(1.95, [2.0]), (2.0, [2.0]), (0.0, []), (None, [])])
+def test_looks_before_the_end_of_a_motion_are_left_out(lasts_s: float | None, waits_s: list[float]) -> None:
+    asked = []
+    with instrument("head", {"REST?": ["0", "1"] if not waits_s else ["1"], "ANGL?": "9"}) as (head, wire, waits):
+        assert isinstance(head, Head)
+        head.lasts = lambda command, **args: asked.append((command, args)) or lasts_s  # type: ignore[func-returns-value]
+        assert head.turn(9.0) == 9.0
+    assert asked == [("head.read", {})]
+    assert wire.told == ["ANGL 9.0", "SYST:ERR?", *["REST?"] * (1 if waits_s else 2), "ANGL?"]
+    assert waits == (waits_s or [Head.poll_s])  # a motion that lasts longer than was said is watched to its end
+
+
 def test_a_face_is_a_word() -> None:
     with instrument("head", {"REST?": "1", "ANGL?": "0"}) as (head, wire, _):
         assert isinstance(head, Head)

@@ -1,4 +1,4 @@
-"""Frame lengths of emu/base/canbits.c against an independent model that writes the frame out as a string of bits.
+"""Frame lengths of emu/base/can/bits.c against an independent model that writes the frame out as a string of bits.
 
 The C file is compiled by itself and called through ctypes; the model below shares nothing with it.
 """
@@ -36,7 +36,7 @@ class Bits(ctypes.Structure):
 @pytest.fixture(scope="session")
 def canbits(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     out = tmp_path_factory.mktemp("canbits") / "canbits.so"
-    source = ROOT / "emu/base/canbits.c"
+    source = ROOT / "emu/base/can/bits.c"
     cc = os.environ.get("CC", "cc")
     subprocess.run([cc, "-std=c11", "-shared", "-fPIC", f"-I{ROOT / 'emu'}", "-o", str(out), str(source)], check=True)
     lib = ctypes.CDLL(str(out))

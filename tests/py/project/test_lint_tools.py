@@ -39,7 +39,7 @@ def check_includes(root: Path, files: dict[str, str]) -> subprocess.CompletedPro
         ("emu/link/a.c", "#include <sys/socket.h>\n"),
         ("emu/app/a.c", '#include "link/link.h"\n'),
         ("emu/scenario/a.c", "#include <libfyaml.h>\n"),
-        ("build/gen/a.c", '#include "a.h"\n#include "base/can.h"\n'),
+        ("build/gen/a.c", '#include "a.h"\n#include "base/can/can.h"\n'),
         ("emu/base/a.c", body(40)),
         ("emu/base/a.c", (body(8) + "\n") * 3 + "// Long: one row per opcode.\n" + body(70)),
         ("emu/base/a.c", "//\n" * 600),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -88,3 +90,36 @@ def test_a_wrong_row_is_an_error(text: str, says: str, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(text)
     with pytest.raises(ValueError, match="^" + says.replace("(", r"\(")):
         tiers.load(tmp_path / "x.toml")
+
+
+def test_an_entry_that_fits_no_test_is_named() -> None:
+    table = Table({}, {"test_a.py": Row(all=("test_f", "test_g[1]", "test_g[[]1[]]", "test_h"))})
+    tests = [(HERE, "test_f", "", ""), (HERE, "test_g", "1", "")]
+    assert tiers.unused(table, tests) == [
+        f"tests/tiers.toml: test_a.py: expected a test named {name}" for name in ("test_g[[]1[]]", "test_h")
+    ]
+
+
+def test_a_run_of_whole_files_refuses_it(tmp_path: Path) -> None:
+    """A file of a table's name with other tests, as after a test was renamed."""
+    folder = tmp_path / "tests"
+    folder.mkdir()
+    (folder / "conftest.py").write_bytes((tiers.ROOT / "tests/conftest.py").read_bytes())
+    (folder / "test_logic.py").write_text("def test_other(): pass\n", encoding="utf-8")
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-c",
+        str(tiers.ROOT / "pyproject.toml"),
+        "--rootdir",
+        str(tmp_path),
+    ]
+    whole, one = (
+        subprocess.run([*command, str(what)], cwd=tmp_path, capture_output=True, text=True, check=False)
+        for what in (folder / "test_logic.py", f"{folder / 'test_logic.py'}::test_other")
+    )
+    assert whole.returncode == pytest.ExitCode.USAGE_ERROR
+    assert "test_logic.py: expected a test named test_sigrok_decodes" in whole.stderr
+    assert one.returncode == 0, one.stdout + one.stderr

@@ -132,7 +132,7 @@ EXPORT double bridge_accelerometer(struct lab *l, const double mounting[7], cons
     struct mems m;
     double a_mps2[3];
     lab_sensor_mps2(l, &s, at_m, 1.0, 0.0, t_ns, a_mps2);
-    mems_init(&m, &c, rng_stream(0, 0, "mems"));
+    mems_init(&m, &c, draws_of(0, 0, "mems"), draws_of(0, 0, "slow"));
     return mems_true_v(&m, a_mps2, t_ns);
 }
 
@@ -191,9 +191,11 @@ EXPORT void bridge_noise(const double terms[5], uint64_t seed, int64_t dt_ns, un
     };
     const double still[3] = {0.0, 0.0, 0.0};
     struct mems m;
-    mems_init(&m, &c, rng_stream(seed, 1, "mems.x"));
-    (void)mems_out_v(&m, still, 0); /* the first look is taken as one of a converter's block */
-    for (unsigned i = 0; i < n; i++) out[i] = mems_out_v(&m, still, (int64_t)(i + 1) * dt_ns);
+    mems_init(&m, &c, draws_of(seed, 1, "mems.x"), draws_of(seed, 1, "mems.slow.x"));
+    for (unsigned i = 0; i < n; i++) {
+        const int64_t t_ns = (int64_t)(i + 1) * dt_ns;
+        mems_out_row_v(&m, still, 1, &(struct looks){&t_ns, 1, dt_ns}, &out[i]);
+    }
 }
 
 /* The same of noise.h alone, in its own terms: B, K, R */
@@ -201,7 +203,7 @@ EXPORT void bridge_slow(const double terms[3], uint64_t seed, int64_t dt_ns, uns
 {
     const struct noise_cfg c = {terms[0], terms[1], terms[2], 0.0};
     struct noise noise;
-    noise_init(&noise, &c, rng_stream(seed, 1, "slow"));
+    noise_init(&noise, &c, draws_of(seed, 1, "slow"));
     for (unsigned i = 0; i < n; i++) out[i] = noise_slow_u(&noise, (int64_t)(i + 1) * dt_ns);
 }
 

@@ -54,7 +54,8 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
 def build(where: Path) -> ctypes.CDLL:
     """Compile emu/phys with the bridge into a library of its own and load it."""
     out = where / "physics.so"
-    sources = [ROOT / "tests/py/support/phys_bridge.c", ROOT / "emu/base/detmath.c", ROOT / "emu/base/rng.c"]
+    base = (ROOT / f"emu/base/{name}.c" for name in ("detmath", "draws", "rng"))
+    sources = [ROOT / "tests/py/support/phys_bridge.c", *base]
     sources += sorted((ROOT / "emu/phys").rglob("*.c"))
     flags = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{ROOT / 'emu'}"]
     subprocess.run([os.environ.get("CC", "cc"), *flags, "-o", str(out), *map(str, sources), "-lm"], check=True)

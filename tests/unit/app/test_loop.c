@@ -134,12 +134,71 @@ static void who_writes_and_closes_is_heard(void **state)
     text_link_free(&r.io);
 }
 
+/* ---- strides */
+
+enum { TICK_NS = 100000, RUN_NS = 200000000, AWAKE_NS = 190000000 };
+
+struct stride_rig {
+    struct sched sched;
+    struct pace pace;
+    struct links links;
+    struct loop loop;
+    struct sched_ev tick;
+    int64_t moved_ns, longest_ns;
+};
+
+/* A board that is asleep and has its own events. */
+static void on_tick(void *ctx, int64_t t_ns)
+{
+    struct stride_rig *r = ctx;
+    r->sched.asleep = t_ns < AWAKE_NS;
+    sched_at(&r->sched, &r->tick, t_ns + TICK_NS);
+}
+
+static void on_moved(void *ctx, int64_t now_ns)
+{
+    struct stride_rig *r = ctx;
+    if (now_ns - r->moved_ns > r->longest_ns) r->longest_ns = now_ns - r->moved_ns;
+    r->moved_ns = now_ns;
+}
+
+/* The longest time without a look at input and output, one of so many boards asleep. */
+static int64_t longest_stride_ns(unsigned boards)
+{
+    static const volatile sig_atomic_t stop = 0;
+    struct stride_rig r = {.moved_ns = 0};
+    sched_init(&r.sched);
+    pace_init(&r.pace, PACE_FREE);
+    r.loop = (struct loop){.sched = &r.sched,
+                           .pace = &r.pace,
+                           .links = &r.links,
+                           .boards = boards,
+                           .end_ns = RUN_NS,
+                           .moved = on_moved,
+                           .say = say,
+                           .ctx = &r};
+    sched_ev_inner(&r.tick, on_tick, &r);
+    sched_at(&r.sched, &r.tick, 0);
+    loop_run(&r.loop, &stop);
+    assert_int_equal(r.sched.now_ns, RUN_NS);
+    return r.longest_ns;
+}
+
+/* What a board that is awake sends has to fit into buffers until the next look. */
+static void time_strides_only_while_all_boards_sleep(void **state)
+{
+    (void)state;
+    assert_true(longest_stride_ns(2) <= 1000000 + TICK_NS);
+    assert_true(longest_stride_ns(1) >= 20000000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_port_that_no_program_has_open_costs_nothing),
         cmocka_unit_test(each_client_is_heard_and_answered),
         cmocka_unit_test(who_writes_and_closes_is_heard),
+        cmocka_unit_test(time_strides_only_while_all_boards_sleep),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

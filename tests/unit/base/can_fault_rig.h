@@ -2,7 +2,8 @@
 #ifndef PSABENCH_TESTS_CAN_FAULT_RIG_H
 #define PSABENCH_TESTS_CAN_FAULT_RIG_H
 
-#include "base/can_fault.h"
+#include "base/can/fault.h"
+#include "base/rng.h"
 
 #include "rig.h"
 

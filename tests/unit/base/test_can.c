@@ -1,5 +1,5 @@
-#include "base/can.h"
-#include "base/canbits.h"
+#include "base/can/bits.h"
+#include "base/can/can.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

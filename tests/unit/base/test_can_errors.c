@@ -1,7 +1,7 @@
 /* Errors on the wire of the bus: destroyed frames, error counters, bus-off. */
 #include "can_fault_rig.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
 
 static void a_destroyed_frame_is_sent_again(void **state)
 {

@@ -1,7 +1,7 @@
 /* Faults of the bus: frames that are lost, doubled, late or changed. */
 #include "can_fault_rig.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
 
 static void a_dropped_frame_is_sent_but_nobody_receives_it(void **state)
 {

@@ -1,4 +1,4 @@
-#include "base/canbits.h"
+#include "base/can/bits.h"
 #include "base/rng.h"
 
 #include <setjmp.h>

@@ -79,6 +79,26 @@ static void steps_meet_every_edge(void **state)
             }
 }
 
+static void many_steps_at_once_end_where_one_after_another_does(void **state)
+{
+    (void)state;
+    struct rng r = rng_stream(rig_seed(1), 0, "clk");
+    for (unsigned run = 0; run < 20000; run++) {
+        const struct clk c = {.hz = 1 + (int64_t)(rng_u64(&r) % 1000000000), .div = 1 + (int64_t)(rng_u64(&r) % 5)};
+        const struct clk_step step = clk_step(&c, 1 + (int64_t)(rng_u64(&r) % 5000));
+        const struct clk_pos from = clk_pos(&c, (int64_t)(rng_u64(&r) % 100000));
+        struct clk_pos edge = from;
+        for (uint64_t n = rng_u64(&r) % 50; n > 0; n--) edge = clk_on(edge, &step);
+        const int64_t gap_ns = clk_on(edge, &step).t_ns - edge.t_ns; /* clocks of 1 ns and less have equal instants */
+        if (gap_ns == 0) continue;
+        const int64_t t_ns = edge.t_ns + (int64_t)(rng_u64(&r) % (uint64_t)gap_ns);
+        const struct clk_pos at = clk_on_to(from, &step, t_ns);
+        assert_int_equal(at.k, edge.k);
+        assert_int_equal(at.t_ns, edge.t_ns);
+        assert_int_equal(at.rest, edge.rest);
+    }
+}
+
 static void rounding_and_sign_extension_keep_their_signs(void **state)
 {
     (void)state;
@@ -110,6 +130,7 @@ int main(void)
         cmocka_unit_test(count_at_finds_the_first_edge_not_before),
         cmocka_unit_test(count_at_is_the_first_edge_of_any_clock),
         cmocka_unit_test(steps_meet_every_edge),
+        cmocka_unit_test(many_steps_at_once_end_where_one_after_another_does),
         cmocka_unit_test(rounding_and_sign_extension_keep_their_signs),
     };
     return cmocka_run_group_tests_name("clk", tests, NULL, NULL);

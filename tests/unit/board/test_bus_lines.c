@@ -1,4 +1,5 @@
 /* Lines of the parallel bus of every board that has one: what they show is what was done, and looking changes nothing. */
+#include "lone_unit.h"
 #include "rig.h"
 
 #include "base/rng.h"
@@ -96,13 +97,8 @@ static void watch(void)
 
 static void live(const struct board_type *t, bool watched)
 {
-    const struct lab_cfg lab = lab_default();
-    struct unit_cfg cfg = unit_default("a");
     memset(&w, 0, sizeof w);
-    sched_init(&w.s);
-    lab_init(&w.lab, &lab, 1);
-    unit_cfg_type(&cfg, t);
-    unit_init(&w.u, &cfg, &w.lab, &w.s);
+    lone_unit(&w.u, &w.lab, &w.s, t, 1);
     if (watched) watch();
     unit_power_up(&w.u, 0);
 }

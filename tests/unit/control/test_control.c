@@ -87,6 +87,38 @@ static void run_is_answered_when_it_is_over(void **state)
     assert_says("{\"id\":12,\"cmd\":\"run\",\"args\":{\"for_s\":1}}", "{\"code\":\"state\",\"text\":\"not now\"}");
 }
 
+/* Frames delivered to client 3, and to the oldest one: 42. */
+static void run_ends_at_the_first_look_that_finds_the_frames(void **state)
+{
+    (void)state;
+    assert_null(say("{\"cmd\":\"run\",\"args\":{\"for_s\":0.0025,\"after_tx\":3,\"rx\":43,\"client\":3}}"));
+    assert_int_equal(asked.after_tx, 3);
+    assert_int_equal(asked.for_ns, 1000000);
+    assert_null(control_run_done(&control, 1000000));
+    assert_null(control_run_done(&control, 2000000));
+    assert_int_equal(asked.for_ns, 500000);
+    assert_non_null(strstr(control_run_done(&control, 2500000), "\"ok\":true"));
+    assert_int_equal(asked.runs, 3);
+    static const struct {
+        const char *args;
+        bool ends;
+    } row[] = {{"\"rx\":42,\"client\":3", true},
+               {"\"rx\":42", true},
+               {"\"rx\":43", false},
+               {"\"rx\":1,\"client\":4", false}, /* there is no such client */
+               {"\"rx\":1,\"every_s\":0.02", false}};
+    for (unsigned i = 0; i < COUNT(row); i++) {
+        char line[128];
+        snprintf(line, sizeof line, "{\"cmd\":\"run\",\"args\":{\"for_s\":0.1,%s}}", row[i].args);
+        assert_null(say(line));
+        assert_int_equal(asked.for_ns, i == 4 ? 20000000 : 1000000);
+        if (i == 4) assert_non_null(control_run_done(&control, 1000000)); /* --for is over */
+        else if (row[i].ends) assert_non_null(control_run_done(&control, 1000000));
+        else assert_null(control_run_done(&control, 1000000));
+        control_run_forget(&control);
+    }
+}
+
 static void run_until_ends_at_the_very_event(void **state)
 {
     (void)state;
@@ -245,6 +277,7 @@ int main(void)
         cmocka_unit_test_setup(bad_commands_are_refused_in_words_and_change_nothing, fresh),
         cmocka_unit_test_setup(an_overlong_line_is_refused, fresh),
         cmocka_unit_test_setup(run_is_answered_when_it_is_over, fresh),
+        cmocka_unit_test_setup(run_ends_at_the_first_look_that_finds_the_frames, fresh),
         cmocka_unit_test_setup(run_until_ends_at_the_very_event, fresh),
         cmocka_unit_test(names_of_events_are_the_boards_own),
         cmocka_unit_test_setup(subscribers_are_told_of_events_and_status, fresh),
@@ -253,8 +286,9 @@ int main(void)
         cmocka_unit_test_setup(what_changes_the_bench_goes_into_the_journal, fresh),
         cmocka_unit_test_setup(a_command_can_be_checked_without_being_carried_out, fresh),
     };
-    bench = malloc(sizeof *bench);
+    bench = calloc(1, sizeof *bench);
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    bench_free(bench);
     free(bench);
     return failed;
 }

@@ -63,7 +63,8 @@ static void counters_frames_and_units_tell_what_they_promise(void **state)
     assert_says("{\"cmd\":\"counters\"}", "\"pace\":{\"name\":\"step\",\"turns\":9");
     assert_says("{\"cmd\":\"counters\"}", "\"bitrate_hz\":1000000");
     assert_says("{\"cmd\":\"units\"}",
-                "{\"name\":\"a\",\"board\":\"psa2\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false}");
+                "{\"name\":\"a\",\"board\":\"psa2\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false,"
+                "\"eager\":\"the controller has not set it up yet\"}");
     assert_says("{\"cmd\":\"quit\"}", "\"ok\":true");
     assert_int_equal(asked.quits, 1);
 }
@@ -146,8 +147,9 @@ int main(void)
         cmocka_unit_test_setup(endpoints_are_told_by_the_bench, fresh),
         cmocka_unit_test_setup(hidden_parameters_are_told_on_the_truth_port_alone, fresh),
     };
-    bench = malloc(sizeof *bench);
+    bench = calloc(1, sizeof *bench);
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    bench_free(bench);
     free(bench);
     return failed;
 }

@@ -239,7 +239,7 @@ static void every_kind_at_every_point_fits_or_says_why_not(void **state)
             f.value[a] = a == FAULT_DROP_V ? 10.0 : 1.0;
             f.given |= kind->need & UINT64_C(1) << a;
         }
-        for (unsigned n = 0; fault_point(&r.view, n, &f.point, f.name); n++) {
+        for (struct fault_points at = {0}; fault_point_next(&r.view, &at, &f.point, f.name);) {
             char why[CONTROL_WHY_MAX] = "";
             if (fault_fits(&r.view, &f, why)) of_kind++;
             else if (strlen(why) < 20) fail_msg("%s at %s: \"%s\"", kind->name, f.name, why);
@@ -259,7 +259,7 @@ static void points_have_names_of_their_own(void **state)
     struct fault_point p;
     char name[FAULT_POINT_MAX], found[FAULT_POINT_MAX];
     unsigned n = 0;
-    for (; fault_point(&r.view, n, &p, name); n++) {
+    for (struct fault_points at = {0}; fault_point_next(&r.view, &at, &p, name); n++) {
         struct fault_point q;
         assert_true(fault_point_find(&r.view, name, &q, found));
         if (p.place != q.place || p.unit != q.unit || p.index != q.index) fail_msg("%s is %s", name, found);
@@ -283,7 +283,7 @@ static void refused(const char *cmd, const char *args)
     cJSON_Delete(j);
 }
 
-/* When a sensor was last looked at decides about its noise: what is refused must not look. */
+/* When an input was last looked at decides about what its filter holds: what is refused must not look. */
 static void a_refused_command_leaves_no_trace(void **state)
 {
     (void)state;
@@ -292,12 +292,12 @@ static void a_refused_command_leaves_no_trace(void **state)
     const struct table_cfg cfg = table_default(1);
     table_init(&r.lab.table, &cfg, &r.lab.site, 1);
     run_to(400 * MS + 12345);
-    const int64_t looked_ns = r.unit[0].mems[0].t_ns;
+    const int64_t looked_ns = r.unit[0].board->afe[0].t_ns;
     assert_true(looked_ns < r.s.now_ns);
     refused("table.sine", "{\"axis\":1,\"amplitude_deg\":100,\"frequency_hz\":10}");
     refused("table.profile", "{\"axis\":1,\"times_s\":[1,0],\"rates_dps\":[1,2]}");
     refused("chamber.ramp", "{\"ramp_k_per_min\":0.0001}");
-    assert_int_equal(r.unit[0].mems[0].t_ns, looked_ns);
+    assert_int_equal(r.unit[0].board->afe[0].t_ns, looked_ns);
 }
 
 int main(void)

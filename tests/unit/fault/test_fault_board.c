@@ -110,11 +110,12 @@ static void its_points_are_those_of_its_table(void **state)
     static const char *const names[] = {
         "f.sensor.x", "f.sensor.y", "f.sensor.z", "f.afe.x",     "f.afe.y",   "f.afe.z",     "f.conv.a", "f.conv.b",
         "f.rom",      "f.lamp",     "f.ctl",      "f.line.BEAT", "f.line.CK", "f.line.MARK", "f.can",    "p.sensor.x"};
+    struct fault_points at = {0};
     struct fault_point p;
     char name[FAULT_POINT_MAX];
     (void)state;
     for (unsigned n = 0; n < COUNT(names); n++) {
-        assert_true(fault_point(&r.view, n, &p, name));
+        assert_true(fault_point_next(&r.view, &at, &p, name));
         assert_string_equal(name, names[n]);
     }
     assert_true(fault_point_find(&r.view, "f.conv.b", &p, name));
@@ -274,7 +275,7 @@ static unsigned points_for(const struct fault_kind *kind)
     for (unsigned a = 0; a < FAULT_ARGS; a++) f.value[a] = a == FAULT_SCALE_PPM || a == FAULT_REFERENCE_PPM ? 1e4 : 1.0;
     f.given = kind->need;
     if (strcmp(kind->name, "sensor.saturation") == 0) f.given |= UINT64_C(1) << FAULT_LOW_V;
-    for (unsigned n = 0; fault_point(&r.view, n, &f.point, f.name); n++) {
+    for (struct fault_points at = {0}; fault_point_next(&r.view, &at, &f.point, f.name);) {
         char why[CONTROL_WHY_MAX] = "";
         if (fault_fits(&r.view, &f, why)) fits++;
         else if (strlen(why) < 20) fail_msg("%s at %s: \"%s\"", kind->name, f.name, why);
@@ -332,7 +333,8 @@ static void it_tells_its_type_its_counters_its_lines_and_its_truth(void **state)
     r.board.cycles = 3;
     r.board.chip[1].conversions = 17;
     r.board.chip[1].lost = 2;
-    assert_says("{'cmd':'units'}", "{'name':'f','board':'fake','serial':1,'node':5,'profile':'usual','ready':true}");
+    assert_says("{'cmd':'units'}", "{'name':'f','board':'fake','serial':1,'node':5,'profile':'usual','ready':true,"
+                                   "'eager':'a board of this type always does'}");
     assert_says(
         "{'cmd':'counters','args':{'unit':'f'}}",
         "'result':{'board':{'cycles':3},'conv_a':{'conversions':0,'lost':0},'conv_b':{'conversions':17,'lost':2},"

@@ -16,12 +16,20 @@ static void a_bias_is_in_the_codes(void **state)
     if (fabs(after_v - before_v - 1.0) > 1e-3) fail_msg("%g V became %g V", before_v, after_v);
 }
 
+/* What the faults of X make of an output of 0. */
+static double faulty_out(const struct unit *u, int64_t t_ns)
+{
+    double out = 0.0;
+    sensor_fault_row(u->sensor_faults[0], &(struct looks){&t_ns, 1, 31250}, &out);
+    return out;
+}
+
 /* Volts of the arguments are volts at the load. */
 static void volts_of_a_current_sensor_are_those_at_its_load(void **state)
 {
     (void)state;
     add("{'kind':'sensor.stuck','point':'b.sensor.x','out_v':5}");
-    const double signal = sensor_fault_out(r.unit[1].sensor_faults[0], 0.0, 1);
+    const double signal = faulty_out(&r.unit[1], 1);
     if (fabs(signal - 5e-3) > 1e-15) fail_msg("%g A", signal);
 }
 
@@ -125,7 +133,7 @@ static void random_faults_are_seeded_by_their_number(void **state)
         fresh(state);
         if (i == 2) add("{'kind':'controller.frozen_words','point':'b.kpsa'}");
         assert_int_equal(add("{'kind':'sensor.noise','point':'a.sensor.x','rms_v':0.1}"), i == 2 ? 2 : 1);
-        out[i] = sensor_fault_out(r.unit[0].sensor_faults[0], 0.0, 1);
+        out[i] = faulty_out(&r.unit[0], 1);
     }
     assert_true(out[0] == out[1]);
     assert_true(out[0] != out[2]);

@@ -1,6 +1,7 @@
 /* What a client of the bus sees of its faults: error frames in words, a program that does not read. */
 #define _POSIX_C_SOURCE 200809L
-#include "base/can_fault.h"
+#include "base/can/fault.h"
+#include "base/rng.h"
 #include "link/can/socketcand.h"
 #include "link/can/socketcand_tcp.h"
 #include "link/text_link.h"

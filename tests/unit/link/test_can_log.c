@@ -2,7 +2,7 @@
 #define _GNU_SOURCE /* mkstemp */
 #include "rig.h"
 
-#include "base/can_text.h"
+#include "base/can/text.h"
 #include "control/control.h"
 #include "link/can/can_log.h"
 

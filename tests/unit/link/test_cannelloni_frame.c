@@ -1,5 +1,6 @@
 #include "can_rig.h"
 
+#include "base/rng.h"
 #include "link/can/cannelloni_can.h"
 #include "link/can/cannelloni_frame.h"
 

@@ -1,6 +1,7 @@
 #include "can_rig.h"
 
-#include "base/canbits.h"
+#include "base/can/bits.h"
+#include "base/rng.h"
 #include "link/can/slcan.h"
 
 #include <string.h>

@@ -2,6 +2,7 @@
 #include "rig.h"
 
 #include "base/detmath.h"
+#include "base/rng.h"
 #include "phys/motion/head.h"
 
 #include <math.h>

@@ -3,6 +3,7 @@
 #include "site.h"
 
 #include "base/detmath.h"
+#include "base/rng.h"
 #include "base/sched.h"
 #include "phys/lab.h"
 
@@ -57,6 +58,54 @@ static void on_the_head_without_lever_arm_it_is_the_heads_own_arithmetic(void **
             lab_sensor_mps2(&l, &(struct lab_mounting){0}, origin, c0, s0, t_ns, got);
             assert_memory_equal(got, want, sizeof got);
         }
+    }
+}
+
+static void row_is_its_looks(struct lab *l, const struct lab_mounting *m, int64_t from_ns, unsigned n)
+{
+    int64_t t_ns[LAB_ROW + 8];
+    double row[LAB_ROW + 8][3], one[3];
+    for (unsigned i = 0; i < n; i++) t_ns[i] = from_ns + i * 31250;
+    const struct lab_sensor s = {m, origin, 1.0, 0.0};
+    const unsigned written = lab_sensor_row_mps2(l, &s, t_ns, n, row);
+    assert_true(written == n || written == 1);
+    for (unsigned i = 0; i < n; i++) {
+        lab_sensor_mps2(l, m, origin, 1.0, 0.0, t_ns[i], one);
+        assert_memory_equal(row[written == 1 ? 0 : i], one, sizeof one);
+    }
+}
+
+/* Of units beside each other, on different mounts and askew, at rest and in motion, with rows that are kept and too long for it. */
+static void a_row_is_its_looks_whoever_asked_before(void **state)
+{
+    (void)state;
+    struct lab l = up();
+    const struct lab_mounting mounts[] = {{.on = LAB_HEAD},
+                                          {.on = LAB_HEAD, .misalignment_rad = {0.01, 0.02, 0.0}},
+                                          {.on = LAB_TABLE},
+                                          {.on = LAB_FIXED}};
+    (void)table_rate(&l.table, 0, 20.0, 0);
+    for (int64_t k = 0; k < 8; k++) {
+        const int64_t from_ns = k * 400000000;
+        if (k == 1) head_turn(&l.head, 77.0, from_ns - 1);
+        for (size_t i = 0; i < COUNT(mounts); i++) row_is_its_looks(&l, &mounts[i], from_ns, 32);
+        for (size_t i = 0; i < COUNT(mounts); i++) row_is_its_looks(&l, &mounts[i], from_ns, 32);
+        for (size_t i = 0; i < COUNT(mounts); i++) row_is_its_looks(&l, &mounts[i], from_ns + 31250, LAB_ROW + 8);
+    }
+}
+
+/* In motion the head's gravity is that of its angle, by libm. */
+static void a_turning_head_is_exact(void **state)
+{
+    (void)state;
+    struct lab l = up();
+    head_turn(&l.head, 333.0, 0);
+    for (int64_t t_ns = 0; t_ns < 2 * NS_PER_S; t_ns += 1234567) {
+        double m[3];
+        head_gravity_mps2(&l.head, t_ns, m);
+        const double alpha = head_angle_rad(&l.head, t_ns);
+        assert_true(fabs(m[0] + l.site.g_mps2 * sin(alpha)) < 5e-15);
+        assert_true(fabs(m[1] + l.site.g_mps2 * cos(alpha)) < 5e-15);
     }
 }
 
@@ -153,6 +202,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(on_the_head_without_lever_arm_it_is_the_heads_own_arithmetic),
+        cmocka_unit_test(a_row_is_its_looks_whoever_asked_before),
+        cmocka_unit_test(a_turning_head_is_exact),
         cmocka_unit_test(a_vanishing_lever_arm_changes_nothing),
         cmocka_unit_test(misalignment_turns_what_the_case_feels),
         cmocka_unit_test(mounts_feel_gravity_down_their_own_axes),

@@ -13,6 +13,13 @@ static void near(double got, double want, double tol)
     if (!(fabs(got - want) <= tol)) fail_msg("got %.12g, want %.12g within %g", got, want, tol);
 }
 
+static double out_v(struct mems *m, const double a_mps2[3], int64_t t_ns, int64_t every_ns)
+{
+    double v;
+    mems_out_row_v(m, a_mps2, 1, &(struct looks){&t_ns, 1, every_ns}, &v);
+    return v;
+}
+
 /* Rows: one term of the model at a time; acceleration in g, volts out. */
 static void each_term_of_the_model(void **state)
 {
@@ -36,7 +43,7 @@ static void each_term_of_the_model(void **state)
         const struct mems_cfg cfg = mems_cfg_si(&rows[i].p, G);
         const double a[3] = {rows[i].a_g[0] * G, rows[i].a_g[1] * G, rows[i].a_g[2] * G};
         struct mems m;
-        mems_init(&m, &cfg, rng_stream(1, 1, "mems.x"));
+        mems_init(&m, &cfg, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
         near(mems_true_v(&m, a, rows[i].t_ns), rows[i].v, 1e-15);
     }
 }
@@ -47,10 +54,10 @@ static void a_second_look_at_one_instant_sees_the_same(void **state)
     const struct mems_cfg cfg = mems_cfg_si(&(struct mems_g){.noise_v_rthz = 1e-4}, G);
     const double a[3] = {0};
     struct mems m;
-    mems_init(&m, &cfg, rng_stream(1, 1, "mems.x"));
-    const double v = mems_out_v(&m, a, 31250);
-    near(mems_out_v(&m, a, 31250), v, 0.0);
-    assert_true(mems_out_v(&m, a, 62500) != v);
+    mems_init(&m, &cfg, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
+    const double v = out_v(&m, a, 31250, 31250);
+    near(out_v(&m, a, 31250, 31250), v, 0.0);
+    assert_true(out_v(&m, a, 62500, 31250) != v);
 }
 
 /* White: the rms of a pull goes as 1 / sqrt(interval); 1e-4 V/rtHz at 31.25 us is 1e-4 sqrt(16 kHz) = 12.65 mV. */
@@ -67,13 +74,43 @@ static void noise_of_a_pull_follows_its_interval(void **state)
         const double a[3] = {0};
         struct mems m;
         double sum2 = 0.0;
-        mems_init(&m, &cfg, rng_stream(1, 1, "mems.x"));
-        (void)mems_out_v(&m, a, 0);
+        mems_init(&m, &cfg, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
         for (int64_t k = 1; k <= N; k++) {
-            const double v = mems_out_v(&m, a, k * rows[i].dt_ns);
+            const double v = out_v(&m, a, k * rows[i].dt_ns, rows[i].dt_ns);
             sum2 += v * v;
         }
         near(sqrt(sum2 / N), rows[i].rms_v, 0.02 * rows[i].rms_v);
+    }
+}
+
+/* White and slow noise, drift and quantum: a row, its looks one by one, and looks among which others come. */
+static void no_look_changes_what_another_sees(void **state)
+{
+    (void)state;
+    enum { N = 32, ROWS = 50 };
+    const struct mems_g g = {.u0_v = 2.5,
+                             .kx_v_per_g = 1.0,
+                             .noise_v_rthz = 1e-4,
+                             .drift_v_per_s = 1e-3,
+                             .bias_instability_v = 1e-4,
+                             .walk_v_rts = 1e-5,
+                             .quantum_v = 1e-6};
+    const struct mems_cfg cfg = mems_cfg_si(&g, G);
+    struct mems row, one, often;
+    const double a[3] = {1.0, 2.0, 3.0};
+    mems_init(&row, &cfg, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
+    one = often = row;
+    for (unsigned k = 0; k < ROWS; k++) {
+        int64_t t_ns[N];
+        double v[N];
+        for (unsigned i = 0; i < N; i++) t_ns[i] = (int64_t)(k * N + i) * 31250;
+        mems_out_row_v(&row, a, 1, &(struct looks){t_ns, N, 31250}, v);
+        for (unsigned i = 0; i < N; i++) {
+            (void)out_v(&often, a, t_ns[i], 7000);
+            if (out_v(&one, a, t_ns[i], 31250) != v[i] || out_v(&often, a, t_ns[i], 31250) != v[i])
+                fail_msg("row %u, look %u", k, i);
+            (void)out_v(&often, a, t_ns[i] + 11, 100);
+        }
     }
 }
 
@@ -126,6 +163,7 @@ int main(void)
         cmocka_unit_test(each_term_of_the_model),
         cmocka_unit_test(a_second_look_at_one_instant_sees_the_same),
         cmocka_unit_test(noise_of_a_pull_follows_its_interval),
+        cmocka_unit_test(no_look_changes_what_another_sees),
         cmocka_unit_test(reading_noise_is_what_the_wire_shows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -151,9 +151,10 @@ static const struct {
     {"units: [{adc_chain: sinc}]\n", "dir/s.yaml:1:21: units.a.adc_chain: expected exact, modulator or direct"},
     {"units: [{axes: {x: {afe: {input: tube}}}}]\n",
      "dir/s.yaml:1:34: units.a.axes.x.afe.input: expected current or voltage"},
-    {"units: [{count: 65}]\n", "dir/s.yaml:1:17: units.u%02u.count: expected 1 to 64, got 65"},
-    {"units: [{count: 60, node: 1}, {count: 5, name: v%u, node: 61, serial: 61}]\n",
-     "dir/s.yaml:1:31: units.v%u.count: expected up to 64 units in all, got more"},
+    {"units: [{count: 1001}]\n", "dir/s.yaml:1:17: units.u%02u.count: expected 1 to 1000, got 1001"},
+    {"units: [{count: 127, node: 2}]\n", "dir/s.yaml:1:28: units.u%02u.node: expected 1 to 127, got 128"},
+    {"buses: [{name: a}, {name: b}, {name: c}, {name: d}, {name: e}, {name: f}, {name: g}, {name: h}, {name: i}]\n",
+     "dir/s.yaml:1:97: buses: expected up to 8 buses, got more"},
     {"units: [{}\n", "dir/s.yaml:2:1: not YAML: "},
     {"a: b: c\n", "dir/s.yaml:1:5: not YAML: "},
     {"seed: \t\n\t- x", "dir/s.yaml:"},
@@ -287,9 +288,9 @@ static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 static void the_shipped_scenarios_and_profiles_load(void **state)
 {
     (void)state;
-    static const char *const scenarios[] = {"converters", "calibrate", "quiet",         "stream",
-                                            "fast",       "multi",     "brownout",      "chamber_sweep",
-                                            "faults",     "fleet64",   "six_positions", "table_rate"};
+    static const char *const scenarios[] = {"converters", "calibrate",     "quiet",         "stream", "fast",
+                                            "multi",      "brownout",      "chamber_sweep", "faults", "fleet64",
+                                            "fleet1000",  "six_positions", "table_rate"};
     static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16",  "lab32",
                                            "psa1",    "psd1",   "pmka",    "pik", "pik5", "pik6"};
     if (access("proto/scenarios", R_OK) != 0) skip();
@@ -308,14 +309,52 @@ static void the_shipped_scenarios_and_profiles_load(void **state)
     assert_int_equal(psa2_profile_period_ns(&s.units[0].profile.psa2), 250000);
 }
 
+/* Eight buses with as many as may be, and one more. */
+static void more_than_1000_units_are_refused(void **state)
+{
+    (void)state;
+    char text[2048];
+    size_t len = (size_t)snprintf(text, sizeof text, "buses: [");
+    for (int i = 0; i < 8; i++) len += (size_t)snprintf(text + len, sizeof text - len, "{name: b%d},", i);
+    len += (size_t)snprintf(text + len, sizeof text - len, "]\nunits:\n");
+    for (int i = 0; i < 8; i++)
+        len +=
+            (size_t)snprintf(text + len, sizeof text - len,
+                             "- {name: %c%%u, count: 125, bus: b%d, node: 1, serial: %d}\n", 'a' + i, i, 1 + 125 * i);
+    if (!scenario_parse("many.yaml", text, len, &s, why, sizeof why)) fail_msg("%s", why);
+    assert_int_equal(s.unit_count, 1000);
+    assert_string_equal(s.units[999].name, "h125");
+    assert_int_equal(s.units[999].cfg.node, 125);
+    assert_int_equal(s.units[999].cfg.board.serial, 1000);
+    assert_int_equal(s.units[999].bus, 7);
+    len += (size_t)snprintf(text + len, sizeof text - len, "- {name: i, bus: b0, node: 126, serial: 1001}\n");
+    assert_false(scenario_parse("many.yaml", text, len, &s, why, sizeof why));
+    assert_string_equal(why, "many.yaml:11:3: units.i.count: expected up to 1000 units in all, got more");
+}
+
+/* Those of another bus are in no one's way: who has no node there finds a free one, however many there are. */
+static void a_node_is_found_beyond_a_full_bus(void **state)
+{
+    (void)state;
+    static const char text[] = "buses: [{name: b0}, {name: b1}, {name: b2}]\n"
+                               "units:\n"
+                               "- {name: a%u, count: 127, bus: b0, node: 1}\n"
+                               "- {name: b%u, count: 127, bus: b1, node: 1, serial: 128}\n"
+                               "- {name: c, bus: b2, serial: 255}\n"
+                               "- {name: d, bus: b2, serial: 256}\n";
+    if (!scenario_parse("full.yaml", text, sizeof text - 1, &s, why, sizeof why)) fail_msg("%s", why);
+    assert_int_equal(s.units[254].cfg.node, 5);
+    assert_int_equal(s.units[255].cfg.node, 6);
+}
+
 static void a_missing_scenario_is_told_in_one_line(void **state)
 {
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
-    assert_string_equal(
-        why, "nope: expected a path or a name from proto/scenarios: "
-             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet64, gyrocompass, gyrocompass_ideal, "
-             "multi, quiet, six_positions, stream, table_rate");
+    assert_string_equal(why, "nope: expected a path or a name from proto/scenarios: "
+                             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
+                             "gyrocompass, gyrocompass_ideal, "
+                             "multi, quiet, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
@@ -352,6 +391,8 @@ int main(void)
         cmocka_unit_test(each_board_brings_its_defaults),
         cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
         cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
+        cmocka_unit_test(more_than_1000_units_are_refused),
+        cmocka_unit_test(a_node_is_found_beyond_a_full_bus),
         cmocka_unit_test(a_missing_scenario_is_told_in_one_line),
         cmocka_unit_test(a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count),
     };

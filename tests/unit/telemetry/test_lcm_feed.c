@@ -121,6 +121,27 @@ static void frames_of_another_length_or_node_are_no_samples(void **state)
     assert_int_equal(r.frames, 4);
 }
 
+static void a_sample_is_that_of_its_unit_among_a_thousand(void **state)
+{
+    enum { LAST = CONTROL_UNITS_MAX - 1 };
+    (void)state;
+    lcm_feed_stop(&r.feed);
+    for (unsigned i = 0; i < LAST; i++) {
+        r.view.unit[i] = &r.unit;
+        r.view.unit_name[i] = "b";
+        r.view.node[i] = NULL;
+    }
+    r.view.units = CONTROL_UNITS_MAX;
+    r.view.unit[LAST] = &r.unit;
+    r.view.unit_name[LAST] = "a";
+    r.view.node[LAST] = &r.place;
+    lcm_feed_start(&r.feed, &r.view, 0, 0);
+    put(XY, "\1\0\0\0\0\0\0\0", 8);
+    put(ZT, "\2\0\0\0\0\0\0\0", 8);
+    assert_int_equal(r.readings, 1);
+    assert_int_equal(r.z_code, 2);
+}
+
 /* ---- SDO: request and answer, 8 bytes each */
 
 static void numbers_have_as_many_bytes_as_the_command_says(void **state)
@@ -198,6 +219,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sample_is_published_when_both_halves_have_come_in_order),
+        cmocka_unit_test_setup(a_sample_is_that_of_its_unit_among_a_thousand, fresh),
         cmocka_unit_test_setup(frames_of_another_length_or_node_are_no_samples, fresh),
         cmocka_unit_test_setup(numbers_have_as_many_bytes_as_the_command_says, fresh),
         cmocka_unit_test_setup(an_answer_without_its_request_is_no_access, fresh),

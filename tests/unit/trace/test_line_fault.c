@@ -1,4 +1,5 @@
 /* Faults of lines: what a watcher sees of a trace whose filter bends some of it. */
+#include "base/rng.h"
 #include "trace/line_fault.h"
 
 #include "rig.h"

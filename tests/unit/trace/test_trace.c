@@ -1,6 +1,8 @@
 #include "rig.h"
 
 #include "base/rng.h"
+#include "trace/group.h"
+#include "trace/line_fault.h"
 #include "trace/trace.h"
 
 #include <string.h>
@@ -317,6 +319,83 @@ static void all_signals_are_delivered(void **state)
     assert_true(TRACE_FIRST(34) == UINT64_C(0x3FFFFFFFF) && TRACE_FIRST(1) == 1);
 }
 
+/* ---- many traces */
+
+static struct trace_group group;
+
+static int fresh_group(void **state)
+{
+    fresh(state);
+    group = (struct trace_group){0};
+    trace.group = &group;
+    return 0;
+}
+
+static void a_trace_without_sinks_sleeps_and_catches_up(void **state)
+{
+    (void)state;
+    trace_advance_group(&group, 5000);
+    trace_set(&trace, 1, true, 4000);
+    assert_int_equal(trace.done_ns, 0); /* not visited */
+    listen(&ear, 7);
+    assert_int_equal(trace.done_ns, 5000);
+    assert_heard(&ear, (const struct heard[]){{0, true, 5000}, {1, true, 5000}, {2, false, 5000}}, 3);
+    assert_int_equal(group.changes, 1);
+    trace_set(&trace, 2, true, 6000);
+    trace_advance_group(&group, 7000);
+    assert_int_equal(ear.count, 4);
+    assert_int_equal(ear.advanced_ns, 7000);
+    trace_detach(&trace, &ear.sink);
+    assert_int_equal(group.changes, 2);
+    trace_advance_group(&group, 8000);
+    trace_advance_group(&group, 9000);
+    assert_int_equal(trace.done_ns, 8000); /* asleep again */
+    assert_null(group.awake);
+    trace_wake(&trace);
+    assert_int_equal(trace.done_ns, 9000);
+}
+
+static void pending_steps_and_filters_keep_a_trace_awake(void **state)
+{
+    (void)state;
+    static struct line_faults faults;
+    trace_advance_group(&group, 1000);
+    trace_steps(&trace, &(struct trace_step){3000, 1, 0}, 1); /* without a sink */
+    assert_int_equal(trace.late, 0);
+    trace_advance_group(&group, 2000);
+    assert_int_equal(trace.level & 1, 1);
+    trace_advance_group(&group, 3000);
+    assert_int_equal(trace.level & 1, 0);
+    assert_null(group.awake);
+    trace_advance_group(&group, 4000);
+    line_faults_init(&faults, &trace);
+    const struct line_fault f = {.kind = LINE_STUCK_LOW, .line = 0, .from_ns = 4000, .until_ns = 6000};
+    assert_int_not_equal(line_fault_add(&faults, &f), 0);
+    assert_int_equal(faults.done_ns, 4000);
+    for (int64_t t_ns = 5000; t_ns <= 8000; t_ns += 1000) trace_advance_group(&group, t_ns);
+    assert_null(trace.filter); /* it has come to its end by itself */
+    assert_null(group.awake);
+}
+
+static int64_t report_nothing(void *ctx, int64_t t_ns)
+{
+    (void)ctx;
+    return t_ns;
+}
+
+static void a_source_that_reports_stays_awake_once_it_was(void **state)
+{
+    (void)state;
+    trace.source = (struct trace_source){.report = report_nothing};
+    trace_advance_group(&group, 1000);
+    assert_int_equal(trace.done_ns, 0);
+    listen(&ear, 1);
+    trace_detach(&trace, &ear.sink);
+    trace_advance_group(&group, 2000);
+    trace_advance_group(&group, 3000);
+    assert_int_equal(trace.done_ns, 3000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -331,6 +410,9 @@ int main(void)
         cmocka_unit_test_setup(late_steps_are_told_now, fresh),
         cmocka_unit_test_setup(a_long_run_fits, fresh),
         cmocka_unit_test_setup(random_reports_come_out_sorted, fresh),
+        cmocka_unit_test_setup(a_trace_without_sinks_sleeps_and_catches_up, fresh_group),
+        cmocka_unit_test_setup(pending_steps_and_filters_keep_a_trace_awake, fresh_group),
+        cmocka_unit_test_setup(a_source_that_reports_stays_awake_once_it_was, fresh_group),
         cmocka_unit_test(runs_are_what_their_steps_are),
         cmocka_unit_test(all_signals_are_delivered),
     };

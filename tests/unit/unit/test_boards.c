@@ -1,4 +1,5 @@
 /* Every type of board is complete, and lives on a unit through nothing but its table. */
+#include "lone_unit.h"
 #include "rig.h"
 
 #include "canopen/co_node.h"
@@ -216,6 +217,35 @@ static void digest(char hex[SHA256_HEX])
     sha256_init(&s);
     w.u.type->digest(w.u.board, &s);
     sha256_hex(&s, hex);
+}
+
+#define KEYS 15u /* chains, white and slow noise of MEMS, quartz, and a source of the board's */
+
+static void noise_keys(const struct board_type *t, uint32_t serial, uint64_t key[KEYS])
+{
+    memset(&w, 0, sizeof w);
+    lone_unit(&w.u, &w.lab, &w.s, t, serial);
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        static const char *const source[] = {"adc.x", "adc.y", "adc.z"};
+        key[i] = w.u.board->afe[i].noise.key;
+        key[3 + i] = w.u.mems[i].noise.key;
+        key[6 + i] = w.u.mems[i].slow.draws.key;
+        key[9 + i] = w.u.quartz[i].noise.key;
+        key[12 + i] = board_draws(w.u.board, source[i]).key;
+    }
+}
+
+/* Units that differ in nothing but their serial number, and their axes. */
+static void no_two_sources_share_their_noise(void **state)
+{
+    (void)state;
+    for (const struct board_type *const *t = board_types; *t; t++) {
+        uint64_t key[3 * KEYS];
+        for (unsigned i = 0; i < 3; i++) noise_keys(*t, i + 1, key + i * KEYS);
+        for (unsigned i = 0; i < 3 * KEYS; i++)
+            for (unsigned k = 0; k < i; k++)
+                if (key[i] == key[k]) fail_msg("%s: sources %u and %u", (*t)->name, k, i);
+    }
 }
 
 static void the_lines_are_those_of_the_table(void **state)
@@ -438,6 +468,7 @@ int main(void)
         cmocka_unit_test(the_default_profile_is_sound_and_the_file_that_it_names),
         cmocka_unit_test(a_dump_of_a_profile_is_a_profile_with_the_same_dump),
         cmocka_unit_test(a_name_takes_its_own_profiles),
+        cmocka_unit_test(no_two_sources_share_their_noise),
         cmocka_unit_test(the_lines_are_those_of_the_table),
         cmocka_unit_test(each_comes_up_tells_of_it_and_goes_down),
         cmocka_unit_test(the_digest_tells_states_apart_and_nothing_else),

@@ -125,6 +125,15 @@ class FrameReader:
         """Samples that `take` would return; fewer where it finds halves of two samples taken for one."""
         return len(self._first.data) * (5 if self._form is Form.BLOCK else 1)
 
+    def least(self, count: int) -> int:
+        """CAN frames that must come yet before `len` can be count; 1 until the first sample tells the form."""
+        if not self._first.data:
+            return 1
+        missing = count - len(self)
+        if self._form is Form.PAIR:
+            return 2 * missing - (self._xy is not None)
+        return -(-missing // 5) if self._form is Form.BLOCK else missing
+
     def forget(self) -> None:
         """Drop what has arrived and is not taken; the sequence starts again."""
         self._first, self._second, self._xy, self._seq, self._stamp = _Kept(), _Kept(), None, None, None

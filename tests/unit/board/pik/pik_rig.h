@@ -2,6 +2,7 @@
 #ifndef PSABENCH_TESTS_PIK_RIG_H
 #define PSABENCH_TESTS_PIK_RIG_H
 
+#include "looks.h"
 #include "rig.h"
 
 #include "base/detmath.h"
@@ -83,6 +84,8 @@ static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
     return rig_input_v(&r->input[axis], t_ns);
 }
 
+LOOKS_ROW(rig_accel_row, rig_accel);
+
 static inline double rig_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
     (void)t_ns;
@@ -151,7 +154,7 @@ static inline struct pik_profile rig_pik6(void)
 
 static inline void rig_init(struct rig *r, const struct pik_profile *p, uint32_t serial)
 {
-    const struct board_io io = {.ctx = r, .accel = rig_accel, .temp_degc = rig_degc, .event = rig_event};
+    const struct board_io io = {.ctx = r, .accel = rig_accel_row, .temp_degc = rig_degc, .event = rig_event};
     struct board_cfg cfg = {.adc_noise_scale = 1.0, .seed = 7, .serial = serial};
     char why[300];
     if (!pik_profile_check(p, why, sizeof why)) fail_msg("%s", why);

@@ -252,6 +252,32 @@ static void noise_walks(void **state)
     assert_true(fabs(rig_count(&r, 0) - 40000.0) <= 1.0);
 }
 
+/* After a power cycle it takes another way. */
+static void noise_does_not_repeat(void **state)
+{
+    (void)state;
+    enum { N = 3000 };
+    static double z[2][N];
+    struct pik_profile p = rig_pik6();
+    p.noise_v_rthz = 20e-3;
+    rig_init(&r, &p, 3);
+    for (unsigned life = 0; life < 2; life++) {
+        pik_power_up(&r.b, r.s.now_ns);
+        for (unsigned k = 0; k < N; k++) {
+            rig_run_until(&r, r.b.look.due_ns + 1);
+            z[life][k] = r.b.channel[1].noise_v / r.b.noise_v;
+        }
+        pik_power_down(&r.b, r.s.now_ns);
+    }
+    double sum = 0.0, squares = 0.0;
+    for (unsigned k = 0; k < N; k++) {
+        sum += z[0][k] * z[1][k];
+        squares += z[0][k] * z[0][k];
+    }
+    assert_true(fabs(squares / N - 1.0) < 4.0 * sqrt(2.0 / N));
+    assert_true(fabs(sum) < 5.0 * sqrt((double)N));
+}
+
 /* 1796 Hz, at 10.32 V, is the most; beyond it pulses are lost, and told: flag of the reading, counters, event, and the end of it. */
 static void saturation_is_counted_and_told(void **state)
 {
@@ -437,6 +463,7 @@ int main(void)
         cmocka_unit_test(counters_follow_the_specimen),
         cmocka_unit_test(dead_times),
         cmocka_unit_test(noise_walks),
+        cmocka_unit_test(noise_does_not_repeat),
         cmocka_unit_test(saturation_is_counted_and_told),
         cmocka_unit_test(clock_fault_changes_the_weight_of_a_pulse),
         cmocka_unit_test(a_clock_that_changes_often_loses_nothing),

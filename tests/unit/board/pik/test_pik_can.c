@@ -1,5 +1,6 @@
 /* A PIK as its unit and the bus see it: the type's table, and what goes over CAN. */
 #include "host_wire.h"
+#include "looks.h"
 
 #include "board/pik/board.h"
 #include "board/pik/internal.h"
@@ -27,6 +28,8 @@ static double accel(void *ctx, unsigned axis, int64_t t_ns)
     (void)t_ns;
     return ((struct rig *)ctx)->v[axis];
 }
+
+LOOKS_ROW(accel_row, accel);
 
 static double degc(void *ctx, unsigned channel, int64_t t_ns)
 {
@@ -65,7 +68,7 @@ static void rig_up(struct rig *rig, const char *key, const char *value)
     assert_true(pik_board.profile_check(&p, why, sizeof why));
     for (unsigned i = 0; i < PIK_AXES; i++) cfg.afe[i] = afe_nominal(AFE_VOLTAGE);
     pik_board.cfg_default(&cfg);
-    const struct board_io io = {.ctx = rig, .accel = accel, .temp_degc = degc};
+    const struct board_io io = {.ctx = rig, .accel = accel_row, .temp_degc = degc};
     sched_init(&rig->s);
     can_bus_init(&rig->bus, &(struct can_bus_cfg){1000000, 0}, &rig->s);
     rig->host = (struct can_node){.name = "host", .rx = on_rx, .ctx = rig};

@@ -2,6 +2,7 @@
 #ifndef PSABENCH_TESTS_PMKA_RIG_H
 #define PSABENCH_TESTS_PMKA_RIG_H
 
+#include "looks.h"
 #include "rig.h"
 
 #include "board/pmka/board.h"
@@ -61,6 +62,8 @@ static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
     return rig_volts(&r->input[axis], 1e-9 * (double)t_ns);
 }
 
+LOOKS_ROW(rig_accel_row, rig_accel);
+
 static inline double rig_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
     const struct rig *r = ctx;
@@ -112,7 +115,7 @@ static inline struct board_cfg rig_cfg(void)
 static inline void rig_init(struct rig *r, const struct pmka_profile *p)
 {
     const struct board_cfg cfg = rig_cfg();
-    const struct board_io io = {.ctx = r, .accel = rig_accel, .temp_degc = rig_degc, .event = rig_event};
+    const struct board_io io = {.ctx = r, .accel = rig_accel_row, .temp_degc = rig_degc, .event = rig_event};
     char why[300];
     if (!pmka_profile_check(p, why, sizeof why)) fail_msg("%s", why);
     memset(r, 0, sizeof *r);

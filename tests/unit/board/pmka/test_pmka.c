@@ -5,7 +5,7 @@
 
 #define LSB_VS 2.8686e-6 /* Sr / Nr of the printed parameters */
 
-static struct rig rig;
+static struct rig rig, quiet;
 
 static void near(double got, double want, double tol)
 {
@@ -81,6 +81,61 @@ static void constants_of_the_specimen_are_all_there_is(void **state)
     pmka_board.power_up(&rig.b.base, 0);
     rig_readings(&rig, 2002);
     compare(&rig, 0, 2000, 20.0);
+}
+
+/* Of the converter and of the thermometer, from reading to reading: what a board without it does not have. */
+static void noise_of_the_converters_is_white(void **state)
+{
+    (void)state;
+    enum { N = 3000 };
+    struct pmka_profile p = rig_ideal();
+    double square[2] = {0.0}, lag[2] = {0.0}, last[2] = {0.0};
+    rig_up(&quiet, &p);
+    p.adc_noise_lsb = 10.0;
+    p.temp_noise_k = 10.0 / 128.0;
+    rig_up(&rig, &p);
+    rig_readings(&quiet, N);
+    rig_readings(&rig, N);
+    for (unsigned k = 0; k < N; k++) {
+        const struct pmka_reading *noisy = &rig.reading[k], *still = &quiet.reading[k];
+        const double z[2] = {noisy->code[1] - still->code[1], noisy->temp_code - still->temp_code};
+        for (unsigned i = 0; i < 2; i++) {
+            square[i] += z[i] * z[i] / (100.0 * N);
+            lag[i] += z[i] * last[i] / (100.0 * N);
+            last[i] = z[i];
+        }
+    }
+    for (unsigned i = 0; i < 2; i++) {
+        near(square[i], 1.0, 4.0 * sqrt(2.0 / N));
+        near(lag[i], 0.0, 5.0 / sqrt(N));
+    }
+}
+
+/* Of a density d over an interval T: rms d sqrt(T / 2), as if the chain were integrated without nodes. */
+static void white_noise_has_its_integral(void **state)
+{
+    (void)state;
+    enum { N = 7000 };
+    const double density_v_rthz = 1e-4;
+    const struct pmka_profile p = rig_ideal();
+    double last_vs[3] = {0.0}, squares = 0.0;
+    int64_t last_ns[3] = {0};
+    rig_init(&rig, &p);
+    for (unsigned a = 0; a < 3; a++) rig.b.base.afe[a].cfg.noise_v_rthz = density_v_rthz;
+    pmka_board.power_up(&rig.b.base, 0);
+    rig_readings(&rig, 100);
+    for (unsigned k = 0; k <= N; k++) {
+        for (unsigned a = 0; a < 3; a++) {
+            const struct pmka_axis *axis = &rig.b.axis[a];
+            const double span_s = 1e-9 * (double)(axis->at_ns - last_ns[a]);
+            const double z = (axis->integral_vs - last_vs[a]) / (density_v_rthz * sqrt(span_s / 2.0));
+            if (k > 0) squares += z * z;
+            last_vs[a] = axis->integral_vs;
+            last_ns[a] = axis->at_ns;
+        }
+        rig_readings(&rig, 101 + k);
+    }
+    near(squares / (3.0 * N), 1.0, 4.0 * sqrt(2.0 / (3.0 * N)));
 }
 
 /* 10 V of either sign is a reset a period; the codes never come near the converter's end. */
@@ -245,6 +300,8 @@ int main(void)
         cmocka_unit_test(a_random_input_is_integrated_through_many_rotations),
         cmocka_unit_test(no_hand_over_costs_more_than_its_codes),
         cmocka_unit_test(constants_of_the_specimen_are_all_there_is),
+        cmocka_unit_test(noise_of_the_converters_is_white),
+        cmocka_unit_test(white_noise_has_its_integral),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

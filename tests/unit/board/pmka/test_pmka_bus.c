@@ -141,7 +141,7 @@ static void the_rom_has_the_factory_s_error(void **state)
             struct board_cfg cfg = rig_cfg();
             cfg.serial = n + 1;
             rig_init(&rig, &p);
-            const struct board_io io = {.ctx = &rig, .accel = rig_accel, .temp_degc = rig_degc, .event = rig_event};
+            const struct board_io io = {.ctx = &rig, .accel = rig_accel_row, .temp_degc = rig_degc, .event = rig_event};
             pmka_board.init(&rig.b.base, &p, &cfg, &io, &rig.s);
             for (unsigned i = 0; i < PMKA_INTS; i++) {
                 const double e = 1e6 * ct_error(i);

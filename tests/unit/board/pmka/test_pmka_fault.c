@@ -321,8 +321,8 @@ static void the_digest_sees_everything(void **state)
     SHOWS(b->rom[40] ^= 1, b->rom[40] ^= 1);
     SHOWS(b->base.faults ^= 4, b->base.faults ^= 4);
     SHOWS(b->bus.index++, b->bus.index--);
-    SHOWS(b->adc_noise.s[2]++, b->adc_noise.s[2]--);
-    SHOWS(b->temp_noise.s[0]++, b->temp_noise.s[0]--);
+    SHOWS(b->adc_noise.key++, b->adc_noise.key--);
+    SHOWS(b->temp_noise.key++, b->temp_noise.key--);
     SHOWS(b->counters.handovers++, b->counters.handovers--);
     SHOWS(b->latest.code[2]++, b->latest.code[2]--);
     SHOWS(b->adc_stuck = true, b->adc_stuck = false);
@@ -364,7 +364,7 @@ static void specimens(void **state)
     rig_init(&other, &p);
     assert_memory_equal(rig.b.rom, other.b.rom, sizeof rig.b.rom);
     struct board_cfg cfg = rig_cfg();
-    const struct board_io io = {.ctx = &other, .accel = rig_accel, .temp_degc = rig_degc};
+    const struct board_io io = {.ctx = &other, .accel = rig_accel_row, .temp_degc = rig_degc};
     cfg.serial++;
     pmka_board.init(&other.b.base, &p, &cfg, &io, &other.s);
     unsigned same = 0;

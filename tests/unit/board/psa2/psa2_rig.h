@@ -2,6 +2,7 @@
 #ifndef PSABENCH_TESTS_PSA2_RIG_H
 #define PSABENCH_TESTS_PSA2_RIG_H
 
+#include "looks.h"
 #include "psa2_profiles.h"
 
 #include "board/psa2/psa2.h"
@@ -46,6 +47,8 @@ static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
     return ((struct rig *)ctx)->volts[axis];
 }
 
+LOOKS_ROW(rig_accel_row, rig_accel);
+
 static inline double rig_degc(void *ctx, unsigned channel, int64_t t_ns)
 {
     (void)t_ns;
@@ -87,7 +90,7 @@ static inline struct board_cfg rig_unit(double noise_scale)
 /* Off; rig_power() or psa2_power_up() switches it on. */
 static inline void rig_init(struct rig *r, const struct psa2_profile *p, double noise_scale)
 {
-    const struct board_io io = {.ctx = r, .accel = rig_accel, .temp_degc = rig_degc};
+    const struct board_io io = {.ctx = r, .accel = rig_accel_row, .temp_degc = rig_degc};
     const struct board_cfg u = rig_unit(noise_scale);
     char why[300];
     if (!psa2_profile_check(p, why, sizeof why)) fail_msg("%s", why);

@@ -243,7 +243,7 @@ static struct rig *real_up(void)
     lab_cfg.head.turn_s = 1.0;
     lab_init(&lab, &lab_cfg, 1);
     unit_init(&real, &cfg, &lab, &r->s);
-    real.store.psa2.host = (struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault};
+    real.store.psa2.host = (struct psa2_host){.ctx = &r->can, .frame = psa2_can_frame, .fault = psa2_can_fault};
     psa2_power_up(&real.store.psa2, 0);
     board_node_power_up(&r->can, 0);
     return r;

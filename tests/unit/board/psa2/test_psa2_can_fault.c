@@ -1,5 +1,6 @@
 /* A unit whose CAN controller or power fails, as a host on the bus sees it. */
-#include "base/can_fault.h"
+#include "base/can/fault.h"
+#include "base/rng.h"
 #include "board/psa2/board.h"
 #include "unit/unit.h"
 
@@ -67,7 +68,7 @@ static struct bench *up(void)
     const struct psa2_can_port port = psa2_can_port(&r->unit.store.psa2);
     psa2_can_init(&r->can, &(struct board_can_cfg){.name = "a", .type = &psa2_board, .node_id = NODE}, &port, &r->bus,
                   &r->s);
-    r->unit.store.psa2.host = (struct psa2_host){&r->can, psa2_can_frame, psa2_can_fault};
+    r->unit.store.psa2.host = (struct psa2_host){.ctx = &r->can, .frame = psa2_can_frame, .fault = psa2_can_fault};
     r->host = (struct can_node){.name = "host", .rx = on_any, .error = on_any, .ctx = r};
     can_attach(&r->bus, &r->host);
     psa2_power_up(&r->unit.store.psa2, 0);

@@ -1,4 +1,5 @@
 /* Events of the board, power that fails in the middle of things, and a controller that does its work wrong. */
+#include "base/rng.h"
 #include "board/psa2/event.h"
 #include "psa2_rig.h"
 

@@ -2,6 +2,7 @@
 #ifndef PSABENCH_TESTS_PSD1_RIG_H
 #define PSABENCH_TESTS_PSD1_RIG_H
 
+#include "looks.h"
 #include "rig.h"
 
 #include "board/board.h"
@@ -47,6 +48,8 @@ static inline double rig_accel(void *ctx, unsigned axis, int64_t t_ns)
     (void)t_ns;
     return ((struct rig *)ctx)->volts[axis];
 }
+
+LOOKS_ROW(rig_accel_row, rig_accel);
 
 static inline double rig_supply_ratio(void *ctx, int64_t t_ns)
 {
@@ -135,7 +138,7 @@ static inline struct psd1_profile rig_exact(void)
 static inline void rig_init(struct rig *r, const struct psd1_profile *p, double noise_scale)
 {
     const struct board_io io = {.ctx = r,
-                                .accel = rig_accel,
+                                .accel = rig_accel_row,
                                 .temp_degc = rig_degc,
                                 .rate_radps = rig_rate,
                                 .supply_ratio = rig_supply_ratio,

@@ -319,6 +319,39 @@ static void abrupt_changes_of_the_rate_are_kept(void **state)
     assert_true(fabs(c->gyro[1] - angle_rad * 180.0 / 3.14159265358979 * 3600.0) < 1.01);
 }
 
+/* 1 deg/sqrt(h) in steps of eight points; after a power cycle it takes another way. */
+static void the_walk_has_its_density_and_does_not_repeat(void **state)
+{
+    (void)state;
+    enum { N = 1000 };
+    static double step_rad[2][3 * N];
+    struct psd1_profile p = rig_exact();
+    p.gyro_arw_deg_rth = 1.0;
+    const int64_t step_ns = 8 * (int64_t)p.gyro_grid_ns;
+    const double rms_rad = 3.14159265358979 / 180.0 * sqrt(1e-9 * (double)step_ns / 3600.0);
+    rig_init(&rig, &p, 1.0);
+    for (unsigned life = 0; life < 2; life++) {
+        double last_rad[3] = {0.0}, squares = 0.0;
+        const int64_t from_ns = rig.s.now_ns;
+        psd1_power_up(&rig.b, from_ns);
+        for (unsigned k = 0; k < N; k++) {
+            rig_until(&rig, from_ns + (k + 1) * step_ns);
+            psd1_sample_until(&rig.b, rig.s.now_ns);
+            for (unsigned i = 0; i < 3; i++) {
+                const double angle_rad = rig.b.gyros.axis[i].angle_rad;
+                step_rad[life][3 * k + i] = (angle_rad - last_rad[i]) / rms_rad;
+                squares += pow(step_rad[life][3 * k + i], 2.0);
+                last_rad[i] = angle_rad;
+            }
+        }
+        assert_true(fabs(squares / (3.0 * N) - 1.0) < 4.0 * sqrt(2.0 / (3.0 * N)));
+        psd1_power_down(&rig.b, rig.s.now_ns);
+    }
+    double sum = 0.0;
+    for (unsigned k = 0; k < 3 * N; k++) sum += step_rad[0][k] * step_rad[1][k];
+    assert_true(fabs(sum) < 5.0 * sqrt(3.0 * N));
+}
+
 static void specimens_differ_and_seeds_repeat(void **state)
 {
     (void)state;
@@ -357,6 +390,7 @@ int main(void)
         cmocka_unit_test(the_supply_is_told_as_it_is),
         cmocka_unit_test(gyros_count_what_they_turn),
         cmocka_unit_test(abrupt_changes_of_the_rate_are_kept),
+        cmocka_unit_test(the_walk_has_its_density_and_does_not_repeat),
         cmocka_unit_test(specimens_differ_and_seeds_repeat),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

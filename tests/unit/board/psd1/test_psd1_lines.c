@@ -1,4 +1,5 @@
 /* What a logic analyser sees on the lines of a PSD-1: the cycle of sources 4.5, row by row; and that looking changes nothing. */
+#include "base/rng.h"
 #include "psd1_rig.h"
 
 static struct rig rig, other;

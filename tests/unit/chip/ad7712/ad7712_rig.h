@@ -75,7 +75,7 @@ static inline void power_up_seeded(struct rig *r, const struct ad7712_cfg *cfg, 
     sched_init(&r->s);
     const struct ad7712_io io = {
         .ctx = r, .vin_v = vin_v, .source_ohm = source_ohm, .drdy = on_drdy, .sdata = on_sdata, .sclk = on_sclk};
-    ad7712_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc.x"));
+    ad7712_init(&r->a, cfg, &io, &r->s, draws_of(seed, 1, "adc.x"));
     ad7712_power_up(&r->a, 0);
 }
 

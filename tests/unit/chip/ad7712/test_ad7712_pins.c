@@ -1,5 +1,6 @@
 /* A word at once against its edges: the same bits, counters, levels and instants, in frames of all kinds and timings. */
 #include "ad7712_rig.h"
+#include "base/rng.h"
 
 struct frame {
     bool write, level;

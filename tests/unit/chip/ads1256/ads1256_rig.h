@@ -47,7 +47,7 @@ static inline void power_up_io(struct rig *r, const struct ads1256_cfg *cfg, str
     memset(r, 0, sizeof *r);
     sched_init(&r->s);
     io.ctx = r;
-    ads1256_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc.t"));
+    ads1256_init(&r->a, cfg, &io, &r->s, draws_of(seed, 1, "adc.t"));
     ads1256_power_up(&r->a, 0);
     ads1256_cs_pin(&r->a, false, 0);
 }

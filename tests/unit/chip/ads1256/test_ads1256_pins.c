@@ -1,5 +1,6 @@
 /* Edges of SCLK, DIN and DOUT of the ADS1256 (sources 2.4): limits, high impedance, the reset pattern, pins against bytes. */
 #include "ads1256_pins_rig.h"
+#include "base/rng.h"
 
 static void up(struct rig *r, const struct ads1256_cfg *cfg)
 {

@@ -1,5 +1,6 @@
 /* Reading the ADS1256: DRDY, RDATA, RDATAC, gaps and bits (sources 2.4, 2.5). */
 #include "ads1256_rig.h"
+#include "base/rng.h"
 
 static void data_read_inside_t6_is_garbled_when_strict(void **state)
 {

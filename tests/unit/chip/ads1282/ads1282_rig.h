@@ -80,7 +80,7 @@ static inline void wired(struct rig *r, const struct ads1282_cfg *cfg, uint64_t 
     io.ctx = r;
     io.vin_v = input;
     io.drdy = drdy;
-    ads1282_init(&r->a, cfg, &io, &r->s, rng_stream(seed, 1, "adc"));
+    ads1282_init(&r->a, cfg, &io, &r->s, draws_of(seed, 1, "adc"));
 }
 
 static inline void unpowered(struct rig *r, const struct ads1282_cfg *cfg, uint64_t seed)

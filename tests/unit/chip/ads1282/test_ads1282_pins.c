@@ -1,5 +1,6 @@
 /* ADS1281/ADS1282 driven edge by edge: SCLK, DIN, DOUT, the limits of their timing, bytes against pins (sources 1.1, 1.4). */
 #include "ads1282_rig.h"
+#include "base/rng.h"
 
 /* ---- The same chip, however it is driven ---- */
 

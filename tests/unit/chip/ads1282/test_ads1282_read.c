@@ -1,5 +1,6 @@
 /* ADS1281/ADS1282: DRDY, reading in both modes, tears, a slipped clock (sources 1.4, 1.5). */
 #include "ads1282_rig.h"
+#include "base/rng.h"
 
 static void drdy_is_high_while_settling(void **state)
 {

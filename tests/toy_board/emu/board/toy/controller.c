@@ -18,8 +18,11 @@ const char *const toy_events[TOY_EVENTS] = {"RES", "SAMPLE", "POWER_DOWN", "POWE
 
 static double input_v(struct toy *b, unsigned axis, int64_t t_ns)
 {
-    const double signal = b->base.io.accel(b->base.io.ctx, axis, t_ns);
-    return afe_out_v(&b->base.afe[axis], signal, b->base.io.temp_degc(b->base.io.ctx, BOARD_SENSOR, t_ns), t_ns);
+    double v;
+    const struct looks at = {&t_ns, 1, toy_period_ns(&b->profile)};
+    b->base.io.accel(b->base.io.ctx, axis, &at, &v);
+    afe_out_row_v(&b->base.afe[axis], &v, b->base.io.temp_degc(b->base.io.ctx, BOARD_SENSOR, t_ns), &at);
+    return v;
 }
 
 static int16_t convert_input(struct toy *b, double volts, bool *clipped)

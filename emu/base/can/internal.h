@@ -2,7 +2,7 @@
 #ifndef PSABENCH_BASE_CAN_INTERNAL_H
 #define PSABENCH_BASE_CAN_INTERNAL_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 /* Fault injection (can_fault.c). */
 struct can_tap {

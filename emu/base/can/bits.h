@@ -4,10 +4,10 @@
  * stuff count): dynamic stuffing up to the last data bit, then fixed stuff bits, whose number does not depend on content.
  * A bit rate switch is counted at the boundary of bits: BRS and the CRC delimiter are whole nominal bits, where silicon
  * switches at their sample points (0.8 us less at 1/5 Mbit/s with samples at 80 %). Pure. */
-#ifndef PSABENCH_BASE_CANBITS_H
-#define PSABENCH_BASE_CANBITS_H
+#ifndef PSABENCH_BASE_CAN_BITS_H
+#define PSABENCH_BASE_CAN_BITS_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #include <stdint.h>
 

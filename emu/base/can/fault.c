@@ -1,6 +1,6 @@
-#include "base/can_fault.h"
+#include "base/can/fault.h"
 
-#include "base/can_internal.h"
+#include "base/can/internal.h"
 
 #include <assert.h>
 

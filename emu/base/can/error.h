@@ -1,4 +1,4 @@
-/* Error confinement of a CAN bus: error counters, states of controllers, bus-off and recovery. See base/can.h.
+/* Error confinement of a CAN bus: error counters, states of controllers, bus-off and recovery. See base/can/can.h.
  *
  * ISO 11898-1 (2015), 12.1: a destroyed frame adds 8 to its sender's TEC and 1 to the REC of each receiver, a frame that
  * passes takes 1 from all. At 96 a node is in error warning, above 127 it is error-passive and suspends transmission for 8 bits after its own frames,

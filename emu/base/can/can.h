@@ -2,15 +2,15 @@
  *
  * A board, a recorder and every client of an adapter is a node. A bus with a bit rate serves one frame at a time: among
  * the nodes that have something to send, the lowest identifier wins (classic arbitration), the frame takes its exact
- * number of bits including stuffing (canbits.h), and at the end of frame every other node receives it; the interframe
+ * number of bits including stuffing (base/can/bits.h), and at the end of frame every other node receives it; the interframe
  * space follows. Frames sent at one instant all take part in the arbitration of that instant. A bus whose bit rate is 0
  * is ideal: frames pass at once in the order of sending, each in its own event, so that a receiver that answers does
  * not recurse. Nodes are owned by their owners and linked in; nothing allocates. The wire itself has no errors: they are
  * injected (can_fault.h) and confined by can_error.h; a frame without receivers passes. */
-#ifndef PSABENCH_BASE_CAN_H
-#define PSABENCH_BASE_CAN_H
+#ifndef PSABENCH_BASE_CAN_CAN_H
+#define PSABENCH_BASE_CAN_CAN_H
 
-#include "base/can_error.h"
+#include "base/can/error.h"
 #include "base/sched.h"
 
 #include <stdbool.h>

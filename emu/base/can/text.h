@@ -3,7 +3,7 @@
 #ifndef PSABENCH_BASE_CAN_TEXT_H
 #define PSABENCH_BASE_CAN_TEXT_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 
 #define CAN_TEXT_MAX 144u /* 8 + 3 + 128 digits, NUL and room */
 

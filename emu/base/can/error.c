@@ -1,6 +1,6 @@
-#include "base/can_error.h"
+#include "base/can/error.h"
 
-#include "base/can_internal.h"
+#include "base/can/internal.h"
 
 #include <string.h>
 

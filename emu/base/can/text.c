@@ -1,4 +1,4 @@
-#include "base/can_text.h"
+#include "base/can/text.h"
 
 #include "base/hex.h"
 

@@ -1,4 +1,4 @@
-#include "base/canbits.h"
+#include "base/can/bits.h"
 
 enum {
     STUFF_RUN = 5,      /* so many equal bits are followed by a bit of the other level */

@@ -1,11 +1,11 @@
-/* Fault injection into a CAN bus (base/can.h): frames lost, doubled, late, out of order, altered, destroyed.
+/* Fault injection into a CAN bus (base/can/can.h): frames lost, doubled, late, out of order, altered, destroyed.
  *
  * A destroyed frame (ERROR) is an error on the wire, with all that error confinement makes of it (can_error.h). The other
  * kinds are faults of links and gateways: the sender believes that its frame has arrived. */
 #ifndef PSABENCH_BASE_CAN_FAULT_H
 #define PSABENCH_BASE_CAN_FAULT_H
 
-#include "base/can.h"
+#include "base/can/can.h"
 #include "base/rng.h"
 
 enum can_fault_kind {

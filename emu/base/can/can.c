@@ -1,7 +1,7 @@
-#include "base/can.h"
+#include "base/can/can.h"
 
-#include "base/can_internal.h"
-#include "base/canbits.h"
+#include "base/can/bits.h"
+#include "base/can/internal.h"
 
 #include <assert.h>
 #include <string.h>
@@ -14,7 +14,7 @@ static void end_phase(void *ctx, int64_t t_ns);
 void can_bus_init(struct can_bus *b, const struct can_bus_cfg *cfg, struct sched *s)
 {
     *b = (struct can_bus){.cfg = *cfg, .sched = s, .phase = CAN_IDLE};
-    sched_ev(&b->step, end_phase, b);
+    sched_ev_inner(&b->step, end_phase, b); /* who answers a frame does not sleep while the bus is busy */
 }
 
 void can_attach(struct can_bus *b, struct can_node *n)

@@ -1,0 +1,62 @@
+#include "base/draws.h"
+
+#include "base/rng.h"
+
+#include <stdbool.h>
+
+#define ROUNDS     7u
+#define MULTIPLIER UINT64_C(0xD2B74407B1CE6E93)
+#define WEYL       UINT64_C(0x9E3779B97F4A7C15)
+
+__extension__ typedef unsigned __int128 product;
+
+struct draws draws_of(uint64_t seed, uint64_t unit, const char *source)
+{
+    struct rng r = rng_stream(seed, unit, source);
+    const uint64_t key = rng_u64(&r);
+    return (struct draws){key, rng_u64(&r)};
+}
+
+static inline struct draws_pair philox_block(uint64_t low, uint64_t high, uint64_t key, unsigned rounds)
+{
+#pragma GCC unroll 7
+    for (unsigned i = 0; i < rounds; i++, key += WEYL) {
+        const product p = (product)low * MULTIPLIER;
+        low = (uint64_t)(p >> 64) ^ key ^ high;
+        high = (uint64_t)p;
+    }
+    return (struct draws_pair){low, high};
+}
+
+struct draws_pair draws_philox(uint64_t low, uint64_t high, uint64_t key, unsigned rounds)
+{
+    return philox_block(low, high, key, rounds);
+}
+
+static inline struct draws_pair block_at(const struct draws *d, uint64_t pair)
+{
+    return philox_block(pair, d->high, d->key, ROUNDS);
+}
+
+uint64_t draws_u64(const struct draws *d, int64_t n)
+{
+    const struct draws_pair p = block_at(d, (uint64_t)n >> 1);
+    return n & 1 ? p.odd : p.even;
+}
+
+double draws_gauss(const struct draws *d, int64_t n)
+{
+    return rng_normal(draws_u64(d, n));
+}
+
+void draws_row(const struct draws *d, int64_t first, unsigned n, uint64_t *out)
+{
+    unsigned i = 0;
+    if (n > 0 && (first & 1)) out[i++] = draws_u64(d, first);
+    for (; i + 1 < n; i += 2) {
+        const struct draws_pair p = block_at(d, (uint64_t)(first + i) >> 1);
+        out[i] = p.even;
+        out[i + 1] = p.odd;
+    }
+    if (i < n) out[i] = draws_u64(d, first + i);
+}

@@ -1,0 +1,195 @@
+/* Frames that no one looks at.
+ *
+ * At the end of a frame it is known when someone may look next (sched_look_ns()). If that is far, the board falls asleep: its
+ * accelerometer converters take no samples. Asleep, it skips all frames up to what it does next by itself, the temperature
+ * scan or a time-out; the frames around that run as always, but for their codes. Before the look it wakes up: the filters are
+ * filled with the samples that they would still hold, and two frames later everything is, to the bit, as if each had been
+ * computed. What may not be put off is in psa2_why_eager(); time itself is never approximated. */
+#include "board/psa2/internal.h"
+
+#define WAKE_FRAMES  4  /* from the frame in which it wakes up to the look, and the one under way */
+#define VALID_FRAMES 2  /* from there until the latest frame, registers and lines are true */
+#define SLEEP_MIN    80 /* frames; waking up costs as much as 66; and from one question whether it may to the next */
+
+/* Drifts are bounded for so long; then the board wakes up as if someone looked. */
+#define BOUND_NS (INT64_C(86400) * NS_PER_S)
+
+static int64_t period_ns(const struct psa2 *b)
+{
+    return ads1282_period_ns(&b->adc[0]);
+}
+
+/* ---- whether ---- */
+
+/* Three converters that do the same at the same instants. */
+static bool in_step(const struct psa2 *b)
+{
+    const struct ads1282 *x = &b->adc[0];
+    for (unsigned i = 0; i < 3; i++) {
+        const struct ads1282 *a = &b->adc[i];
+        if (!ads1282_rests(a) || a->due.due_ns != x->due.due_ns || a->period != x->period ||
+            a->sync_count != x->sync_count)
+            return false;
+    }
+    return true;
+}
+
+/* Nothing is under way but the wait for the next data-ready, and the frame that has just ended was one of many. */
+static bool is_steady(const struct psa2 *b)
+{
+    const struct psa2_sample *s = &b->sample;
+    const bool port_free = !psa2_spi_busy(b) && !b->pulse.busy && !b->request;
+    const bool scan_waits = b->profile.temp_channels == 0 || (b->temp.stage == PSA2_SCAN_WAIT && !b->temp.hold);
+    return b->mode == PSA2_RUN && port_free && scan_waits && !s->due && !s->reading && !s->overrun &&
+           s->unsettled == 0 && !b->out.busy && b->timeout.queued && in_step(b);
+}
+
+/* From data-ready to the end of a frame at most, whatever edges of the serial clocks it meets; that has just ended at t_ns. */
+static int64_t span_ns(const struct psa2 *b, int64_t t_ns)
+{
+    return t_ns - b->drd_a_ns + 2 * NS_PER_S / b->profile.sclk_hz + 4 * b->out.one.ns + 10;
+}
+
+static bool is_watched(const struct psa2 *b)
+{
+    return b->base.observed || b->base.trace.watched || b->base.trace.filter ||
+           (b->host.frame && !(b->host.ignores && b->host.ignores(b->host.ctx)));
+}
+
+const char *psa2_why_eager(struct psa2 *b, int64_t t_ns)
+{
+    const int64_t every_ns = b->adc[0].step.ns;
+    const char *why = NULL;
+    if (b->mode != PSA2_RUN) return "the controller has not set it up yet";
+    if (!b->base.io.accel_range) return "nothing is known of its sensors";
+    if (!b->profile.gate_sclk) return "bursts for the temperature converter reach the others";
+    if (b->base.faults) return "its controller has a fault";
+    for (unsigned i = 0; !why && i < 3; i++) {
+        const struct afe *afe = &b->base.afe[i];
+        const struct looks_range out = b->base.io.accel_range(b->base.io.ctx, i, every_ns, t_ns + BOUND_NS, &why);
+        if (!why) why = ads1282_why_eager(&b->adc[i], afe_range_v(afe, out, every_ns));
+        if (!why && !afe_forgets(afe, every_ns)) why = "the filter of an analog channel remembers long, or has a fault";
+    }
+    return why;
+}
+
+/* ---- asleep ---- */
+
+static void fall_asleep(struct psa2 *b, int64_t t_ns)
+{
+    for (unsigned i = 0; i < 3; i++) ads1282_put_off(&b->adc[i]);
+    b->lazy.sleep = PSA2_ASLEEP;
+    b->lazy.span_ns = span_ns(b, t_ns);
+    b->lazy.temp_ns = 0;
+    b->base.sched->asleep++;
+}
+
+static int64_t earlier_ns(int64_t at_ns, const struct sched_ev *e)
+{
+    return e->queued && e->due_ns < at_ns ? e->due_ns : at_ns;
+}
+
+/* What the board does next but for reading accelerometers. */
+static int64_t next_own_ns(const struct psa2 *b)
+{
+    int64_t at_ns = b->timeout.due_ns;
+    at_ns = earlier_ns(at_ns, &b->temp.timeout);
+    at_ns = earlier_ns(at_ns, &b->tadc.ready_ev);
+    return earlier_ns(at_ns, &b->tadc.cal_ev);
+}
+
+/* All frames that are over before an instant. */
+static void skip_frames(struct psa2 *b, int64_t before_ns)
+{
+    const struct ads1282 *x = &b->adc[0];
+    const int64_t n = (before_ns - b->lazy.span_ns - b->drd_a_ns) / (period_ns(b) + 1);
+    if (n <= 0) return;
+    for (unsigned i = 0; i < 3; i++) ads1282_skip(&b->adc[i], (uint32_t)n);
+    b->timeout_ns += x->ended.t_ns - b->drd_a_ns;
+    b->drd_a_ns = x->ended.t_ns;
+    b->seq += (uint32_t)n;
+    b->counters.frames += (uint32_t)n;
+}
+
+/* ---- awake again ---- */
+
+/* Converter X falls first, and with it the board's temperature is read: its samples know that of the period before. */
+static void fill_filters(struct psa2 *b)
+{
+    void *const ctx = b->base.io.ctx;
+    int64_t from = 0, before_ns;
+    for (unsigned i = 0; i < 3; i++) {
+        from = ads1282_resume(&b->adc[i], &before_ns);
+        afe_skip(&b->base.afe[i], before_ns);
+    }
+    for (int64_t p = from; p < b->adc[0].period; p++) {
+        const int64_t end_ns = ads1282_end_ns(&b->adc[0], p);
+        b->board_degc = b->base.io.temp_degc(ctx, 3, ads1282_end_ns(&b->adc[0], p - 1));
+        ads1282_sample_until(&b->adc[0], end_ns);
+        b->board_degc = b->base.io.temp_degc(ctx, 3, end_ns);
+        ads1282_sample_until(&b->adc[1], end_ns);
+        ads1282_sample_until(&b->adc[2], end_ns);
+    }
+}
+
+static void wake_up(struct psa2 *b)
+{
+    fill_filters(b);
+    b->lazy.sleep = PSA2_WAKING;
+    b->lazy.left = VALID_FRAMES;
+}
+
+static void end_waking(struct psa2 *b)
+{
+    if (--b->lazy.left > 0) return;
+    b->lazy.sleep = PSA2_AWAKE;
+    b->base.sched->asleep--;
+}
+
+/* ---- */
+
+/* Latest instant at which it may begin to wake up, for the next look. */
+static int64_t wake_ns(const struct psa2 *b)
+{
+    const int64_t look_ns = sched_look_ns(b->base.sched);
+    return (look_ns < b->lazy.bound_ns ? look_ns : b->lazy.bound_ns) - WAKE_FRAMES * period_ns(b);
+}
+
+/* Later, where temperature conversions have been skipped beyond: an unexpected look. */
+static int64_t not_before_temp_ns(const struct psa2 *b, int64_t t_ns)
+{
+    return t_ns > b->lazy.temp_ns ? t_ns : b->lazy.temp_ns;
+}
+
+static void look_for_sleep(struct psa2 *b, int64_t t_ns)
+{
+    if (t_ns < b->lazy.ask_ns || is_watched(b) || !is_steady(b) || span_ns(b, t_ns) >= period_ns(b)) return;
+    const int64_t least_ns = t_ns + SLEEP_MIN * period_ns(b);
+    b->lazy.bound_ns = t_ns + BOUND_NS;
+    if (wake_ns(b) < least_ns) return;
+    if (psa2_why_eager(b, t_ns)) b->lazy.ask_ns = least_ns;
+    else fall_asleep(b, t_ns);
+}
+
+void psa2_lazy_sleep(struct psa2 *b)
+{
+    if (b->lazy.sleep != PSA2_ASLEEP || !is_steady(b)) return;
+    const int64_t look_ns = wake_ns(b);
+    psa2_temp_skip(b, look_ns);
+    const int64_t own_ns = next_own_ns(b), until_ns = not_before_temp_ns(b, look_ns);
+    skip_frames(b, own_ns < until_ns ? own_ns : until_ns);
+}
+
+void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)
+{
+    if (b->lazy.sleep == PSA2_WAKING) end_waking(b);
+    else if (b->lazy.sleep == PSA2_AWAKE) look_for_sleep(b, t_ns);
+    else if (t_ns >= not_before_temp_ns(b, wake_ns(b))) wake_up(b);
+    psa2_lazy_sleep(b);
+}
+
+void psa2_lazy_stop(struct psa2 *b)
+{
+    b->base.sched->asleep -= b->lazy.sleep != PSA2_AWAKE;
+    b->lazy = (struct psa2_lazy){.sleep = PSA2_AWAKE};
+}

@@ -1,0 +1,14 @@
+/* A few lives, lazy and eager. */
+#include "lazy_lives.h"
+
+static void lazy_is_eager_to_the_byte(void **state)
+{
+    (void)state;
+    live_lives(40u);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lazy_is_eager_to_the_byte)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
