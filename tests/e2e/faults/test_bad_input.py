@@ -55,9 +55,13 @@ UNIT = "units: [{name: a, node: 5, axes: {x: {sensor: mems}}}]\n"
             "node: expected a node of its own, got 5, which unit a has",
         ),
         (
-            "65 units",
-            "units: [" + ", ".join(f"{{name: u{k}, node: {k + 1}}}" for k in range(65)) + "]",
-            "expected up to 64 units",
+            "1001 units",
+            "buses: ["
+            + ", ".join(f"{{name: can{k}}}" for k in range(8))
+            + "]\nunits: ["
+            + ", ".join(f"{{name: u{k}, bus: can{k // 127}, node: {k % 127 + 1}}}" for k in range(1001))
+            + "]",
+            "expected up to 1000 units",
         ),
         (
             "bit rate",
@@ -65,7 +69,7 @@ UNIT = "units: [{name: a, node: 5, axes: {x: {sensor: mems}}}]\n"
             "expected 10000 or more, or 0 (frames take no time), got 9999",
         ),
         ("deep", "units: " + "[" * 2000, "{file}:"),
-        ("long", "# " + "x" * (4 << 20) + "\n" + UNIT, "longer than 4194304 bytes"),
+        ("long", "# " + "x" * (16 << 20) + "\n" + UNIT, "longer than 16777216 bytes"),
     ],
 )
 def test_a_malformed_scenario_is_refused_with_file_and_line(tmp_path: Path, what: str, text: str, says: str) -> None:

@@ -153,10 +153,10 @@ def test_two_hundred_runs_and_a_thousand_have_the_distribution_of_the_algebra(tm
             p = stats.ks_2samp(rows[:count, column], closed[:, column]).pvalue
             print(f"{count} runs, {name}: KS p {p:.3f}")
             assert p > chains.KS_P, f"{name} of {count} runs"
-    # The comparison can fail: with a tenth of a degree of zero, or half the error again, it does.
+    # The comparison can fail: with a tenth of a degree of zero (200 runs show it), or half the error again, it does.
     case = WIRE["article"]
     assert page.agree(case, "emulated", rows[:RUNS] + np.float32(0.1), closed).p < chains.KS_P
-    assert page.agree(case, "emulated", rows[:RUNS] * np.float32(1.6), closed).p < chains.KS_P
+    assert page.agree(case, "emulated", rows * np.float32(1.5), closed).p < chains.KS_P
 
 
 # ---- what is refused, and what fails
