@@ -27,7 +27,7 @@ static void describe_vcd(struct service *s, char stored[STORED_MAX])
     const ssize_t n = size ? pread(fd, tail, (size_t)(size - from), from) : 0;
     tail[n > 0 ? n : 0] = '\0';
     const char *time = strrchr(tail, '#');
-    const double t_s = time ? (double)strtoll(time + 1, NULL, 10) * (double)s->bench->vcd.unit_ns * 1e-9 : 0.0;
+    const double t_s = time ? (double)strtoll(time + 1, NULL, 10) * (double)s->bench->vcd.chunk.unit_ns * 1e-9 : 0.0;
     snprintf(stored, STORED_MAX, "stored %lld bytes, edges before %.9f s", (long long)size, t_s);
 }
 

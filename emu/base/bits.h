@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 /* Value of the low `bits` (1..32) of v as two's complement. */
 static inline int32_t bits_sign_extend(uint32_t v, unsigned bits)
@@ -48,6 +49,16 @@ static inline unsigned bits_log2(unsigned power_of_two)
 static inline void bits_put_le(uint8_t *p, uint64_t v, size_t n)
 {
     for (size_t i = 0; i < n; i++) p[i] = (uint8_t)(v >> (8 * i));
+}
+
+/* The same of 8 bytes; one store where a compiler finds none in the loop. */
+static inline void bits_put_le64(void *to, uint64_t v)
+{
+#if defined __BYTE_ORDER__ && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+    memcpy(to, &v, 8);
+#else
+    bits_put_le((uint8_t *)to, v, 8);
+#endif
 }
 
 static inline uint64_t bits_get_le(const uint8_t *p, size_t n)

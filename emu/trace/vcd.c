@@ -1,10 +1,16 @@
 #include "trace/vcd.h"
 
+#include "base/bits.h"
+
 #include <errno.h>
 #include <string.h>
 
-#define STEP_MAX_LEN (sizeof((struct vcd *)0)->prefix + 5u + 3u * TRACE_SIGNALS_MAX) /* time; level, code, newline */
-#define CHUNK        10000 /* units: the digits above them are formatted once for all times of a chunk */
+#define STEP_MAX_LEN                                                                                                   \
+    (sizeof((struct vcd_chunk *)0)->prefix + 5u + 3u * TRACE_SIGNALS_MAX +                                             \
+     5u)                      /* time; level, code, newline; put_word() puts 8 */
+#define CHUNK         10000   /* units: the digits above them are formatted once for all times of a chunk */
+#define UNIT_SHIFT    50      /* CHUNK * 2^50 is the largest product: 63.3 bits */
+#define UNIT_FAST_MAX 100000u /* ns */
 
 static char code_of(unsigned sig)
 {
@@ -50,80 +56,135 @@ static void put_time(struct vcd *v, int64_t t_units)
     v->t_units = t_units;
 }
 
-/* "#" and the digits above the lowest four of all times in the chunk that begins here. */
-static void begin_chunk(struct vcd *v, int64_t t_units)
+/* "#" and the digits above the lowest four of all times in the chunk of t_ns. */
+static void begin_chunk(struct vcd_chunk *c, int64_t t_ns)
 {
     char digits[20];
     unsigned n = 0;
-    for (int64_t high = t_units / CHUNK; high > 0; high /= 10) digits[n++] = (char)('0' + high % 10);
-    v->chunk_units = t_units - t_units % CHUNK;
-    v->prefix_len = n + 1;
-    v->prefix[0] = '#';
-    for (unsigned i = 0; i < n; i++) v->prefix[1 + i] = digits[n - 1 - i];
+    const int64_t chunk = t_ns / c->unit_ns / CHUNK;
+    for (int64_t high = chunk; high > 0; high /= 10) digits[n++] = (char)('0' + high % 10);
+    c->units = chunk * CHUNK;
+    c->ns = c->units * c->unit_ns;
+    c->end_ns = c->ns + CHUNK * c->unit_ns;
+    c->prefix_len = n + 1;
+    c->prefix[0] = '#';
+    for (unsigned i = 0; i < n; i++) c->prefix[1 + i] = digits[n - 1 - i];
 }
 
-/* Times of 10000 units and more; returns the end of the line. */
-static char *time_line(struct vcd *v, char *p, int64_t t_units)
+/* Units from the chunk's beginning, rounded down; without a division where the product is exact in 64 bits: below
+ * CHUNK * unit_ns the error of the reciprocal stays under 1 / unit_ns as long as CHUNK * unit_ns^2 < 2^UNIT_SHIFT. */
+static unsigned units_in_chunk(const struct vcd_chunk *c, int64_t t_ns)
 {
-    if (t_units - v->chunk_units >= CHUNK) begin_chunk(v, t_units);
-    const unsigned low = (unsigned)(t_units - v->chunk_units);
-    memcpy(p, v->prefix, sizeof v->prefix);
-    p += v->prefix_len;
-    p[0] = (char)('0' + low / 1000);
-    p[1] = (char)('0' + low / 100 % 10);
-    p[2] = (char)('0' + low / 10 % 10);
-    p[3] = (char)('0' + low % 10);
-    p[4] = '\n';
-    return p + 5;
+    const uint64_t ns = (uint64_t)(t_ns - c->ns);
+    return (unsigned)(c->per_unit ? ns * c->per_unit >> UNIT_SHIFT : ns / (uint64_t)c->unit_ns);
+}
+
+static void set_unit(struct vcd_chunk *c, uint32_t unit_ns)
+{
+    c->unit_ns = unit_ns;
+    c->per_unit = unit_ns <= UNIT_FAST_MAX ? (UINT64_C(1) << UNIT_SHIFT) / unit_ns + 1 : 0;
+}
+
+#define TWO_DIGITS(tens, ones) (uint16_t)('0' + (tens) + (('0' + (ones)) << 8))
+#define TEN_PAIRS(tens)                                                                                                \
+    TWO_DIGITS(tens, 0), TWO_DIGITS(tens, 1), TWO_DIGITS(tens, 2), TWO_DIGITS(tens, 3), TWO_DIGITS(tens, 4),           \
+        TWO_DIGITS(tens, 5), TWO_DIGITS(tens, 6), TWO_DIGITS(tens, 7), TWO_DIGITS(tens, 8), TWO_DIGITS(tens, 9)
+
+static const uint16_t two_digits[100] = {TEN_PAIRS(0), TEN_PAIRS(1), TEN_PAIRS(2), TEN_PAIRS(3), TEN_PAIRS(4),
+                                         TEN_PAIRS(5), TEN_PAIRS(6), TEN_PAIRS(7), TEN_PAIRS(8), TEN_PAIRS(9)};
+
+/* Four digits and a newline, for put_word(). */
+static uint64_t end_of_time(unsigned low)
+{
+    const uint64_t newline = (uint64_t)'\n' << 32;
+    return newline | two_digits[low / 100] | (uint32_t)two_digits[low % 100] << 16;
+}
+
+static char *put_word(char *p, uint64_t text, unsigned len)
+{
+    bits_put_le64(p, text);
+    return p + len;
+}
+
+/* Level, code, newline of the first of these lines; for put_word(). */
+static uint64_t level_line(uint64_t lines, uint64_t level)
+{
+    const unsigned sig = (unsigned)__builtin_ctzll(lines);
+    return '0' + (level >> sig & 1) + ((uint64_t)(unsigned char)code_of(sig) << 8) + ((uint64_t)'\n' << 16);
 }
 
 static char *level_lines(char *p, uint64_t lines, uint64_t level)
 {
-    for (; lines; lines &= lines - 1) {
-        const unsigned sig = (unsigned)__builtin_ctzll(lines);
-        *p++ = (char)('0' + (level >> sig & 1));
-        *p++ = code_of(sig);
-        *p++ = '\n';
-    }
+    for (; lines; lines &= lines - 1) p = put_word(p, level_line(lines, level), 3);
     return p;
 }
 
-/* The path of every edge. */
-static void write_step(struct vcd *v, const struct trace_step *s, uint64_t lines)
+/* In the first chunk, where numbers have fewer digits. */
+static void write_step(struct vcd *v, const struct trace_step *s)
 {
+    const uint64_t lines = s->lines & v->sink.mask;
+    if (!lines) return;
+    const int64_t t_units = s->t_ns / v->chunk.unit_ns;
+    if (t_units != v->t_units) put_time(v, t_units);
     if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
-    const int64_t t_units = s->t_ns / v->unit_ns;
-    char *p = v->buf + v->len;
-    if (t_units != v->t_units && t_units < CHUNK) {
-        put_time(v, t_units);
-        p = v->buf + v->len;
-    } else if (t_units != v->t_units) {
-        p = time_line(v, p, t_units);
-    }
-    char *const end = level_lines(p, lines, s->level);
+    char *const p = v->buf + v->len, *const end = level_lines(p, lines, s->level);
     v->changes += (uint64_t)(end - p) / 3;
-    v->len = (size_t)(end - v->buf);
-    v->t_units = v->edge_units = t_units;
+    v->len += (size_t)(end - p);
+    v->edge_units = t_units;
+}
+
+/* The path of nearly every edge: steps of a chunk whose higher digits are ready, a time and a level in one word. Returns
+ * the first step that is left. */
+static const struct trace_step *write_chunk(struct vcd *v, const struct trace_step *s, const struct trace_step *end)
+{
+    const struct vcd_chunk c = v->chunk; /* what is written through p cannot change it */
+    const uint64_t mask = v->sink.mask;
+    const char *const room = v->buf + VCD_BUF - STEP_MAX_LEN;
+    char *p = v->buf + v->len;
+    int64_t before = v->t_units - c.units;
+    uint64_t changes = 0;
+    for (; s < end && s->t_ns < c.end_ns && p <= room; s++) {
+        const uint64_t lines = s->lines & mask;
+        if (!lines) continue;
+        const unsigned low = units_in_chunk(&c, s->t_ns);
+        const uint64_t level = level_line(lines, s->level);
+        if (low == before) p = put_word(p, level, 3);
+        else {
+            memcpy(p, c.prefix, sizeof c.prefix);
+            p = put_word(p + c.prefix_len, end_of_time(low) | level << 40, 8);
+        }
+        before = low;
+        changes++;
+        for (uint64_t more = lines & (lines - 1); more; more &= more - 1, changes++)
+            p = put_word(p, level_line(more, s->level), 3);
+    }
+    v->changes += changes;
+    v->t_units = c.units + before;
+    if (changes > 0) v->edge_units = v->t_units;
+    v->len = (size_t)(p - v->buf);
+    return s;
 }
 
 static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
 {
     struct vcd *v = ctx;
-    for (const struct trace_step *const end = s + n; s < end; s++) {
-        const uint64_t lines = s->lines & v->sink.mask;
-        if (lines) write_step(v, s, lines);
+    for (const struct trace_step *const end = s + n; s < end;) {
+        if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
+        if (s->t_ns >= v->chunk.end_ns) begin_chunk(&v->chunk, s->t_ns);
+        if (v->chunk.units > 0) s = write_chunk(v, s, end);
+        else write_step(v, s++);
     }
 }
 
 static void on_advance(void *ctx, int64_t t_ns)
 {
     struct vcd *v = ctx;
-    v->seen_units = t_ns / v->unit_ns;
+    v->seen_units = t_ns / v->chunk.unit_ns;
 }
 
 static void put_levels(struct vcd *v, uint64_t lines, uint64_t level)
 {
-    char text[3 * TRACE_SIGNALS_MAX + 1];
+    char text[3 * TRACE_SIGNALS_MAX + 8];
     *level_lines(text, lines & v->sink.mask, level) = '\0';
     put_text(v, text);
 }
@@ -132,7 +193,7 @@ static void put_levels(struct vcd *v, uint64_t lines, uint64_t level)
 static void begin_edges(struct vcd *v)
 {
     const uint64_t first = v->before ^ ((v->before ^ v->found) & v->moved);
-    put_time(v, v->from_ns / v->unit_ns);
+    put_time(v, v->from_ns / v->chunk.unit_ns);
     put_text(v, "$dumpvars\n");
     put_levels(v, UINT64_MAX, first);
     put_text(v, "$end\n");
@@ -212,9 +273,9 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     memset(v, 0, offsetof(struct vcd, buf));
     v->trace = t;
     v->out = cfg->out;
-    v->unit_ns = cfg->unit_ns;
     v->max_bytes = cfg->max_bytes;
     if (!put_timescale(v, cfg->unit_ns)) return false;
+    set_unit(&v->chunk, cfg->unit_ns);
     put_names(v, cfg->scope, cfg->mask);
     trace_wake(t);
     v->from_ns = cfg->from_ns > t->done_ns ? cfg->from_ns : t->done_ns;
@@ -239,7 +300,7 @@ void vcd_close(struct vcd *v, int64_t t_ns)
 {
     trace_detach(v->trace, &v->sink);
     if (v->sink.steps != on_steps) begin_and_end(v);
-    const int64_t end_units = t_ns / v->unit_ns;
+    const int64_t end_units = t_ns / v->chunk.unit_ns;
     v->seen_units = end_units > v->edge_units ? end_units : v->edge_units + 1;
     vcd_flush(v);
 }

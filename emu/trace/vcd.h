@@ -31,20 +31,24 @@ struct vcd { /* read-only outside vcd.c */
     struct trace_sink sink;
     struct trace *trace;
     FILE *out;
-    int64_t unit_ns;
-    int64_t from_ns;     /* of the first levels in the file; until the trace has come there: */
-    uint64_t before;     /* levels before from_ns, as far as delivered */
-    uint64_t level;      /* and with what has happened at from_ns */
-    uint64_t found;      /* levels at from_ns when the recording was asked for */
-    uint64_t moved;      /* lines that had moved at that instant already */
-    int64_t t_units;     /* last time written */
-    int64_t edge_units;  /* time of the last change */
-    int64_t seen_units;  /* nothing will change before this */
-    int64_t chunk_units; /* times from here on have the digits in prefix ... */
-    unsigned prefix_len;
-    char prefix[24]; /* ... and four more */
-    int error;       /* errno of the first write that failed */
-    bool limited;    /* EFBIG, at max_bytes */
+    int64_t from_ns;    /* of the first levels in the file; until the trace has come there: */
+    uint64_t before;    /* levels before from_ns, as far as delivered */
+    uint64_t level;     /* and with what has happened at from_ns */
+    uint64_t found;     /* levels at from_ns when the recording was asked for */
+    uint64_t moved;     /* lines that had moved at that instant already */
+    int64_t t_units;    /* last time written */
+    int64_t edge_units; /* time of the last change */
+    int64_t seen_units; /* nothing will change before this */
+    struct vcd_chunk {
+        int64_t unit_ns;
+        uint64_t per_unit; /* reciprocal of unit_ns, or 0 */
+        int64_t units;     /* times from here on ... */
+        int64_t ns, end_ns;
+        unsigned prefix_len;
+        char prefix[16]; /* ... have these digits and four more */
+    } chunk;
+    int error;    /* errno of the first write that failed */
+    bool limited; /* EFBIG, at max_bytes */
     bool reported;
     uint64_t changes;
     uint64_t bytes, max_bytes; /* handed to out */

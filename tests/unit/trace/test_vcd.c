@@ -133,6 +133,31 @@ static void times_have_the_digits_that_printf_gives(void **state)
     fclose(f);
 }
 
+/* The last and the first nanosecond of units all over a chunk of 10000, in every unit, as integer division has them. */
+static void both_ends_of_a_unit_belong_to_it(void **state)
+{
+    (void)state;
+    static char want[1 << 18];
+    for (uint32_t unit = 1; unit <= 100000000; unit *= 10) {
+        fresh(NULL);
+        FILE *f = open_vcd(unit);
+        size_t n = 0;
+        int64_t seen = 0;
+        for (int64_t k = 10000; k <= 40000; k += k % 10000 < 9990 ? 37 : 1)
+            for (int64_t t = k * unit - (unit > 1); t <= k * unit; t++) {
+                trace_set(&trace, 1, !(trace_known(&trace, t) >> 1 & 1), t);
+                trace_advance(&trace, t);
+                if (t / unit != seen)
+                    n += (size_t)snprintf(want + n, sizeof want - n, "#%lld\n", (long long)(t / unit));
+                n += (size_t)snprintf(want + n, sizeof want - n, "%d\"\n", (int)(trace.level >> 1 & 1));
+                seen = t / unit;
+            }
+        vcd_close(&vcd, trace.done_ns);
+        assert_non_null(strstr(read_back(f), want));
+        fclose(f);
+    }
+}
+
 static void a_unit_that_vcd_does_not_know_is_refused(void **state)
 {
     (void)state;
@@ -289,6 +314,7 @@ int main(void)
         cmocka_unit_test_setup(sixty_four_lines_have_codes_of_their_own, fresh),
         cmocka_unit_test(times_are_rounded_down_to_the_unit),
         cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),
+        cmocka_unit_test(both_ends_of_a_unit_belong_to_it),
         cmocka_unit_test_setup(a_unit_that_vcd_does_not_know_is_refused, fresh),
         cmocka_unit_test_setup(a_late_start_begins_at_its_own_time, fresh),
         cmocka_unit_test_setup(edges_before_its_start_are_in_its_first_levels, fresh),
