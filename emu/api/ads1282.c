@@ -32,7 +32,8 @@ struct part_ads1282 {
       "in RDATAC obeys only WAKEUP, SDATAC and RESET")                                                                 \
     X("strict_gap", API_BOOL, part_ads1282, cfg.strict_gap, "0", 0, 1, NULL,                                           \
       "a byte sooner than 24 tCLK after a command's last is lost, and its command with it")                            \
-    X("wreg_gap_free", API_BOOL, part_ads1282, cfg.wreg_gap_free, "0", 0, 1, NULL, "the bytes of WREG need no gap")    \
+    X("wreg_gap_free", API_BOOL, part_ads1282, cfg.wreg_gap_free, "0", 0, 1, NULL,                                     \
+      "the bytes of WREG and the command bytes of RREG need no gap")                                                   \
     X("strict_sync", API_BOOL, part_ads1282, cfg.strict_sync, "0", 0, 1, NULL,                                         \
       "limits of a SYNC pulse matter: too close to CLK it is taken late, too short by none")                           \
     X("strict_config0", API_BOOL, part_ads1282, cfg.strict_config0, "0", 0, 1, NULL,                                   \

@@ -8,8 +8,8 @@ static bool in_frame(const struct ad7712 *a)
     return (a->port.reading && !a->port.rfs) || a->port.writing;
 }
 
-/* Inside a frame A0 has done its work; moving it is a breach, and garbles where the chip is strict. Between two parts of a
- * read it gives up the rest. */
+/* Inside a frame moving A0 is a breach, and garbles where the chip is strict; else it still counts for a write before its
+ * first SCLK. Between two parts of a read it gives up the rest. */
 void ad7712_a0_pin(struct ad7712 *a, bool level, int64_t t_ns)
 {
     struct ad7712_port *p = &a->port;

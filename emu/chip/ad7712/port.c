@@ -109,10 +109,9 @@ void ad7712_begin_write(struct ad7712 *a, int64_t t_ns)
     }
     p->reading = p->garbled = p->clocked = false;
     p->writing = true;
-    p->target = !p->a0 ? AD7712_TO_CONTROL : ad7712_coef_mode(a) ? AD7712_TO_COEF : AD7712_TO_NOTHING;
+    p->target = AD7712_TO_NOTHING;
     p->in = 0;
     p->taken = 0;
-    a->n.refused += p->target == AD7712_TO_NOTHING;
     if (p->mode) ad7712_own_clock(a, t_ns);
 }
 
@@ -130,6 +129,14 @@ void ad7712_end_write(struct ad7712 *a, int64_t t_ns)
     a->n.dropped++;
 }
 
+/* At the first SCLK of a write: drivers that work on hardware lower A0 after TFS. */
+static void choose_target(struct ad7712 *a)
+{
+    struct ad7712_port *p = &a->port;
+    p->target = !p->a0 ? AD7712_TO_CONTROL : ad7712_coef_mode(a) ? AD7712_TO_COEF : AD7712_TO_NOTHING;
+    a->n.refused += p->target == AD7712_TO_NOTHING;
+}
+
 void ad7712_clock_rise(struct ad7712 *a, int64_t t_ns)
 {
     struct ad7712_port *p = &a->port;
@@ -140,6 +147,7 @@ void ad7712_clock_rise(struct ad7712 *a, int64_t t_ns)
     const bool fast = period_ns < ad7712_tau_ns(a, SCLK_TAU) || low_ns < ad7712_tau_ns(a, PULSE_TAU);
     count_violation(a, fast && !p->mode, &a->n.sclk_violations);
     p->clocked = true;
+    if (p->writing && p->taken == 0) choose_target(a);
     if (p->writing && p->taken < 24) p->in = p->in << 1 | p->sdata;
 }
 

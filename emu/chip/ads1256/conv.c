@@ -131,13 +131,14 @@ bool ads1256_in_range(const struct ads1256 *a, double low_v, double high_v)
     return !clipped;
 }
 
-/* The serial port's side of a new word: a read in progress goes on with the new one's bytes, each RDATAC word starts over. */
+/* The serial port's side of a new word: a read in progress goes on with the new one's bytes, each RDATAC word starts over
+ * with the next byte. */
 static void offer_word(struct ads1256 *a)
 {
     a->n.overruns += a->unread;
     a->unread = true;
-    a->n.torn_reads += a->port == ADS1256_WORD && (a->word_left == 1 || a->word_left == 2);
-    if (a->rdatac) a->word_left = 3;
+    a->n.torn_reads += ads1256_half_read(a);
+    if (a->rdatac) a->word_left = 3 + a->begun;
     else if (a->port != ADS1256_WORD) a->word_left = 0;
 }
 

@@ -8,7 +8,7 @@ enum { T6_TAU = 50, T11_TAU = 4, T11_LONG_TAU = 24 };
 void ads1256_port_idle(struct ads1256 *a)
 {
     a->port = ADS1256_OPCODE;
-    a->rdatac = a->awaiting_data = a->garbled = a->after_sdatac = false;
+    a->rdatac = a->awaiting_data = a->garbled = a->after_sdatac = a->begun = false;
     a->word_left = 0;
 }
 
@@ -237,6 +237,12 @@ static uint8_t out_byte(const struct ads1256 *a)
     return ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_ORDER ? reverse_bits(v) : v;
 }
 
+bool ads1256_half_read(const struct ads1256 *a)
+{
+    const int taken = 3 - a->word_left + a->begun;
+    return a->port == ADS1256_WORD && a->word_left > 0 && (taken == 1 || taken == 2);
+}
+
 static void shift_word(struct ads1256 *a, int64_t t_ns)
 {
     if (--a->word_left) return;
@@ -254,6 +260,7 @@ static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
     static port_fn *const ports[ADS1256_PORTS] = {on_opcode, on_count, on_write, on_read, on_word};
     struct ads1256 *a = chip;
     if (a->cs || ads1256_deaf(a)) return ads1256_on_wire(a, ADS1256_DOUT_IDLE);
+    a->begun = false;
     a->in_word = a->word_left && a->port != ADS1256_READ;
     if (a->in_word) shift_word(a, t_ns);
     ports[a->port](a, mosi, t_ns);
@@ -288,6 +295,7 @@ static void on_first(void *chip, int64_t t_ns)
     a->early = t_ns < a->next_ok_ns; /* before the byte itself ends standby, from where on the next one has to wait */
     if (a->mode == ADS1256_STANDBY && a->cfg.strict_bus) leave_standby(a, t_ns); /* any SCLK interrupts it */
     judge_read(a, t_ns);
+    a->begun = a->port == ADS1256_WORD && a->word_left;
     spi_load(&a->spi, ads1256_on_wire(a, out_byte(a)));
 }
 
@@ -299,8 +307,9 @@ void ads1256_serial_init(struct ads1256 *a)
 
 void ads1256_port_drop(struct ads1256 *a)
 {
-    const bool half_read = a->word_left == 1 || a->word_left == 2;
-    a->n.dropped += a->rdatac ? half_read : a->port != ADS1256_OPCODE;
+    const bool part_read = a->word_left > 0 && (a->word_left < 3 || a->begun);
+    a->n.dropped += a->rdatac ? part_read : a->port != ADS1256_OPCODE;
+    a->begun = false;
     if (a->rdatac && !a->cfg.strict_cs) a->word_left = a->word_left ? 3 : 0; /* the mode stays, the word too (M50) */
     else ads1256_port_idle(a);
 }

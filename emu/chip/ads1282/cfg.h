@@ -49,7 +49,7 @@ struct ads1282_cfg {
     /* Where sources disagree or practice is kinder than the data sheet. All false: the kind reading. */
     bool strict_sdatac; /* in RDATAC obey only WAKEUP, SDATAC and RESET (sources 1.3) */
     bool strict_gap;    /* a byte sooner than 24 tCLK after a command's last is lost, and its command with it (1.3) */
-    bool wreg_gap_free; /* the bytes of WREG need no gap: neither counted nor lost (1.3, TI's own driver) */
+    bool wreg_gap_free; /* bytes of WREG, command bytes of RREG need no gap: neither counted nor lost (1.3, TI's own) */
     bool strict_sync; /* a SYNC rise within 30 ns before a CLK edge is taken by the one after it, a rise after less than
                             2 tCLK low by none (1.4) */
     bool strict_config0; /* each write to CONFIG0 restarts, even one that changes nothing (1.6) */

@@ -238,7 +238,9 @@ static uint8_t on_byte(void *chip, uint8_t mosi, int64_t t_ns)
 /* t_ns: the byte's first SCLK rise where it is known, else its fall, which is later by the clock's high time. */
 void ads1282_serial_gap(struct ads1282 *a, int64_t t_ns)
 {
-    const bool matters = a->gap_matters && !(a->cfg.wreg_gap_free && a->op && a->op->skip);
+    const bool inside =
+        a->op && (a->op->skip || a->op_stage == ADS1282_COUNT); /* WREG; RREG between its command bytes */
+    const bool matters = a->gap_matters && !(a->cfg.wreg_gap_free && inside);
     a->gap_matters = false;
     if (!matters || t_ns - a->rise_ns >= a->gap_ns) return;
     a->count.gap_violations++;

@@ -125,6 +125,37 @@ static void a0_must_not_move_inside_a_frame(void **state)
     }
 }
 
+/* TFS low, then A0, then SCLK: the first SCLK decides. It is a breach, and lost where the chip is strict. */
+static void a0_may_follow_tfs_until_the_first_sclk(void **state)
+{
+    (void)state;
+    static const struct {
+        bool to;
+        uint32_t refused;
+    } rows[] = {{false, 0}, {true, 1}};
+    const uint32_t word = FAST | AD7712_CTL_BO;
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        for (unsigned strict = 0; strict < 2; strict++) {
+            struct rig r;
+            struct ad7712_cfg cfg = quiet;
+            cfg.strict_timing = strict;
+            up(&r, &cfg, FAST);
+            a0(&r, !rows[i].to);
+            tfs(&r, false);
+            ad7712_a0_pin(&r.a, rows[i].to, r.s.now_ns);
+            write_bits(&r, word, 24);
+            wait_ns(&r, LAST_NS);
+            tfs(&r, true);
+            wait_ns(&r, 1000);
+            const bool lost = strict || rows[i].to;
+            assert_int_equal(r.a.control, lost ? FAST : word);
+            assert_int_equal(r.a.n.a0_violations, 1);
+            assert_int_equal(r.a.n.refused, rows[i].refused);
+            assert_int_equal(r.a.n.dropped, strict && !rows[i].to);
+        }
+    }
+}
+
 /* Pulses outside of frames, and an SCLK that is high when the frame begins, shift nothing. */
 static void pulses_outside_of_frames_do_nothing(void **state)
 {
@@ -244,6 +275,7 @@ int main(void)
         cmocka_unit_test(limits_of_a_read),
         cmocka_unit_test(limits_of_a_write),
         cmocka_unit_test(a0_must_not_move_inside_a_frame),
+        cmocka_unit_test(a0_may_follow_tfs_until_the_first_sclk),
         cmocka_unit_test(pulses_outside_of_frames_do_nothing),
         cmocka_unit_test(self_clocking_reads),
         cmocka_unit_test(self_clocking_writes),

@@ -269,6 +269,42 @@ static void a_read_across_an_update_is_torn_and_counted(void **state)
     assert_true(r.a.n.torn_reads > 0);
 }
 
+/* 250 phases of a read to the update, 84 of them between the first SCLK of the first byte and that of the last: what the host
+ * has in its hand decides. */
+static void torn_is_counted_for_mixed_words_and_no_others(void **state)
+{
+    (void)state;
+    for (unsigned continuous = 0; continuous < 2; continuous++) {
+        unsigned mixed = 0;
+        for (int64_t lead_ns = 100; lead_ns <= 25000; lead_ns += 100) {
+            struct rig r;
+            rig_up(&r, &quiet);
+            r.v[0] = 1.0;
+            set_rate(&r, 0x92);
+            if (continuous) xfer(&r, 0x03);
+            const int64_t first_ns = await_fall(&r), second_ns = await_fall(&r), old = r.a.word & 0xFFFFFF;
+            r.v[0] = -0.7;
+            wait_ns(&r, second_ns - first_ns - lead_ns);
+            const uint32_t before = r.a.n.torn_reads;
+            if (!continuous) {
+                xfer(&r, 0x01);
+                wait_ns(&r, T6_NS);
+            }
+            const int64_t got = read_word(&r) & 0xFFFFFF;
+            wait_ns(&r, 30000); /* in any phase the new word has come */
+            const int64_t new = r.a.word & 0xFFFFFF, differ = old ^ new;
+            assert_true((differ & 0xFF0000) && (differ & 0xFF00) && (differ & 0xFF));
+            const bool whole = got == old || got == new;
+            if (r.a.n.torn_reads - before != !whole)
+                fail_msg("%lld ns before DRDY: read %06llx of %06llx, %06llx", (long long)lead_ns, (long long)got,
+                         (long long)old, (long long)new);
+            mixed += !whole;
+            if (continuous && got == old) assert_int_equal(read_word(&r) & 0xFFFFFF, new); /* from its first byte on */
+        }
+        assert_int_equal(mixed, 84);
+    }
+}
+
 static void order_reverses_the_bits_of_each_output_byte(void **state)
 {
     (void)state;
@@ -329,6 +365,7 @@ int main(void)
         cmocka_unit_test(only_the_first_word_of_a_hasty_rdatac_is_garbled),
         cmocka_unit_test(reset_command_is_obeyed_inside_an_rdatac_read),
         cmocka_unit_test(a_read_across_an_update_is_torn_and_counted),
+        cmocka_unit_test(torn_is_counted_for_mixed_words_and_no_others),
         cmocka_unit_test(order_reverses_the_bits_of_each_output_byte),
         cmocka_unit_test(bits_and_bytes_drive_the_same_chip),
     };

@@ -374,8 +374,9 @@ static void gaps_count_from_rise_to_rise(void **state)
         {"23 tCLK, strict part", 23, true, false, false, 2, false},
         {"24 tCLK, strict part", 24, true, false, false, 0, true},
         {"WREG needs none", 5, true, true, false, 0, true},
-        {"RREG does", 23, true, true, true, 2, false},
-        {"RREG, kind part", 23, false, true, true, 2, true},
+        {"RREG needs it", 23, true, false, true, 2, false},
+        {"RREG needs it before its data alone", 23, true, true, true, 1, true},
+        {"the same, kind part", 23, false, true, true, 1, true},
     };
     for (unsigned k = 0; k < COUNT(rows); k++) {
         struct rig r;
