@@ -143,13 +143,15 @@ static void a0_may_follow_tfs_until_the_first_sclk(void **state)
             a0(&r, !rows[i].to);
             tfs(&r, false);
             ad7712_a0_pin(&r.a, rows[i].to, r.s.now_ns);
-            write_bits(&r, word, 24);
+            write_bits(&r, word >> 23, 1);
+            ad7712_a0_pin(&r.a, !rows[i].to, r.s.now_ns); /* too late */
+            write_bits(&r, word & 0x7FFFFF, 23);
             wait_ns(&r, LAST_NS);
             tfs(&r, true);
             wait_ns(&r, 1000);
             const bool lost = strict || rows[i].to;
             assert_int_equal(r.a.control, lost ? FAST : word);
-            assert_int_equal(r.a.n.a0_violations, 1);
+            assert_int_equal(r.a.n.a0_violations, 2);
             assert_int_equal(r.a.n.refused, rows[i].refused);
             assert_int_equal(r.a.n.dropped, strict && !rows[i].to);
         }
