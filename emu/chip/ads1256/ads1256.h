@@ -67,8 +67,7 @@ struct ads1256 {
     uint8_t opcode, addr, left;   /* of the command in progress; left: bytes to come */
     uint8_t before[ADS1256_REGS]; /* registers before the WREG in progress */
     uint8_t word_left;            /* bytes of the word not yet shifted out, 3..0 */
-    bool begun;                   /* the next of them is on its way: loaded at its first SCLK */
-    bool in_word;                 /* the present byte shifted out one of them */
+    bool begun, in_word;          /* one of them is on its way, loaded at its first SCLK; has just been shifted out */
     bool rdatac, after_sdatac, awaiting_data, garbled, first_drdy;
     bool early;         /* the present byte began before next_ok_ns */
     int64_t first_ns;   /* first SCLK edge of the present byte */

@@ -58,7 +58,7 @@ void ads1256_go(struct ads1256 *a, int64_t t_ns);
 /* ---- ads1256/port.c ---- */
 
 void ads1256_serial_init(struct ads1256 *a);
-void ads1256_port_idle(struct ads1256 *a); /* forgets a command in progress and RDATAC */
+void ads1256_port_idle(struct ads1256 *a);       /* forgets a command in progress and RDATAC */
 bool ads1256_half_read(const struct ads1256 *a); /* some bytes of the word are read or on their way, others not */
 void ads1256_port_drop(struct ads1256 *a); /* what CS high does: a partial command or read is dropped and counted */
 bool ads1256_has_output(const struct ads1256 *a); /* the next byte comes from a register or the word */
