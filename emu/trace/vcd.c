@@ -65,10 +65,15 @@ static void begin_chunk(struct vcd_chunk *c, int64_t t_ns)
     for (int64_t high = chunk; high > 0; high /= 10) digits[n++] = (char)('0' + high % 10);
     c->units = chunk * CHUNK;
     c->ns = c->units * c->unit_ns;
-    c->end_ns = c->ns + CHUNK * c->unit_ns;
+    c->span_ns = (uint64_t)(CHUNK * c->unit_ns);
     c->prefix_len = n + 1;
     c->prefix[0] = '#';
     for (unsigned i = 0; i < n; i++) c->prefix[1 + i] = digits[n - 1 - i];
+}
+
+static bool in_chunk(const struct vcd_chunk *c, int64_t t_ns)
+{
+    return (uint64_t)(t_ns - c->ns) < c->span_ns;
 }
 
 /* Units from the chunk's beginning, rounded down; without a division where the product is exact in 64 bits: below
@@ -143,7 +148,7 @@ static const struct trace_step *write_chunk(struct vcd *v, const struct trace_st
     char *p = v->buf + v->len;
     int64_t before = v->t_units - c.units;
     uint64_t changes = 0;
-    for (; s < end && s->t_ns < c.end_ns && p <= room; s++) {
+    for (; s < end && in_chunk(&c, s->t_ns) && p <= room; s++) {
         const uint64_t lines = s->lines & mask;
         if (!lines) continue;
         const unsigned low = units_in_chunk(&c, s->t_ns);
@@ -170,7 +175,7 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     struct vcd *v = ctx;
     for (const struct trace_step *const end = s + n; s < end;) {
         if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
-        if (s->t_ns >= v->chunk.end_ns) begin_chunk(&v->chunk, s->t_ns);
+        if (!in_chunk(&v->chunk, s->t_ns)) begin_chunk(&v->chunk, s->t_ns);
         if (v->chunk.units > 0) s = write_chunk(v, s, end);
         else write_step(v, s++);
     }

@@ -43,7 +43,8 @@ struct vcd { /* read-only outside vcd.c */
         int64_t unit_ns;
         uint64_t per_unit; /* reciprocal of unit_ns, or 0 */
         int64_t units;     /* times from here on ... */
-        int64_t ns, end_ns;
+        int64_t ns;
+        uint64_t span_ns;
         unsigned prefix_len;
         char prefix[16]; /* ... have these digits and four more */
     } chunk;
