@@ -18,15 +18,10 @@
 
 /* ---- time */
 
-static int64_t min_ns(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
 static void run_stride(struct loop *l, int64_t until_ns)
 {
     const int64_t began_ns = pace_clock_ns();
-    sched_run_towards(l->sched, min_ns(until_ns, l->sched->now_ns + l->stride_ns), until_ns);
+    sched_run_towards(l->sched, ns_earlier(until_ns, l->sched->now_ns + l->stride_ns), until_ns);
     const int64_t took_ns = pace_clock_ns() - began_ns;
     if (took_ns > STRIDE_WALL_NS && l->stride_ns > STRIDE_MIN_NS) l->stride_ns /= 2;
     if (took_ns < STRIDE_WALL_NS / 2 && l->stride_ns < STRIDE_MAX_NS) l->stride_ns *= 2;
@@ -39,7 +34,7 @@ static void run_slice(struct loop *l, int64_t until_ns)
     const bool sliced = l->sliced && l->sliced(l->ctx);
     /* Over a stretch without events in one stride. */
     const int64_t from_ns = next_ns > now_ns && !sliced ? next_ns : now_ns;
-    const int64_t to_ns = from_ns >= until_ns ? until_ns : min_ns(until_ns, from_ns + BENCH_SLICE_NS);
+    const int64_t to_ns = from_ns >= until_ns ? until_ns : ns_earlier(until_ns, from_ns + BENCH_SLICE_NS);
     sched_run_towards(l->sched, to_ns, until_ns);
 }
 
@@ -54,8 +49,8 @@ static void run_on(struct loop *l, int64_t until_ns)
 /* Wall pace: everything due by now, instant by instant, so that each one's lateness is known. */
 static void run_wall(struct loop *l)
 {
-    const int64_t target_ns = min_ns(pace_target_ns(l->pace, l->sched->now_ns), l->end_ns);
-    const int64_t to_ns = min_ns(target_ns, l->sched->now_ns + PACE_BATCH_NS);
+    const int64_t target_ns = ns_earlier(pace_target_ns(l->pace, l->sched->now_ns), l->end_ns);
+    const int64_t to_ns = ns_earlier(target_ns, l->sched->now_ns + PACE_BATCH_NS);
     for (int64_t due_ns; (due_ns = sched_next_ns(l->sched)) <= to_ns;) {
         sched_run_until(l->sched, due_ns);
         pace_event(l->pace, due_ns, target_ns);
@@ -155,16 +150,16 @@ static int64_t timeout_ns(const struct loop *l)
     int64_t wait_ns = SCHED_NEVER;
     const int64_t clock_ns = pace_clock_ns();
     for (const struct link *k = l->links->first; k; k = k->next) {
-        if (k->timer_due_ns) wait_ns = min_ns(wait_ns, k->timer_due_ns - clock_ns);
+        if (k->timer_due_ns) wait_ns = ns_earlier(wait_ns, k->timer_due_ns - clock_ns);
     }
     if (l->started && l->pace->kind == PACE_WALL) {
-        const int64_t due_ns = min_ns(sched_next_ns(l->sched), l->end_ns);
+        const int64_t due_ns = ns_earlier(sched_next_ns(l->sched), l->end_ns);
         const int64_t at_ns = l->sched->now_ns + PACE_QUANTUM_NS;
         if (due_ns < SCHED_NEVER)
-            wait_ns = min_ns(wait_ns, l->pace->origin_ns + (due_ns > at_ns ? due_ns : at_ns) - clock_ns);
+            wait_ns = ns_earlier(wait_ns, l->pace->origin_ns + (due_ns > at_ns ? due_ns : at_ns) - clock_ns);
     }
     if (l->full_since_ns && clock_ns - l->full_since_ns < SLOW_NS)
-        wait_ns = min_ns(wait_ns, l->full_since_ns + SLOW_NS - clock_ns);
+        wait_ns = ns_earlier(wait_ns, l->full_since_ns + SLOW_NS - clock_ns);
     const bool running = l->started && (l->pace->kind == PACE_FREE || l->run == LOOP_RUNNING);
     if (running && !links_full(l->links) && (l->pace->kind == PACE_FREE || l->sched->now_ns < l->until_ns)) return 0;
     if (l->run == LOOP_ARMED && l->taken(l->ctx, l->after_taken)) return 0;
@@ -273,7 +268,7 @@ bool loop_step(struct loop *l, int64_t for_ns, uint64_t after_taken)
 {
     if (l->run != LOOP_IDLE) return false;
     l->run = LOOP_ARMED;
-    l->until_ns = min_ns(l->sched->now_ns + for_ns, l->end_ns);
+    l->until_ns = ns_earlier(l->sched->now_ns + for_ns, l->end_ns);
     l->after_taken = after_taken;
     return true;
 }

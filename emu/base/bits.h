@@ -48,16 +48,10 @@ static inline unsigned bits_log2(unsigned power_of_two)
 /* Little-endian put and get of n (1..8) bytes. */
 static inline void bits_put_le(uint8_t *p, uint64_t v, size_t n)
 {
-    for (size_t i = 0; i < n; i++) p[i] = (uint8_t)(v >> (8 * i));
-}
-
-/* The same of 8 bytes; one store where a compiler finds none in the loop. */
-static inline void bits_put_le64(void *to, uint64_t v)
-{
 #if defined __BYTE_ORDER__ && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    memcpy(to, &v, 8);
+    memcpy(p, &v, n);
 #else
-    bits_put_le((uint8_t *)to, v, 8);
+    for (size_t i = 0; i < n; i++) p[i] = (uint8_t)(v >> (8 * i));
 #endif
 }
 

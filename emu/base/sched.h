@@ -13,6 +13,16 @@
     100000u /* more events than this at one instant is a bug: a callback re-arms itself at zero delay */
 #define NS_PER_S INT64_C(1000000000)
 
+static inline int64_t ns_earlier(int64_t a_ns, int64_t b_ns)
+{
+    return a_ns < b_ns ? a_ns : b_ns;
+}
+
+static inline int64_t ns_later(int64_t a_ns, int64_t b_ns)
+{
+    return a_ns > b_ns ? a_ns : b_ns;
+}
+
 typedef void sched_fn(void *ctx, int64_t t_ns); /* t_ns is the instant the event was due */
 
 /* One event. Zero it or call sched_ev() before first use; read-only outside sched.c afterwards. */

@@ -5,12 +5,12 @@
 #include <errno.h>
 #include <string.h>
 
-#define STEP_MAX_LEN                                                                                                   \
-    (sizeof((struct vcd_chunk *)0)->prefix + 5u + 3u * TRACE_SIGNALS_MAX +                                             \
-     5u)                      /* time; level, code, newline; put_word() puts 8 */
 #define CHUNK         10000   /* units: the digits above them are formatted once for all times of a chunk */
-#define UNIT_SHIFT    50      /* CHUNK * 2^50 is the largest product: 63.3 bits */
+#define Q50           50      /* CHUNK * 2^50 is the largest product: 63.3 bits */
 #define UNIT_FAST_MAX 100000u /* ns */
+
+/* Time; level, code and newline of each line; and what put_word() writes beyond the last. */
+enum { STEP_MAX_LEN = sizeof((struct vcd_chunk *)0)->prefix + 5 + 3 * TRACE_SIGNALS_MAX + 5 };
 
 static char code_of(unsigned sig)
 {
@@ -77,17 +77,17 @@ static bool in_chunk(const struct vcd_chunk *c, int64_t t_ns)
 }
 
 /* Units from the chunk's beginning, rounded down; without a division where the product is exact in 64 bits: below
- * CHUNK * unit_ns the error of the reciprocal stays under 1 / unit_ns as long as CHUNK * unit_ns^2 < 2^UNIT_SHIFT. */
+ * CHUNK * unit_ns the error of the reciprocal stays under 1 / unit_ns as long as CHUNK * unit_ns^2 < 2^Q50. */
 static unsigned units_in_chunk(const struct vcd_chunk *c, int64_t t_ns)
 {
     const uint64_t ns = (uint64_t)(t_ns - c->ns);
-    return (unsigned)(c->per_unit ? ns * c->per_unit >> UNIT_SHIFT : ns / (uint64_t)c->unit_ns);
+    return (unsigned)(c->units_per_ns_q50 ? ns * c->units_per_ns_q50 >> Q50 : ns / (uint64_t)c->unit_ns);
 }
 
 static void set_unit(struct vcd_chunk *c, uint32_t unit_ns)
 {
     c->unit_ns = unit_ns;
-    c->per_unit = unit_ns <= UNIT_FAST_MAX ? (UINT64_C(1) << UNIT_SHIFT) / unit_ns + 1 : 0;
+    c->units_per_ns_q50 = unit_ns <= UNIT_FAST_MAX ? (UINT64_C(1) << Q50) / unit_ns + 1 : 0;
 }
 
 #define TWO_DIGITS(tens, ones) (uint16_t)('0' + (tens) + (('0' + (ones)) << 8))
@@ -107,7 +107,7 @@ static uint64_t end_of_time(unsigned low)
 
 static char *put_word(char *p, uint64_t text, unsigned len)
 {
-    bits_put_le64(p, text);
+    bits_put_le((uint8_t *)p, text, 8);
     return p + len;
 }
 

@@ -41,8 +41,8 @@ struct vcd { /* read-only outside vcd.c */
     int64_t seen_units; /* nothing will change before this */
     struct vcd_chunk {
         int64_t unit_ns;
-        uint64_t per_unit; /* reciprocal of unit_ns, or 0 */
-        int64_t units;     /* times from here on ... */
+        uint64_t units_per_ns_q50; /* times 2^50, rounded up; 0: the unit is too long for it */
+        int64_t units;             /* times from here on ... */
         int64_t ns;
         uint64_t span_ns;
         unsigned prefix_len;

@@ -3,16 +3,6 @@
 
 #include <math.h>
 
-static int64_t later_ns(int64_t a, int64_t b)
-{
-    return a > b ? a : b;
-}
-
-static int64_t earlier_ns(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
 /* ---- inputs ---- */
 
 /* Integral of an axis from its last instant to t_ns: one cell, half a period at most. */
@@ -34,7 +24,7 @@ static double cell_vs(struct pmka *b, unsigned axis, int64_t t_ns)
 void pmka_integrate_axis(struct pmka *b, unsigned axis, int64_t t_ns)
 {
     struct pmka_axis *a = &b->axis[axis];
-    while (a->at_ns < t_ns) (void)cell_vs(b, axis, earlier_ns(t_ns, a->at_ns + pmka_half_ns(b)));
+    while (a->at_ns < t_ns) (void)cell_vs(b, axis, ns_earlier(t_ns, a->at_ns + pmka_half_ns(b)));
 }
 
 /* ---- integrators ---- */
@@ -46,7 +36,7 @@ static void apply_reset(const struct pmka *b, struct pmka_channel *c, int64_t fr
         return;
     }
     if (!c->resetting) return;
-    const int64_t on_ns = later_ns(from_ns, c->reset_from_ns), off_ns = earlier_ns(until_ns, c->reset_until_ns);
+    const int64_t on_ns = ns_later(from_ns, c->reset_from_ns), off_ns = ns_earlier(until_ns, c->reset_until_ns);
     if (on_ns < off_ns) pmka_int_reset(&c->integrator, c->sign, b->uref_v, off_ns - on_ns);
 }
 
@@ -55,7 +45,7 @@ void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns)
     struct pmka_channel *c = &b->channel[i];
     while (c->at_ns < t_ns) {
         while (c->cell_ns <= c->at_ns) c->cell_ns += pmka_half_ns(b);
-        const int64_t end_ns = earlier_ns(t_ns, c->cell_ns);
+        const int64_t end_ns = ns_earlier(t_ns, c->cell_ns);
         const double input_vs = c->axis < 0 ? 0.0 : cell_vs(b, (unsigned)c->axis, end_ns);
         pmka_int_feed(&c->integrator, input_vs, end_ns - c->at_ns);
         apply_reset(b, c, c->at_ns, end_ns);
@@ -137,7 +127,7 @@ static int16_t to_code(struct pmka *b, double out_v, int64_t t_ns, bool *clipped
 
 static void report_step(struct pmka *b, int64_t t_ns, uint64_t lines, uint64_t level)
 {
-    trace_steps(&b->base.trace, &(struct trace_step){later_ns(t_ns, b->base.trace.done_ns), lines, level}, 1);
+    trace_steps(&b->base.trace, &(struct trace_step){ns_later(t_ns, b->base.trace.done_ns), lines, level}, 1);
 }
 
 /* Its end is known as it begins; should the board stop before, the lines fall the sooner. */

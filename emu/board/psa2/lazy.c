@@ -14,11 +14,6 @@
 /* Drifts are bounded for so long; then the board wakes up as if someone looked. */
 #define BOUND_NS (INT64_C(86400) * NS_PER_S)
 
-static int64_t period_ns(const struct psa2 *b)
-{
-    return ads1282_period_ns(&b->adc[0]);
-}
-
 /* ---- whether ---- */
 
 /* Three converters that do the same at the same instants. */
@@ -102,7 +97,7 @@ static int64_t next_own_ns(const struct psa2 *b)
 static void skip_frames(struct psa2 *b, int64_t before_ns)
 {
     const struct ads1282 *x = &b->adc[0];
-    const int64_t n = (before_ns - b->lazy.span_ns - b->drd_a_ns) / (period_ns(b) + 1);
+    const int64_t n = (before_ns - b->lazy.span_ns - b->drd_a_ns) / (b->period_ns + 1);
     if (n <= 0) return;
     for (unsigned i = 0; i < 3; i++) ads1282_skip(&b->adc[i], (uint32_t)n);
     b->timeout_ns += x->ended.t_ns - b->drd_a_ns;
@@ -152,19 +147,19 @@ static void end_waking(struct psa2 *b)
 static int64_t wake_ns(const struct psa2 *b)
 {
     const int64_t look_ns = sched_look_ns(b->base.sched);
-    return (look_ns < b->lazy.bound_ns ? look_ns : b->lazy.bound_ns) - WAKE_FRAMES * period_ns(b);
+    return ns_earlier(look_ns, b->lazy.bound_ns) - WAKE_FRAMES * b->period_ns;
 }
 
 /* Later, where temperature conversions have been skipped beyond: an unexpected look. */
 static int64_t not_before_temp_ns(const struct psa2 *b, int64_t t_ns)
 {
-    return t_ns > b->lazy.temp_ns ? t_ns : b->lazy.temp_ns;
+    return ns_later(t_ns, b->lazy.temp_ns);
 }
 
 static void look_for_sleep(struct psa2 *b, int64_t t_ns)
 {
-    if (t_ns < b->lazy.ask_ns || is_watched(b) || !is_steady(b) || span_ns(b, t_ns) >= period_ns(b)) return;
-    const int64_t least_ns = t_ns + SLEEP_MIN * period_ns(b);
+    if (t_ns < b->lazy.ask_ns || is_watched(b) || !is_steady(b) || span_ns(b, t_ns) >= b->period_ns) return;
+    const int64_t least_ns = t_ns + SLEEP_MIN * b->period_ns;
     b->lazy.bound_ns = t_ns + BOUND_NS;
     if (wake_ns(b) < least_ns) return;
     if (psa2_why_eager(b, t_ns)) b->lazy.ask_ns = least_ns;
@@ -177,7 +172,7 @@ void psa2_lazy_sleep(struct psa2 *b)
     const int64_t look_ns = wake_ns(b);
     psa2_temp_skip(b, look_ns);
     const int64_t own_ns = next_own_ns(b), until_ns = not_before_temp_ns(b, look_ns);
-    skip_frames(b, own_ns < until_ns ? own_ns : until_ns);
+    skip_frames(b, ns_earlier(own_ns, until_ns));
 }
 
 void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)

@@ -39,19 +39,14 @@ static void pass_readings(struct scan *s, int64_t t_ns)
     s->read_ns = psa2_spi_pass(s->b, &s->past, &s->b->read, s->drd_a.t_ns);
 }
 
-static int64_t later_ns(int64_t a, int64_t b)
-{
-    return a > b ? a : b;
-}
-
 /* From *t_ns, where a burst is due, to its end: it waits until the port is free and there is time for it, after the next
  * reading if there is not enough now. False: not there either. */
 static bool pass_burst(struct scan *s, const struct burst *burst, int64_t *t_ns)
 {
     for (unsigned readings = 0; readings < 2; readings++) {
         pass_readings(s, *t_ns);
-        const int64_t free_ns = later_ns(*t_ns, s->read_ns);
-        const int64_t ready_ns = later_ns(free_ns, s->past.ready_ns[PSA2_TEMP]);
+        const int64_t free_ns = ns_later(*t_ns, s->read_ns);
+        const int64_t ready_ns = ns_later(free_ns, s->past.ready_ns[PSA2_TEMP]);
         if (psa2_in_time(s->b, s->drd_a.t_ns, ready_ns + burst->span_ns)) {
             *t_ns = psa2_spi_pass(s->b, &s->past, &burst->x, free_ns);
             return true;
@@ -96,7 +91,7 @@ static void begin_run(struct psa2 *b, uint32_t n, const struct scan *s)
 void psa2_temp_skip(struct psa2 *b, int64_t until_ns)
 {
     const int64_t ahead_ns = b->base.sched->now_ns + AHEAD_NS, turn = turn_ns(b);
-    const int64_t last_ns = (until_ns < ahead_ns ? until_ns : ahead_ns) - turn;
+    const int64_t last_ns = ns_earlier(until_ns, ahead_ns) - turn;
     if (b->profile.temp_channels == 0 || last_ns <= b->tadc.ready_ev.due_ns) return;
     const struct burst write = burst_of(b, psa2_temp_write_mux(b, 0)), read = burst_of(b, psa2_temp_read_data(b));
     struct scan s = {b, &write, &read, b->spi.past, b->adc[0].ended, .run = ads1256_run_now(&b->tadc)}, next = s;

@@ -66,11 +66,6 @@ static double northwards_m(double v, double a, double h, double w, double d_s)
     return ((v + a * d_s) * end.sin - v * ahead.sin + a / w * (end.cos - ahead.cos)) / w;
 }
 
-static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
-{
-    return a_ns < b_ns ? a_ns : b_ns;
-}
-
 static int64_t ramp_end_ns(const struct vehicle_ramp *r)
 {
     return r->from_ns + (int64_t)ceil(ramp_s(r) * (double)NS_PER_S);
@@ -82,11 +77,11 @@ static double latitude_rad(const struct vehicle_plan *p, int64_t t_ns)
     if (p->speed_mps.from == 0.0 && p->speed_mps.to == 0.0) return p->latitude_rad;
     const int64_t speed_ns = ramp_end_ns(&p->speed_mps);
     const int64_t turn_ns = ramp_end_ns(&p->heading_rad);
-    const int64_t ends[] = {earlier_ns(speed_ns, turn_ns), speed_ns < turn_ns ? turn_ns : speed_ns, t_ns};
+    const int64_t ends[] = {ns_earlier(speed_ns, turn_ns), speed_ns < turn_ns ? turn_ns : speed_ns, t_ns};
     int64_t from_ns = p->from_ns;
     double north_m = 0.0;
     for (unsigned i = 0; i < 3; i++) {
-        const int64_t to_ns = earlier_ns(ends[i], t_ns);
+        const int64_t to_ns = ns_earlier(ends[i], t_ns);
         if (to_ns <= from_ns) continue;
         const struct value v = ramp_at(&p->speed_mps, from_ns);
         const struct value h = ramp_at(&p->heading_rad, from_ns);

@@ -1,7 +1,6 @@
 #include "rig.h"
 
 #include "base/rng.h"
-#include "trace/group.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
