@@ -164,7 +164,7 @@ RULES = {
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 57_581, 57_581),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_316, 44_316),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_668, 1_668),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_669, 1_669),
 }
 
 

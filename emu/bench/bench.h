@@ -5,6 +5,7 @@
 #include "canopen/uds_door.h"
 #include "command/view.h"
 #include "scenario/scenario.h"
+#include "trace/group.h"
 #include "trace/sampler.h"
 #include "trace/vcd.h"
 

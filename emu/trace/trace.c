@@ -1,5 +1,7 @@
 #include "trace/trace.h"
 
+#include "trace/group.h"
+
 #include <assert.h>
 #include <string.h>
 

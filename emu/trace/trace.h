@@ -74,7 +74,7 @@ struct trace {
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
     struct trace_source source;                   /* set by the board; wake may stay NULL */
-    struct trace_group *group;                    /* or NULL: its owner advances it */
+    struct trace_group *group;                    /* group.h; or NULL: its owner advances it */
     struct trace *next_awake;                     /* of the group */
     unsigned room;                                /* TRACE_PENDING_MAX; 0: asleep, it takes no steps before it wakes */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
@@ -143,16 +143,5 @@ void trace_each(const struct trace_step *s, unsigned n, uint64_t mask, trace_cha
 /* Delivers everything up to and including t_ns: call with now - TRACE_LAG_NS while running (also without observers, so
  * that done_ns keeps up), with now at the end. Then calls advance of every sink. A t_ns in the past has no effect. */
 void trace_advance(struct trace *t, int64_t t_ns);
-
-/* Many traces whose time one owner moves. Only those that are awake are advanced: a trace without sinks, filter and pending
- * steps costs nothing, and catches up when it wakes. A trace joins by its `group`, before its first step. */
-struct trace_group {
-    struct trace *awake;
-    int64_t done_ns;  /* of all of them */
-    uint64_t changes; /* of what is watched, in any of them */
-};
-
-/* All of a group, as trace_advance(). */
-void trace_advance_group(struct trace_group *g, int64_t t_ns);
 
 #endif

@@ -12,6 +12,7 @@ import pytest
 from psabench.places import find_emulator
 
 from tests.bench import cases, page, peers
+from tests.bench.targets import WHY_LINES
 
 DIRECT = ("frames-direct", "frames-watched-direct", "frames-vcd")  # which has no decimation chain
 ROOT = Path(__file__).resolve().parents[3]
@@ -185,7 +186,7 @@ def test_a_target_is_reached_or_missed_or_not_measured() -> None:
     rows = page.targets(result(**{"frames-watched-direct": watched})).splitlines()[2:]
     assert rows[0].endswith("| ≥ 6.00 | 8.00 | reached |")
     assert rows[1].endswith("| ≤ 34.0 | 51.0 | missed by 50% (a) |")
-    assert rows[-1] == f"(a) {page.WHY_LINES[0].upper()}{page.WHY_LINES[1:]}."
+    assert rows[-1] == f"(a) {WHY_LINES[0].upper()}{WHY_LINES[1:]}."
     assert rows[3].endswith("| ≥ 700 | 800 | reached |")
     assert rows[6].endswith("| ≥ 5,000 |  | not measured |")
     assert page.targets(result(start={"unit": "starts", "ms": 51.0})).splitlines()[-1].endswith("missed by 2% |")

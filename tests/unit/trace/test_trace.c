@@ -1,6 +1,7 @@
 #include "rig.h"
 
 #include "base/rng.h"
+#include "trace/group.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
