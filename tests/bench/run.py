@@ -18,6 +18,7 @@ import numpy
 
 from tests.bench import cases, page, peers
 from tests.bench.cases import ROOT, Case
+from tests.bench.targets import Result
 
 OUT = ROOT / "build/bench"
 PAGE = ROOT / "docs/reference/performance.md"
@@ -53,7 +54,7 @@ def machine() -> dict[str, str | int]:
     }
 
 
-def summary(measured: list[Case], rounds: int) -> page.Result:
+def summary(measured: list[Case], rounds: int) -> Result:
     by_name = {c.name: c for c in measured}
     rows = {}
     for c in measured:
@@ -84,7 +85,7 @@ def summary(measured: list[Case], rounds: int) -> page.Result:
     return {"machine": machine(), "rounds": rounds, "cases": rows}
 
 
-def bench(seconds: float) -> page.Result:
+def bench(seconds: float) -> Result:
     """Build, prove, calibrate, measure; about so many seconds of measuring."""
     OUT.mkdir(parents=True, exist_ok=True)
     words, words_psd1 = OUT / "words.hex", OUT / "words_psd1.hex"

@@ -12,7 +12,7 @@ import pytest
 from psabench.places import find_emulator
 
 from tests.bench import cases, page, peers
-from tests.bench.targets import WHY_LINES
+from tests.bench.targets import WHY_LINES, Result
 
 DIRECT = ("frames-direct", "frames-watched-direct", "frames-vcd")  # which has no decimation chain
 ROOT = Path(__file__).resolve().parents[3]
@@ -168,7 +168,7 @@ def test_figures_have_three_digits(x: float | None, want: str) -> None:
     assert page.figure(x) == want
 
 
-def result(**rows: dict[str, object]) -> page.Result:
+def result(**rows: dict[str, object]) -> Result:
     """As bench makes it, with only these rows besides the peer."""
     peer = {"unit": "frames", "per_s": 1e5, "times_peer": 1.0, "ms": 1.0, "edges_per_unit": 395.0}
     words = "arch cc cflags cxx peer_cflags verilator icarus valgrind python numpy".split()
