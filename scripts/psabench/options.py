@@ -141,8 +141,12 @@ def add_default_node(p: Any) -> None:
 
 
 def add_selection(p: Any, beginning: str, out: str, default: Path | None = None) -> None:
-    """--only, --out and --verbose of a conformance suite. beginning: of ids; out: the folder, for the help."""
+    """Options of every conformance suite. beginning: of ids; out: the folder, for the help."""
     p.add_argument("--only", nargs="+", default=[], metavar="ID", help=f"requirement ids or prefixes: {beginning}")
+    text = "requirements that the run must judge: N, or P%% of those that an interface shows (90%%)"
+    p.add_argument("--min-judged", metavar="N|P%", help=text)
+    text = "requirement ids or prefixes: each must have passed"
+    p.add_argument("--require", nargs="+", default=[], metavar="ID", help=text)
     p.add_argument("--out", type=Path, default=default, metavar="FOLDER", help=f"folder of the report ({out})")
     p.add_argument("-v", "--verbose", action="store_true", help="list passed requirements as well")
 

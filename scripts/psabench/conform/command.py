@@ -27,6 +27,7 @@ examples:
   psabench conform device --board psa2 --profile w24 --can socketcand:127.0.0.1:29536 --lines /dev/pts/7
   psabench conform device --board psd1 --can slcan:/dev/ttyACM0 --bus-port /dev/ttyUSB1
   psabench conform recording run.log lines.vcd --board psa2    recorded files
+  psabench conform recording run.log --board psa2 --min-judged 60 --require PSA2-FRAME    what must have been judged
   psabench conform host --command "build/host {can} {node}"
   psabench conform list --board psa2                     requirements, and how each is observed
 """
@@ -36,7 +37,9 @@ Black box: the suite uses CAN, the lines and the bus port only. A requirement th
 not observable, never as passed. OUT has report.html, and junit.xml and conform.json for programs; each failure comes
 with its waveform.
 
-Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench or a link failed, 130 ended by Ctrl-C.
+Exit status: 0 conforms, or no violation was seen and as much was judged as --min-judged and --require say; 1 a
+requirement is violated; 4 no violation was seen, but too little was judged; 2 bad input; 3 the bench or a
+link failed; 130 ended by Ctrl-C.
 """
 
 RECORDING_EPILOG = """\
@@ -45,7 +48,8 @@ FILE: at most one log of the CAN bus (.log of candump, .blf, .mcap, .mf4 ...), a
 
 A requirement that the files do not show is reported as not observable, never as passed.
 
-Exit status: 0 conforms, 1 does not, 2 bad input, 130 ended by Ctrl-C.
+Exit status: 0 conforms, or no violation was seen and as much was judged as --min-judged and --require say; 1 a
+requirement is violated; 4 no violation was seen, but too little was judged; 2 bad input; 130 ended by Ctrl-C.
 """
 
 HOST_EPILOG = """\
@@ -64,7 +68,9 @@ examples:
   psabench conform host --manual can --results build/results.jsonl     start it by hand, case by case
 
 OUT has report.html, junit.xml and conform.json, and for each case the bus log and the reported results.
-Exit status: 0 conforms, 1 does not, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
+Exit status: 0 conforms, or no violation was seen and as much was judged as --min-judged and --require say; 1 a
+requirement is violated; 4 no violation was seen, but too little was judged; 2 bad input; 3 the bench
+failed; 130 ended by Ctrl-C.
 """
 
 
@@ -183,8 +189,8 @@ def _handler(module: str) -> Callable[[argparse.Namespace], int]:
 
 
 def _list(args: argparse.Namespace) -> int:
-    from psabench.conform.device_command import requirements_of
     from psabench.conform.profile import variant
+    from psabench.conform.selection import requirements_of
 
     for r in requirements_of(variant(args.board, args.profile)):
         print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")

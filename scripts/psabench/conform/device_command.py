@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from psabench.conform import identity, report, runner, suite
+from psabench.conform.coverage import USUAL, Goal
 from psabench.conform.defaults import OUT
 from psabench.conform.dut import INPUTS_V, Addresses, Dut
 from psabench.conform.excerpts import Excerpts
 from psabench.conform.profile import Variant, variant
-from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.selection import goal_of, selected, selection_of
 from psabench.conform.verdict import Outcome
 from psabench.errors import BadInput, expected
 from psabench.procedures.head_bench import Progress
@@ -23,6 +24,7 @@ def handle(args: argparse.Namespace) -> int:
     """Handler of `conform device`."""
     v = variant(args.board, args.profile)
     folder = args.out or OUT / f"{v.board}-{v.profile}"
+    goal = goal_of(args, selected(v, args.only))
     run = device_run(
         v,
         _addresses(args),
@@ -33,21 +35,9 @@ def handle(args: argparse.Namespace) -> int:
         clock_error=args.clock_error,
         recorder_error=args.recorder_error,
         clock_ppm=args.clock_ppm,
+        goal=goal,
     )
     return report.publish(folder, run, everything=args.verbose)
-
-
-def requirements_of(v: Variant) -> list[Requirement]:
-    """Those of a board in a profile, without those of its hosts."""
-    return [r for r in requirements() if r.group != "host" and r.applies(v.board, v.profile)]
-
-
-def selected(v: Variant, only: Sequence[str]) -> list[Requirement]:
-    """Those with these ids or prefixes, all without any. Raises BadInput for none."""
-    rows = [r for r in requirements_of(v) if not only or r.id.startswith(tuple(only))]
-    if not rows:
-        raise BadInput(expected(f"ids or prefixes of {v.name} (psabench conform list)", " ".join(only), "--only"))
-    return rows
 
 
 def device_run(
@@ -61,6 +51,7 @@ def device_run(
     clock_error: float = 0.0,
     recorder_error: float = 0.0,
     clock_ppm: float = 100.0,
+    goal: Goal = USUAL,
 ) -> report.Run:
     """Check a board; what shows a failure goes into the folder. Ctrl-C ends it, and what was checked stays.
 
@@ -79,7 +70,14 @@ def device_run(
         except KeyboardInterrupt:
             interrupted = True
     return report.Run(
-        suite="device", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
+        suite="device",
+        subject=v.name,
+        facts=facts,
+        outcomes=outcomes,
+        rows=rows,
+        interrupted=interrupted,
+        goal=goal,
+        selection=selection_of(("--only", only)),
     )
 
 

@@ -6,9 +6,9 @@ import argparse
 
 from psabench.conform import identity, recording, report, suite
 from psabench.conform.defaults import OUT
-from psabench.conform.device_command import selected
 from psabench.conform.excerpts import Excerpts
 from psabench.conform.profile import variant
+from psabench.conform.selection import goal_of, selected, selection_of
 from psabench.conform.sources.files import read_files
 from psabench.conform.sources.taken import Bounds
 from psabench.conform.verdict import Outcome
@@ -21,6 +21,7 @@ def handle(args: argparse.Namespace) -> int:
     """Handler of `conform recording`."""
     v = variant(args.board, args.profile)
     rows = selected(v, args.only)
+    goal = goal_of(args, rows)
     bench = _bench(args)
     suite.load()
     folder = args.out or OUT / f"recording-{v.board}-{v.profile}"
@@ -33,7 +34,14 @@ def handle(args: argparse.Namespace) -> int:
     outcomes += [] if interrupted else recording.untested(rows, outcomes)
     facts = _facts(bench)
     run = report.Run(
-        suite="recording", subject=v.name, facts=facts, outcomes=outcomes, rows=rows, interrupted=interrupted
+        suite="recording",
+        subject=v.name,
+        facts=facts,
+        outcomes=outcomes,
+        rows=rows,
+        interrupted=interrupted,
+        goal=goal,
+        selection=selection_of(("--only", args.only)),
     )
     return report.publish(folder, run, everything=args.verbose, first=_about(bench))
 

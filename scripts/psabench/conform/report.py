@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from psabench.conform.coverage import USUAL, Coverage, Goal, Result
 from psabench.conform.requirements import Requirement, requirements
-from psabench.conform.verdict import Outcome, Verdict, conforms
+from psabench.conform.verdict import Outcome, Verdict
 from psabench.link.own import replace_file
 from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
 
@@ -37,7 +38,11 @@ CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """Of a suite on one subject. facts: who and what was tested, in words."""
+    """Of a suite on one subject.
+
+    facts: who and what was tested, in words. selection: options that left requirements out. out_of_reach: ids of
+    requirements that this suite cannot see where it is, whatever the subject does.
+    """
 
     suite: str  # device, recording, host
     subject: str
@@ -45,10 +50,21 @@ class Run:
     outcomes: Sequence[Outcome]
     rows: Sequence[Requirement]  # that hold for the subject
     interrupted: bool = False
+    goal: Goal = USUAL
+    selection: str = ""
+    out_of_reach: frozenset[str] = frozenset()
 
     @property
     def conforms(self) -> bool:
-        return not self.interrupted and conforms(list(self.verdicts().values()))
+        """Nothing is violated, and enough was judged to say so."""
+        return self.coverage().result is Result.CONFORMS
+
+    def coverage(self) -> Coverage:
+        """How much was judged."""
+        verdicts = self.verdicts()
+        hidden = {r.id for r in self.rows if r.unobservable} | self.out_of_reach
+        reach = sum(i not in hidden and v is not Verdict.NOT_APPLICABLE for i, v in verdicts.items())
+        return Coverage(verdicts=verdicts, reach=reach, goal=self.goal, interrupted=self.interrupted)
 
     def verdicts(self) -> dict[str, Verdict]:
         """Of each requirement: the worst of its tests; open where somebody could see it and no test looks."""
@@ -100,13 +116,16 @@ def told(o: Outcome) -> Iterator[str]:
 
 
 def summary(run: Run) -> str:
-    """One line: what it came to, with the counts of requirements."""
-    verdicts = list(run.verdicts().values())
-    counts = ", ".join(f"{n} {v.value}" for v in ORDER if (n := verdicts.count(v)))
-    if run.interrupted:
-        return f"{run.subject}: interrupted; of {len(verdicts)} requirements {counts}"
-    said = "conforms" if run.conforms else "does not conform"
-    return f"{run.subject} {said}: of {len(verdicts)} requirements {counts}"
+    """One line: what it came to, how many requirements were judged, and what became of the others."""
+    c = run.coverage()
+    what = f"{run.subject} ({run.selection})" if run.selection else run.subject
+    verb = c.result in (Result.CONFORMS, Result.VIOLATED)
+    said = f"{what} {c.result.value}:" if verb else f"{what}: {c.result.value},"
+    judged = f"{c.judged} of {len(c.verdicts)} requirements judged"
+    short = f" ({c.needed} needed)" if c.judged < c.needed and not c.interrupted else ""
+    others = [f"{n} {v.value}" for v in ORDER if v is not Verdict.PASSED and (n := c.count(v))]
+    missing = [f"required and not passed: {' '.join(c.missing)}"] if c.missing else []
+    return ", ".join([f"{said} {judged}{short}", *others, *missing])
 
 
 def unseen(run: Run) -> dict[str, int]:
@@ -130,7 +149,7 @@ def publish(folder: Path, run: Run, *, everything: bool, first: Sequence[str] = 
     for line in [*first, *lines(run, everything=everything)]:
         print(line)
     print(f"report: {page}", file=sys.stderr)
-    return 130 if run.interrupted else 0 if run.conforms else 1
+    return run.coverage().status
 
 
 def as_dict(run: Run) -> dict[str, Any]:
@@ -141,6 +160,7 @@ def as_dict(run: Run) -> dict[str, Any]:
         "subject": run.subject,
         "conforms": run.conforms,
         "interrupted": run.interrupted,
+        **_sums(run),
         "facts": dict(run.facts),
         "requirements": {i: v.value for i, v in run.verdicts().items()},
         "tests": [_test_dict(o) for o in run.outcomes],
@@ -153,25 +173,46 @@ def _test_dict(o: Outcome) -> dict[str, Any]:
     return {keys.get(name, name): value for name, value in asdict(o).items()} | {"verdict": o.verdict.value}
 
 
+def _sums(run: Run) -> dict[str, Any]:
+    """The result and its counts of requirements, the same in each form of the report."""
+    c = run.coverage()
+    counts = {v.value.replace(" ", "_"): c.count(v) for v in ORDER}
+    return {"result": c.result.value, "judged": c.judged, "needed": c.needed, "of": len(c.verdicts), **counts}
+
+
 def junit(run: Run) -> str:
-    """As CI servers read it: what is not observable or not applicable is skipped, with its reason."""
-    suite = ET.Element("testsuite", name=f"conform {run.suite}: {run.subject}", tests=str(len(run.outcomes)))
-    counts = {
-        "failures": sum(o.verdict is Verdict.FAILED for o in run.outcomes),
-        "errors": sum(o.verdict is Verdict.INCONCLUSIVE for o in run.outcomes),
-        "skipped": sum(o.verdict in (Verdict.NOT_OBSERVABLE, Verdict.NOT_APPLICABLE) for o in run.outcomes),
-    }
-    suite.attrib |= {name: str(n) for name, n in counts.items()}
+    """As CI servers read it, a case for each requirement: one that was not judged is skipped, with its reason."""
+    c = run.coverage()
+    suite = ET.Element("testsuite", name=f"conform {run.suite}: {run.subject}", tests=str(len(c.verdicts)))
+    kinds = Counter(_JUNIT[v] for v in c.verdicts.values() if v in _JUNIT)
+    plurals = {"failure": "failures", "error": "errors", "skipped": "skipped"}
+    suite.attrib |= {plural: str(kinds[kind]) for kind, plural in plurals.items()}
     properties = ET.SubElement(suite, "properties")
-    for name, value in run.facts.items():
-        ET.SubElement(properties, "property", name=name, value=value)
-    for o in run.outcomes:
-        case = ET.SubElement(suite, "testcase", classname=" ".join(o.requirements), name=o.test, time=f"{o.took_s:.3f}")
-        kind = _JUNIT.get(o.verdict)
-        if kind is not None:
-            ET.SubElement(case, kind, message=f"saw {o.saw}; due {o.due}" if o.due else o.reason)
+    for name, value in {**_sums(run), **run.facts}.items():
+        ET.SubElement(properties, "property", name=name, value=str(value))
+    for i, verdict in c.verdicts.items():
+        _case(suite, run, i, verdict)
     ET.indent(suite)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(suite, encoding="unicode") + "\n"
+
+
+def _case(suite: ET.Element, run: Run, i: str, verdict: Verdict) -> None:
+    """The case of a requirement: its tests share their time among what they are tests of."""
+    tests = [o for o in run.outcomes if i in o.requirements]
+    took_s = sum(o.took_s / len(o.requirements) for o in tests)
+    case = ET.SubElement(suite, "testcase", classname=f"{run.suite}.{i.split('-')[0]}", name=i, time=f"{took_s:.3f}")
+    if verdict in _JUNIT:
+        told = [f"{o.test}: {_why(o)}" for o in tests if o.verdict is verdict]
+        ET.SubElement(case, _JUNIT[verdict], message="; ".join(told) or _untested(run, i))
+
+
+def _why(o: Outcome) -> str:
+    return f"saw {o.saw}; due {o.due}" if o.due else o.reason
+
+
+def _untested(run: Run, i: str) -> str:
+    row = next(r for r in run.rows if r.id == i)
+    return f"no external interface shows it: {row.unobservable}" if row.unobservable else "no test looked at it"
 
 
 _JUNIT = {
@@ -199,7 +240,8 @@ def html_page(run: Run, folder: Path) -> str:
 
 def _verdict(run: Run) -> str:
     why = [f"{count} not observable: {escape(reason)}" for reason, count in unseen(run).items()]
-    return verdict_line(summary(run), run.conforms) + bullets(why, "small")
+    colour = {Result.CONFORMS: True, Result.VIOLATED: False}.get(run.coverage().result)
+    return verdict_line(summary(run), colour) + bullets(why, "small")
 
 
 def _failure(o: Outcome, folder: Path) -> str:

@@ -148,9 +148,3 @@ def decide(open_: Outcome, test: Callable[[], str], keep: Callable[[Failed], tup
     except Exception as e:  # an error of the test's own: the other tests still run
         reason = f"the test itself failed: {type(e).__name__}: {str(e)[:200]}"
         return replace(open_, verdict=Verdict.INCONCLUSIVE, reason=reason)
-
-
-def conforms(verdicts: Sequence[Verdict]) -> bool:
-    """Nothing failed, nothing is open but what no probe was there to see, and something passed."""
-    bad = (Verdict.FAILED, Verdict.INCONCLUSIVE)
-    return Verdict.PASSED in verdicts and not any(v in bad for v in verdicts)

@@ -21,7 +21,7 @@ import can
 import made_recordings as make
 import numpy as np
 import pytest
-from made_recordings import judge
+from made_recordings import NO_VIOLATION, judge
 from psabench.cli import main
 from psabench.conform.sources import mf4
 from psabench.conform.sources.can_logs import read_can
@@ -86,7 +86,7 @@ def sound(logs: Mapping[str, Path]) -> bytes:
 def test_an_mf4_is_judged_as_its_source_is(name: str, logs: Mapping[str, Path], tmp_path: Path) -> None:
     words = ["conform", "recording", str(logs[name]), "--board", name, "--out", str(tmp_path / "mf4")]
     run = subprocess.run([PSABENCH, *words], capture_output=True, text=True, timeout=200, check=False)
-    assert run.returncode == 0, run.stdout + run.stderr
+    assert run.returncode == NO_VIOLATION, run.stdout + run.stderr
     report = json.loads((tmp_path / "mf4/conform.json").read_text())
     source = judge(tmp_path, logs[name].with_suffix(".log"), board=name)
     assert report["requirements"] == source.report["requirements"]

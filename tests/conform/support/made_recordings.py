@@ -23,6 +23,8 @@ from psabench.places import find_emulator
 
 INPUTS_V = {"x": 1.0101, "y": -0.3007, "z": 0.7003}
 NOISE_V = 1e-5  # so that no two words are the same
+NO_VIOLATION = 4  # exit status of a run that judged too little to say more
+OPEN = "inconclusive"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,11 @@ class Judged:
     def of(self, verdict: str) -> set[str]:
         """Requirements with this verdict."""
         return {i for i, v in self.report["requirements"].items() if v == verdict}
+
+    @property
+    def clean(self) -> bool:
+        """No violation seen and nothing open. A recording alone never shows enough to conform."""
+        return self.status == NO_VIOLATION and self.report["result"] == "no violation seen" and not self.of(OPEN)
 
     @property
     def failed(self) -> set[str]:

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -45,9 +46,23 @@ def check_report(folder: Path, run: report.Run) -> None:
     told = json.loads((folder / "conform.json").read_text(encoding="utf-8"))
     assert told["requirements"] == {i: v.value for i, v in verdicts.items()}
     assert told["conforms"] == run.conforms
+    check_counts(folder, run)
+
+
+def check_counts(folder: Path, run: report.Run) -> None:
+    """The line on the terminal, the page, JSON and JUnit count the same requirements."""
+    c = run.coverage()
+    told = json.loads((folder / "conform.json").read_text(encoding="utf-8"))
+    assert [told[key] for key in ("result", "judged", "of")] == [c.result.value, c.judged, len(run.rows)]
+    assert f"{c.judged} of {len(run.rows)} requirements judged" in report.summary(run)
+    assert escape(report.summary(run)) in (folder / "report.html").read_text(encoding="utf-8")
     suite = ET.parse(folder / "junit.xml").getroot()
-    assert len(suite.findall("testcase")) == len(run.outcomes)
-    assert int(suite.get("failures", "-1")) == sum(o.verdict is Verdict.FAILED for o in run.outcomes)
+    assert [case.get("name") for case in suite.findall("testcase")] == [r.id for r in run.rows]
+    of_junit = {"failures": "failed", "errors": "inconclusive", "skipped": "not_observable"}
+    assert {kind: int(suite.get(kind, "-1")) for kind in of_junit} == {kind: told[v] for kind, v in of_junit.items()}
+    assert int(suite.get("tests", "-1")) == len(run.rows)
+    properties = {p.get("name"): p.get("value") for p in suite.iter("property")}
+    assert (properties["result"], properties["judged"]) == (c.result.value, str(c.judged))
 
 
 def not_met(run: report.Run) -> list[str]:

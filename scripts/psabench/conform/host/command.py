@@ -14,6 +14,7 @@ from psabench.conform.host.check import CaseCheck, case_checks
 from psabench.conform.identity import suite_facts
 from psabench.conform.profile import Variant, variant
 from psabench.conform.requirements import Requirement, requirements
+from psabench.conform.selection import goal_of, selection_of
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.errors import BadInput, expected
 from psabench.procedures.head_bench import Silent
@@ -49,7 +50,9 @@ def handle(args: argparse.Namespace) -> int:
     rows = [r for r in rows if not args.case or any(r.id in j.ids for j in tests)]
     if not rows:
         raise BadInput(expected("requirements or cases with a check (docs/conform_host.md)", "none", "--only"))
+    goal = goal_of(args, rows)
     outcomes = list(unseen(rows, tests, link))
+    out_of_reach = frozenset(i for o in outcomes for i in o.requirements)
     play = runner.Play(
         folder=args.out,
         board=v.family if v.board in ALIASES else v.board,
@@ -74,6 +77,9 @@ def handle(args: argparse.Namespace) -> int:
         outcomes=outcomes,
         rows=rows,
         interrupted=interrupted,
+        goal=goal,
+        selection=selection_of(("--only", args.only), ("--case", args.case)),
+        out_of_reach=out_of_reach,
     )
     return report.publish(args.out, told, everything=args.verbose)
 
