@@ -163,8 +163,8 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 57_590, 57_590),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_316, 44_316),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_669, 1_669),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_541, 44_316),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_672, 1_669),
 }
 
 

@@ -60,7 +60,7 @@ class Goal:
     least: Least = COMPLETE
     require: tuple[str, ...] = ()  # ids or prefixes of requirements that must have passed
 
-    def check(self, ids: Sequence[str]) -> None:
+    def check_ids(self, ids: Sequence[str]) -> None:
         """Raises BadInput for one that names none of these requirements, and for more than there are."""
         for named in self.require:
             if not any(i.startswith(named) for i in ids):
@@ -81,14 +81,14 @@ class Coverage:
     goal: Goal
     interrupted: bool
 
-    def count(self, verdict: Verdict) -> int:
+    def count_of(self, verdict: Verdict) -> int:
         """Requirements with this verdict."""
         return sum(v is verdict for v in self.verdicts.values())
 
     @property
     def judged(self) -> int:
         """Requirements that passed or failed."""
-        return self.count(Verdict.PASSED) + self.count(Verdict.FAILED)
+        return self.count_of(Verdict.PASSED) + self.count_of(Verdict.FAILED)
 
     @property
     def needed(self) -> int:
@@ -104,15 +104,15 @@ class Coverage:
     @property
     def sufficient(self) -> bool:
         """Something passed, nothing failed or stayed open, and as much was judged as the goal says."""
-        bad = self.count(Verdict.FAILED) + self.count(Verdict.INCONCLUSIVE)
-        return self.count(Verdict.PASSED) > 0 and not bad and self.judged >= self.needed and not self.missing
+        bad = self.count_of(Verdict.FAILED) + self.count_of(Verdict.INCONCLUSIVE)
+        return self.count_of(Verdict.PASSED) > 0 and not bad and self.judged >= self.needed and not self.missing
 
     @property
     def result(self) -> Result:
         """In one word."""
         if self.interrupted:
             return Result.INTERRUPTED
-        if self.count(Verdict.FAILED):
+        if self.count_of(Verdict.FAILED):
             return Result.VIOLATED
         complete = self.sufficient and self.judged >= COMPLETE.of(self.reach)
         return Result.CONFORMS if complete else Result.NO_VIOLATION
@@ -122,6 +122,6 @@ class Coverage:
         """Exit status of the command."""
         if self.interrupted:
             return 130
-        if self.count(Verdict.FAILED):
+        if self.count_of(Verdict.FAILED):
             return 1
         return 0 if self.sufficient else 4

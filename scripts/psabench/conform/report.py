@@ -123,7 +123,7 @@ def summary(run: Run) -> str:
     said = f"{what} {c.result.value}:" if verb else f"{what}: {c.result.value},"
     judged = f"{c.judged} of {len(c.verdicts)} requirements judged"
     short = f" ({c.needed} needed)" if c.judged < c.needed and not c.interrupted else ""
-    others = [f"{n} {v.value}" for v in ORDER if v is not Verdict.PASSED and (n := c.count(v))]
+    others = [f"{n} {v.value}" for v in ORDER if v is not Verdict.PASSED and (n := c.count_of(v))]
     missing = [f"required and not passed: {' '.join(c.missing)}"] if c.missing else []
     return ", ".join([f"{said} {judged}{short}", *others, *missing])
 
@@ -160,7 +160,7 @@ def as_dict(run: Run) -> dict[str, Any]:
         "subject": run.subject,
         "conforms": run.conforms,
         "interrupted": run.interrupted,
-        **_sums(run),
+        **_result_counts(run),
         "facts": dict(run.facts),
         "requirements": {i: v.value for i, v in run.verdicts().items()},
         "tests": [_test_dict(o) for o in run.outcomes],
@@ -173,10 +173,10 @@ def _test_dict(o: Outcome) -> dict[str, Any]:
     return {keys.get(name, name): value for name, value in asdict(o).items()} | {"verdict": o.verdict.value}
 
 
-def _sums(run: Run) -> dict[str, Any]:
+def _result_counts(run: Run) -> dict[str, Any]:
     """The result and its counts of requirements, the same in each form of the report."""
     c = run.coverage()
-    counts = {v.value.replace(" ", "_"): c.count(v) for v in ORDER}
+    counts = {v.value.replace(" ", "_"): c.count_of(v) for v in ORDER}
     return {"result": c.result.value, "judged": c.judged, "needed": c.needed, "of": len(c.verdicts), **counts}
 
 
@@ -188,25 +188,25 @@ def junit(run: Run) -> str:
     plurals = {"failure": "failures", "error": "errors", "skipped": "skipped"}
     suite.attrib |= {plural: str(kinds[kind]) for kind, plural in plurals.items()}
     properties = ET.SubElement(suite, "properties")
-    for name, value in {**_sums(run), **run.facts}.items():
+    for name, value in {**_result_counts(run), **run.facts}.items():
         ET.SubElement(properties, "property", name=name, value=str(value))
     for i, verdict in c.verdicts.items():
-        _case(suite, run, i, verdict)
+        _add_case(suite, run, i, verdict)
     ET.indent(suite)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(suite, encoding="unicode") + "\n"
 
 
-def _case(suite: ET.Element, run: Run, i: str, verdict: Verdict) -> None:
+def _add_case(suite: ET.Element, run: Run, i: str, verdict: Verdict) -> None:
     """The case of a requirement: its tests share their time among what they are tests of."""
     tests = [o for o in run.outcomes if i in o.requirements]
     took_s = sum(o.took_s / len(o.requirements) for o in tests)
     case = ET.SubElement(suite, "testcase", classname=f"{run.suite}.{i.split('-')[0]}", name=i, time=f"{took_s:.3f}")
     if verdict in _JUNIT:
-        told = [f"{o.test}: {_why(o)}" for o in tests if o.verdict is verdict]
+        told = [f"{o.test}: {_reason_of(o)}" for o in tests if o.verdict is verdict]
         ET.SubElement(case, _JUNIT[verdict], message="; ".join(told) or _untested(run, i))
 
 
-def _why(o: Outcome) -> str:
+def _reason_of(o: Outcome) -> str:
     return f"saw {o.saw}; due {o.due}" if o.due else o.reason
 
 

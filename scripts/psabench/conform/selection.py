@@ -31,7 +31,7 @@ def goal_of(args: argparse.Namespace, rows: Sequence[Requirement]) -> Goal:
     except ValueError as e:
         raise BadInput(expected("a number of requirements, or 0% to 100%", args.min_judged, "--min-judged")) from e
     goal = Goal(least=least, require=tuple(args.require))
-    goal.check([r.id for r in rows])
+    goal.check_ids([r.id for r in rows])
     return goal
 
 

@@ -29,7 +29,7 @@ def test_a_board_conforms_over(transport: str, board: str, profile: str) -> None
     at = Addresses(adapter=ADAPTERS[transport], port_only=True)
     run = reported(board, profile, at, transport, () if services else MINE[board])
     assert not_met(run) == []
-    assert not run.coverage().count(Verdict.INCONCLUSIVE)
+    assert not run.coverage().count_of(Verdict.INCONCLUSIVE)
     verdicts = run.verdicts()
     passed = {i for i, v in verdicts.items() if v is Verdict.PASSED}
     assert len(passed) >= (90 if services else 30)
