@@ -136,7 +136,10 @@ def bus_object(rows: list[dict[str, Any]]) -> Object:
         address = r.get("address", address)
         if address not in BUS_REGISTERS or (entries and address < entries[-1].sub):
             raise ValueError(f"bus: {r['name']}: address {address}")
-        row = {"type": "UNSIGNED16", "access": "rw", **{k: v for k, v in r.items() if k != "address"}}
+        row = {"type": "UNSIGNED16", "access": "rw", **{k: v for k, v in r.items() if k not in ("address", "object")}}
+        if "object" in r:
+            index, sub = r["object"]
+            row["comment"] += f"; as {index:04X}h:{sub}"
         entries.append(Entry(index=BUS, sub=address + 1, **row))
         address += 1
     highest = entries[-1].sub
@@ -160,9 +163,19 @@ def unit_objects(source: dict[str, Any], base: Protocol) -> list[Object]:
             rows = [{"type": "UNSIGNED32", "access": "ro", **c} for c in source["counters"]]
             o["subs"] += [{k: v for k, v in r.items() if k != "counter"} for r in rows]
         objects.append(read_object(o, source))
+    own = [read_object(o, source) for o in source.get("objects", [])]
     if "bus" in source:
+        check_doors(source["bus"], own)
         objects.append(bus_object(source["bus"]))
-    return objects + [read_object(o, source) for o in source.get("objects", [])]
+    return objects + own
+
+
+def check_doors(rows: list[dict[str, Any]], objects: list[Object]) -> None:
+    """A register that shows what an object shows names one that there is. Raises ValueError."""
+    there = {(e.index, e.sub) for o in objects for e in o.entries}
+    for r in rows:
+        if "object" in r and tuple(r["object"]) not in there:
+            raise ValueError(f"bus: {r['name']}: expected an object of this board, got {r['object']}")
 
 
 def load_unit(path: Path, source: dict[str, Any], base: Protocol) -> Protocol:

@@ -283,6 +283,7 @@ class Dut:
 
 SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g", "kxy_v_per_g2", "drift_v_per_s", "reading_noise_v")
 PPM = 1e-6
+ASKEW_ARCSEC = [500, -1000, 0]  # of a board on a table: what its three gyros see of a turn differs
 # What a gyro unit is on: the platform without errors, as it was left; the PSA-2 that measures its level.
 PLATFORM: Mapping[str, Any] = {
     "site": {"latitude_deg": 50.0},
@@ -335,6 +336,7 @@ def scenario(
     around: dict[str, Any] = {"chamber": {}} if board.has_thermometer else {}
     if board.on_table:
         unit["on"], around["table"] = "table", {}
+        unit["misalignment_arcsec"] = ASKEW_ARCSEC
     if board.overdrive_v_per_g and "x" in axes:  # nothing at 0 deg; beyond full scale at -90 deg
         axes["x"]["kx_v_per_g"], around["head"] = board.overdrive_v_per_g, {}
     return {"supply": {}, **around, "units": [unit]}

@@ -105,13 +105,17 @@ def check(
 
 
 def active(
-    *ids: str, needs: Iterable[str] = ("can",), before: Prepare | None = None, after: Prepare | None = None
+    *ids: str,
+    needs: Iterable[str] = ("can",),
+    before: Prepare | None = None,
+    after: Prepare | None = None,
+    boards: Iterable[str] = (),
 ) -> Callable[[Test], Active]:
     """A test that asks the board itself.
 
-    before: brings the board to a known state first; after: the same once it has passed.
+    before: brings the board to a known state first; after: the same once it has passed. boards: as those of a check.
     """
-    plan = Plan(stimulus="", needs=_ways(needs))
+    plan = Plan(stimulus="", needs=_ways(needs), boards=frozenset(boards))
     return lambda test: _planned(test, ids, plan, before, after)
 
 

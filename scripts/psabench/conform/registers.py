@@ -1,18 +1,24 @@
-"""Registers of a parallel bus against the table of proto/<board>.yaml: names, rights, what answers where."""
+"""Registers of a parallel bus against the table of proto/<board>.yaml: names, rights, what answers where, which object
+shows the same."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from psabench.conform.bus_host import line, line_refused, port
 from psabench.conform.dut import Dut
 from psabench.conform.profile import proto_yaml
-from psabench.conform.verdict import expect
+from psabench.conform.verdict import Inconclusive, conclusive, expect
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)
 ADDRESSES = 16
+NUMBER = (0x2202, 1)  # of the latest reading, whatever the board
+LOOKS, TRIES = 4, 40  # readings; to read two doors within one of them, in real time
+WORD = 0xFFFF
 
 
 @cache
@@ -50,3 +56,47 @@ def _rights(s: Dut, address: int, row: Mapping[str, Any], never: Mapping[str, in
         line_refused(s, f"W {address:X} 0", READ_ONLY)
     else:
         line(s, f"W {address:X} {writes.get(name, 0):X}")
+
+
+@dataclass(frozen=True, slots=True)
+class Door:
+    """A register and the object that shows the same."""
+
+    name: str
+    address: int
+    index: int
+    sub: int
+
+
+def doors(board: str) -> tuple[Door, ...]:
+    """The registers of a board beside which its table names an object."""
+    return tuple(Door(str(r["name"]), k, *r["object"]) for k, r in enumerate(table(board)) if "object" in r)
+
+
+def one_value(s: Dut, board: str, renew: Callable[[Dut], None], *, told_apart: bool = True) -> str:
+    """Every register beside its object in some readings; returns what was seen, raises Failed.
+
+    renew: lets the board make another reading. told_apart: raises Inconclusive where two registers showed the same in
+    all readings, so that no one could tell one from the other.
+    """
+    seen: dict[str, list[int]] = {}
+    for _ in range(LOOKS):
+        renew(s)
+        for door in doors(board):
+            seen.setdefault(door.name, []).append(_both(s, door))
+    alike = [f"{a} and {b}" for a, b in itertools.combinations(seen, 2) if seen[a] == seen[b]]
+    conclusive(not (told_apart and alike), f"{', '.join(alike)} showed the same in {LOOKS} readings")
+    return f"{len(seen)} registers as their objects in {LOOKS} readings" + (f"; alike: {', '.join(alike)}" * bool(alike))
+
+
+def _both(s: Dut, door: Door) -> int:
+    """The word of a register and of its object within one reading."""
+    read = s.unit.node.read
+    for _ in range(TRIES):
+        number, told = int(read(*NUMBER)), int(read(door.index, door.sub)) & WORD
+        word = line(s, f"R {door.address:X}").data
+        if int(read(*NUMBER)) == number:
+            due = f"{told:04X}h as in {door.index:04X}h:{door.sub}"
+            expect(word == told, f"{word:04X}h in {door.name}", due)
+            return word
+    raise Inconclusive(f"no reading stood still while {door.name} and its object were read")

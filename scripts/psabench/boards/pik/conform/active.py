@@ -9,7 +9,7 @@ from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.registers import names_and_rights
+from psabench.conform.registers import names_and_rights, one_value
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, conclusive, expect
@@ -189,6 +189,17 @@ def what_cannot_be_is_refused(s: Dut, row: Requirement) -> str:
 def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     return names_and_rights(s, "pik", never={}, writes={"PERIOD": 100})
+
+
+@active("BUS-PORT-11", needs={"bus", "can"}, before=by_hand, after=calm, boards=("pik",))
+def registers_show_what_their_objects_show(s: Dut) -> str:
+    """Latch by hand, read X, Y, Z and SEQ beside the objects of the same reading."""
+
+    def renew(s: Dut) -> None:
+        s.run_for(0.05)
+        line(s, LATCH)
+
+    return one_value(s, "pik", renew)
 
 
 @active("PIK-CAN-05", needs={"can"})

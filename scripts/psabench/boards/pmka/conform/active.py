@@ -11,7 +11,7 @@ from psabench.conform.capture.log import CanLog
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.registers import names_and_rights
+from psabench.conform.registers import names_and_rights, one_value
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
 from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
@@ -84,6 +84,12 @@ def registers_have_their_names_and_rights(s: Dut) -> str:
     """Ask who is there, read and write every address."""
     line(s, "W 9 0")  # COMMAND is taken in mode program
     return names_and_rights(s, "pmka", never={}, writes={"COMMAND": 0, "BEAT": 200, "ZERO": 100, "INDEX": 1, "MODE": 0})
+
+
+@active("BUS-PORT-11", needs={"bus", "can"}, before=calm, boards=("pmka",))
+def registers_show_what_their_objects_show(s: Dut) -> str:
+    """Read codes, resets, number and temperature beside the objects of the same reading."""
+    return one_value(s, "pmka", lambda s: s.run_for(2 * ts_s()))
 
 
 @active("PMKA-CAL-02", needs={"bus", "can"}, before=calm, after=calm)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from psabench.boards.objects import Psd1Objects as OD
 from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.registers import names_and_rights
+from psabench.conform.registers import names_and_rights, one_value
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, expect
 from psabench.errors import CycleRefused
@@ -159,6 +161,34 @@ def registers_have_their_names_and_rights(s: Dut) -> str:
     return names_and_rights(s, "psd1", never=words, writes={"COMMAND": 3, "TEMP": 1, "SERVICE": 2, "FLAGS": 0})
 
 
+@active("BUS-PORT-11", needs={"bus", "can"}, before=calm, after=calm, boards=("psd1",))
+def registers_show_what_their_objects_show(s: Dut) -> str:
+    """Read gyros and rate sensors beside the objects of the same cycle; where there is a rate table it turns meanwhile."""
+
+    def renew(s: Dut) -> None:
+        line(s, f"W F {BOTH:04X}")
+        run_cycles(s, 2)
+        line(s, "W F 0000")
+        s.run_for(period_s(s.variant))
+
+    with _turning(s) as turns:
+        return one_value(s, "psd1", renew, told_apart=turns)
+
+
+@contextmanager
+def _turning(s: Dut) -> Iterator[bool]:
+    """The rate table turns within; False: there is none."""
+    if "table" not in s.probes:
+        yield False
+        return
+    s.bench.table.rate(TURN_DPS)
+    s.run_for(TURN_DPS / TURN_DPS2 + 0.1)
+    try:
+        yield True
+    finally:
+        s.bench.table.stop()
+
+
 @active("PSD1-BUS-10", needs={"bus"}, before=calm)
 def channels_come_back_with_their_codes(s: Dut, row: Requirement) -> str:
     """Write each channel to TEMP and SERVICE and read it back."""
@@ -213,19 +243,12 @@ def the_service_signal_follows_the_supply(s: Dut, row: Requirement) -> str:
 @active("PSD1-BUS-12", needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Dut) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
-    table = s.bench.table if "table" in s.probes else None
-    if table is not None:
-        table.rate(TURN_DPS)
-        s.run_for(TURN_DPS / TURN_DPS2 + 0.1)
-    try:
+    with _turning(s) as turns:
         first, later = _latched(s), _latched(s)
-    finally:
-        if table is not None:
-            table.stop()
     calm(s)
-    if table is not None and first[:3] == later[:3]:
+    if turns and first[:3] == later[:3]:
         raise Failed(f"gyros {first[:3]} in two cycles of a board that turns", "counts that go on")
-    return f"{first} twice in a cycle" + (f", then {later}" if table is not None else "")
+    return f"{first} twice in a cycle" + (f", then {later}" if turns else "")
 
 
 def _latched(s: Dut) -> list[int]:

@@ -10,6 +10,7 @@ from psabench.boards.psd1.conform.host import (
     BOTH,
     FLAGS,
     calm,
+    coefficients,
     drive,
     has_host,
     messages_on,
@@ -53,10 +54,6 @@ def _control(s: Dut) -> tuple[int, int]:
     return int(s.unit.node.read(OD.UC1)), int(s.unit.node.read(OD.UC2))
 
 
-def _coefficients(s: Dut) -> list[int]:
-    return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in AXES]
-
-
 def _cycles(s: Dut, count: int) -> Readings:
     """Words of the next cycles, as they are reported; of more in real time, where a busy machine is late."""
     s.unit.frames.forget()
@@ -82,7 +79,7 @@ def control_words_are_read_as_they_are(s: Dut, row: Requirement) -> str:
 @active("PSD1-SETUP-01", needs={"can"}, before=calm)
 def coefficients_are_kept(s: Dut) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
-    first, again = _coefficients(s), _coefficients(s)
+    first, again = coefficients(s), coefficients(s)
     expect(all(first) and first == again, f"{first}, then {again}", "six that are not 0, and the same again")
     return f"zero {first[:3]}, full scale {first[3:]}"
 
@@ -90,7 +87,7 @@ def coefficients_are_kept(s: Dut) -> str:
 @active("PSD1-SETUP-01", needs={"bus", "can"}, before=calm)
 def coefficients_are_shown_on_the_bus(s: Dut) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
-    for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), _coefficients(s), strict=True):
+    for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), coefficients(s), strict=True):
         line(s, f"W E {command:X}")
         got = line(s, "R C").data << 16 | line(s, "R D").data
         expect(got == due, f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
@@ -121,14 +118,14 @@ def converters_are_in_step_after_res(s: Dut) -> str:
 @active("PSD1-UC-03", needs={"can"}, before=calm, after=calm)
 def uc1_calibrates_anew(s: Dut, row: Requirement) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
-    before, (uc1, uc2) = _coefficients(s), _control(s)
+    before, (uc1, uc2) = coefficients(s), _control(s)
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
     took = []
     for index, value in ((OD.UC1, uc1), (OD.UC2, uc2)):
         begun_s = s.bench.time_s
         s.unit.node.write(index, 0, value)
         took.append(s.bench.time_s - begun_s)
-    after = _coefficients(s)
+    after = coefficients(s)
     expect(before != after, f"coefficients {before} before and after", "new ones")
     if s.lockstep and took[0] > most_s:
         raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")

@@ -22,6 +22,7 @@ from psabench.conform.capture.intervals import (
     before,
     bus_word,
     edges,
+    fact,
     first_bad,
     interval,
     overlaps,
@@ -40,7 +41,8 @@ from psabench.link.signals import Ints
 WRITE = ("TFS", "A0", "SCLK", "SDAT", "CLK_1M25", "DR")
 SETUP = ("TFS", "A0", "DR", "SCLK", *FRAMES)
 MS = 1e6
-COEFFICIENTS = 6  # zero and full scale of three converters
+COEFFICIENT_NAMES = tuple(f"{kind} of {axis}" for kind in ("zero", "full scale") for axis in "XYZ")  # as they are read
+COEFFICIENTS = len(COEFFICIENT_NAMES)
 CYCLE_BYTES, CNT_AT = 8, 6  # of PSD1_CYCLE
 STATUS_LINES = ("FL2", "A0", "INT0", "FL1", "DR")
 
@@ -75,6 +77,19 @@ def frames(e: Capture) -> list[Frame]:
 def controls(e: Capture) -> list[Frame]:
     """The control words."""
     return [f for f in frames(e) if f.line == "TFS"]
+
+
+@check("power_on", "PSD1-SETUP-01", needs={"pins", "can"}, on_recording="")
+def coefficients_are_those_of_their_converters(e: Capture) -> str:
+    """Read the six coefficients off SDAT and compare each with its object, 2044h and 2045h."""
+    read = [f for f in frames(e) if f.line != "TFS" and len(f.rises) == CONTROL_BITS][:COEFFICIENTS]
+    conclusive(len(read) == COEFFICIENTS, f"{len(read)} coefficients were read in the recording")
+    told, seen = fact(e, "coefficients"), [_word(e, f) for f in read]
+    for name, here, there, f in zip(COEFFICIENT_NAMES, seen, told, read, strict=True):
+        expect(here == there, f"{name} {there:06X}h", f"{here:06X}h as on SDAT", at_ns=f.fall, lines=SETUP)
+    for part in (seen[:3], seen[3:]):
+        conclusive(len(set(part)) == len(part), "two converters gave the same coefficient: no one can tell which is which")
+    return f"{', '.join(f'{w:06X}h' for w in seen)} on SDAT and in the objects"
 
 
 @check("power_on", "PSD1-SETUP-02", needs={"pins"})

@@ -44,6 +44,11 @@ def calm(s: Dut) -> None:
     s.run_for(0.002 + setup_s(s.variant))
 
 
+def coefficients(s: Dut) -> list[int]:
+    """Zero of X, Y, Z and full scale of X, Y, Z, as 2044h and 2045h show them."""
+    return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in (1, 2, 3)]
+
+
 def messages_on(s: Dut, on: bool) -> None:
     """Switch PSD1_TIME, PSD1_GYRO and PSD1_RATE on or off."""
     for index in TPDOS.values():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from psabench.boards.psd1.conform.host import calm, has_host, messages_on, period_s, run_cycles, setup_s, word
+from dataclasses import replace
+
+from psabench.boards.psd1.conform.host import calm, coefficients, has_host, messages_on, period_s, run_cycles, setup_s, word
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
@@ -15,8 +17,9 @@ MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than th
 
 @stimulus("power_on", boards=("psd1",))
 def power_on(s: Dut) -> Capture:
-    """From Res to the first cycles, streaming as soon as it has booted."""
-    return from_res(s, setup_s(s.variant))
+    """From Res to the first cycles, streaming as soon as it has booted. facts: coefficients, as the objects show them."""
+    e = from_res(s, setup_s(s.variant))
+    return replace(e, facts={**e.facts, "coefficients": coefficients(s)})
 
 
 @recorded("stream", boards=("psd1",), before=calm, streaming=True)
