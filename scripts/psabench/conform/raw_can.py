@@ -327,7 +327,7 @@ def talk(s: Dut, *, reset: bool = False, take: Take | None = None) -> Iterator[T
 
 
 def dialogue(
-    *ids: str, needs: Iterable[str] = ("can",), reset: bool = False, boards: Iterable[str] = ()
+    *ids: str, needs: Iterable[str] = ("can",), reset: bool = False
 ) -> Callable[[Dialogue], Callable[[Dut], str]]:
     """An active test that is a conversation: it gets a Talk, which ends with it as `talk` says."""
 
@@ -337,7 +337,7 @@ def dialogue(
             with talk(s, reset=reset) as t:
                 return test(t, *row)
 
-        return active(*ids, needs=needs, boards=boards)(converse)
+        return active(*ids, needs=needs)(converse)
 
     return register
 

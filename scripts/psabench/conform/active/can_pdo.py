@@ -8,12 +8,14 @@ from __future__ import annotations
 import itertools
 
 from psabench.boards.objects import Common
-from psabench.conform.capture.log import CanFrame
+from psabench.conform.capture.log import CanFrame, CanLog
+from psabench.conform.check.can_frames import numbered, pdos
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect, none_of
+from psabench.link.protocol_files import message
 
 READINGS, TIMEOUT_S = 1, 5.0  # sub-index of 2030h
 FEW = 4  # readings in which something should come, or nothing
@@ -23,6 +25,7 @@ EVENT, SYNC_NEW = 254, 0
 INHIBIT_S = 0.05
 HISTORY, OVERLOADS = Common.ERROR_HISTORY, 9
 FLOOD_S, CALM_S = 0.3, 1.3
+LONG, EIGHTHS = {"can", "lockstep", "stream"}, 8  # a round of 16 bits takes minutes of the bench
 
 
 def _first(t: Talk) -> tuple[int, int]:
@@ -198,6 +201,37 @@ def the_inhibit_time_keeps_tpdos_apart(t: Talk, row: Requirement) -> str:
     if not least - 2 <= len(came) + left_out <= most + 2:
         raise Failed(f"{len(came)} sent, {left_out} left out of {least} to {most} readings", "each sent or counted")
     return f"{min(apart_s):.6f} s and more apart; of {most} readings {left_out} left out"
+
+
+@dialogue("PSA2-CAN-04", "PMKA-CAN-02", "PIK-CAN-03", "PSD1-CAN-03", "GYRO-CAN-02", needs=LONG, reset=True)
+def numbers_go_on_to_their_modulus(t: Talk) -> str:
+    """Let a whole round of numbers pass, an eighth at a time; compare numbers with 2030h:1, which counts on."""
+    t.s.wait_ready()
+    name, signal = numbered(t.s.variant.family)
+    modulus, can_id = 1 << message(name).get_signal_by_name(signal).length, pdos(t.s.variant.family)[name] + t.node
+    base, seen, rate_hz = None, [], _rate_hz(t)
+    for _ in range(EIGHTHS + 2):
+        before = t.number(Common.COUNTERS, READINGS)
+        came = t.stream(FEW, can_id)
+        t.hush()
+        after = t.number(Common.COUNTERS, READINGS)
+        numbers = CanLog(frames=tuple(came)).raw(name)[signal]
+        base = before - int(numbers[0]) if base is None else base
+        behind = [(after - base - int(n)) % modulus for n in numbers]
+        due = f"{before - base} to {after - base} modulo {modulus} as counted in 2030h:1"
+        expect(max(behind) <= after - before + 1, f"{signal} {numbers.tolist()}", due, frames=came)
+        seen.append(int(numbers[0]))
+        t.s.run_for(modulus / EIGHTHS / rate_hz)
+    return f"{signal} {', '.join(map(str, seen))} as 2030h:1 counts modulo {modulus}"
+
+
+def _rate_hz(t: Talk) -> float:
+    """Readings a second, as 2030h:1 counts them."""
+    before = t.number(Common.COUNTERS, READINGS)
+    t.s.run_for(1.0)
+    made = t.number(Common.COUNTERS, READINGS) - before
+    conclusive(made, "no reading in a second")
+    return float(made)
 
 
 @dialogue("BUS-EMCY-04", needs={"can", "stream"}, reset=True)

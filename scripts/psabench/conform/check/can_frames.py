@@ -273,11 +273,16 @@ def lost_samples_are_told(e: Capture, row: Requirement) -> str:
     return f"{missing} readings lost, all counted; told, and over {lasted_s:.3f} s later"
 
 
+@cache
+def numbered(family: str) -> tuple[str, str]:
+    """The message and the signal that number a board's readings."""
+    counter = "SEQ" if family == "psa2" else of_board(family).layout.counter
+    return next(n for n in pdos(family) if counter in message(n).signal_tree), counter
+
+
 def _numbers(e: Capture) -> np.ndarray:
     """Numbers (n,) of the readings of the log, unwrapped. Raises Inconclusive, and Failed for other lengths."""
-    family = e.variant.family
-    counter = "SEQ" if family == "psa2" else of_board(family).layout.counter
-    name = next(n for n in pdos(family) if counter in message(n).signal_tree)
+    name, counter = numbered(e.variant.family)
     frames = e.frames_of(name)
     conclusive(len(frames) >= 2, f"{len(frames)} frames {name} in the log")
     with damaged_data_are(Failed, "frames of the DBC's length"):

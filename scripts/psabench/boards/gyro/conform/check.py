@@ -23,6 +23,7 @@ LINES = ("STEP", "READY", "SLEW", "SETTLE", "WINDOW", "FAULT")
 FLAGS = ("SATURATED", "LEVEL_LOST", "ENCODER_FAULT", "NOT_SETTLED")
 PHASES = {"SLEW": Phase.SLEWING, "SETTLE": Phase.SETTLING, "WINDOW": Phase.WINDOW}
 US = 1e3
+LEAST = 20  # readings that lack a frame of the level unit
 LIMITS = ("GYRO-LAW-05", "GYRO-LAW-06")
 
 
@@ -257,6 +258,18 @@ def missing_frames_are_told(e: Capture, row: Requirement) -> str:
     took = ended[-1] - begun[0]
     expect(abs(took - due) <= row.limit("tolerance_s"), f"ended {took:.3f} s after it began", f"{due:.3f} s")
     return f"LEVEL_LOST in {int(lost.sum())} readings, FF21h ended {took:.3f} s after it began"
+
+
+@check("gaps", "GYRO-LEV-03", needs={"can"})
+def a_single_missing_frame_is_told(e: Capture) -> str:
+    """Look for LEVEL_LOST in the readings while each frame of the level unit lacks the one before it."""
+    part = slice(*fact(e, "gaps"))
+    c = columns(e.with_can(CanLog(frames=e.can.frames[part])))
+    lost, fresh = c["LEVEL_LOST"] == 1, np.diff(c["LEVEL_SEQ"], prepend=c["LEVEL_SEQ"][0]) != 0
+    conclusive(fresh.sum() >= LEAST, f"{fresh.sum()} readings with a new frame of the level unit")
+    missed = int((fresh & ~lost).sum())
+    expect(not missed, f"{missed} of {fresh.sum()} readings that lack a frame without LEVEL_LOST", "LEVEL_LOST in each")
+    return f"LEVEL_LOST in {fresh.sum()} readings that lack one frame each"
 
 
 @check("silence", "GYRO-LEV-04", needs={"can"})

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from psabench.boards.gyro.conform.capture_readings import columns, vertical_degph
 from psabench.boards.gyro.device import SETTINGS, Gyro, Mode, Phase
 from psabench.boards.objects import GyroObjects as OD
+from psabench.boards.objects import Psa2Objects
 from psabench.boards.unit import NMT_PREOP, NMT_START
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
@@ -15,8 +17,11 @@ from psabench.conform.requirements import requirements
 from psabench.conform.stimulus.streamed import from_res, recorded, while_streaming
 from psabench.conform.verdict import conclusive, known
 from psabench.estimate.angles import wrapped_deg
+from psabench.link.canopen_host import CanopenNode
+from psabench.places import proto_file
 
 READY_S = 0.4
+EVERY_NTH = 2  # sample mode of a PSA-2
 REST_S = 2.0  # from there to what the Earth and the drift leave, nearly: two time constants
 WAIT_S = 0.5
 RUN_LIMIT_S = 150.0
@@ -46,6 +51,16 @@ def level_unit(s: Dut, on: bool) -> None:
     node = int(s.unit.node.read(OD.LEVEL, 1))
     s.host.send(0x000, bytes([NMT_START if on else NMT_PREOP, node]))
     s.run_for(0.2 if on else 0.02)
+
+
+@contextmanager
+def level_client(s: Dut) -> Iterator[CanopenNode]:
+    """SDOs of the level unit."""
+    listeners = list(s.host.listeners)
+    try:
+        yield CanopenNode(s.host, int(s.unit.node.read(OD.LEVEL, 1)), proto_file("psa2.eds"), timeout_s=1.0)
+    finally:
+        s.host.listeners[:] = listeners
 
 
 def settings(s: Dut) -> dict[str, object]:
@@ -223,3 +238,22 @@ def silence(s: Dut, take: Take) -> None:
     s.run_for(0.5)
     level_unit(s, True)
     s.run_for(2.5)
+
+
+@recorded("gaps", boards=("gyro",), before=levelled, after=calm, lines=False, streaming=True)
+def gaps(s: Dut, take: Take) -> None:
+    """Every second frame of the level unit left out, by its sample mode 2; before and after all of them.
+
+    facts: gaps, first and last frame of the while in which each frame lacks the one before.
+    """
+    with level_client(s) as level:
+        s.run_for(0.3)
+        level.write(Psa2Objects.SAMPLE_NTH, 0, 2)
+        level.write(Psa2Objects.SAMPLE_MODE, 0, EVERY_NTH)
+        s.run_for(0.1)
+        begin = len(take.frames)
+        s.run_for(1.0)
+        take.facts["gaps"] = begin, len(take.frames)
+        level.write(Psa2Objects.SAMPLE_MODE, 0, 0)
+        level.write(Psa2Objects.SAMPLE_NTH, 0, 1)
+    s.run_for(2.0)

@@ -16,7 +16,7 @@ from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, damaged_data_are, expect, none_of
+from psabench.conform.verdict import Failed, conclusive, damaged_data_are, expect, none_of
 from psabench.link import signals
 from psabench.link.protocol_files import message
 from psabench.link.signals import Floats, Ints
@@ -117,6 +117,22 @@ def _evenly(e: Capture, row: Requirement, stamp_us: Ints, samples: int) -> str:
     if (np.abs(step - due) > slack_us).any():
         raise Failed(f"{step[np.argmax(np.abs(step - due))]} us from frame to frame", f"{due:.0f} us")
     return f"{due:.0f} us apart"
+
+
+@check("forms", "PSA2-FORM-04", needs={"fd"})
+def the_stamp_of_a_block_is_that_of_its_first_sample(e: Capture, row: Requirement) -> str:
+    """Read 2202h:5, the stamp of the latest sample, as soon as a block has come: the last of its samples or a later one."""
+    apart_us = (row.limit("samples_count") - 1) * row_for(e, "PSA2-READ-06").limit("period_us")
+    least_us = apart_us - row.limit("tolerance_us") - e.slack_ns(apart_us * 1e3) * 1e-3
+    found = []
+    for answer, came in fact(e, "latest", "no stamp was read after a block"):
+        with damaged_data_are(Failed, "messages of their length", frames=e.can.frames[came - 1 : came]):
+            block = CanLog(frames=e.can.frames[came - 1 : came]).raw("PSA2_BLOCK")
+        found.append((number(answer) - int(block["TSTAMP"][0])) % (1 << 32))
+    conclusive(found, "no block came")
+    due = f"{apart_us:.0f} us or more: the first of its samples"
+    expect(least_us <= min(found) <= max(found) < 1 << 31, f"TSTAMP {min(found)} us before the latest sample", due)
+    return f"TSTAMP {min(found)} to {max(found)} us before the latest sample"
 
 
 @check("forms", "PSA2-FORM-05", needs={"fd"})

@@ -10,15 +10,17 @@ from psabench.boards.psa2.conform.capture_can import SEQ_BITS, STAMP_BITS, pairs
 from psabench.boards.psa2.conform.capture_line import WORDS, Transfers, transfers
 from psabench.boards.psa2.conform.check_serial import LEAST
 from psabench.boards.psa2.conform.stimulus_can import FRAMES, OVERRUNS, Answer
-from psabench.conform.capture.intervals import fact, first_of
-from psabench.conform.capture.log import CanLog, Capture
+from psabench.conform.capture.intervals import fact, first_of, wires_needed
+from psabench.conform.capture.log import Bools, CanLog, Capture
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.protocol_files import message
+from psabench.link.signals import Floats, Ints
 
 LINES = ("Int", "Data", "CLK")
+SAMPLED = ("DRD_A", "Int")
 FORMATS = ("PSA2-FRAME-06", "PSA2-FRAME-07", "PSA2-FRAME-08")
 MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
 US = 1e-6
@@ -169,18 +171,30 @@ def tstamp_goes_by_the_data_period(e: Capture, row: Requirement) -> str:
 
 @check("stream", "PSA2-CAN-05", needs={"pins", "exact"})
 def tstamp_is_the_fall_of_drd_a(e: Capture, row: Requirement) -> str:
-    """Compare TSTAMP with the falls of DRD_A."""
+    """Compare each TSTAMP with the fall of DRD_A of its own sample: the last before the Int that its frame follows."""
     p = pairs(e)
-    falls = e.wires.falls("DRD_A")
-    conclusive(len(falls) >= LEAST, f"{len(falls)} falls of DRD_A were recorded")
-    due = np.unique(falls // round(unit_us(e) * 1e3) % (1 << STAMP_BITS))
-    bad = ~np.isin(p.stamp % (1 << STAMP_BITS), due)
-    if bad.sum() > row.limit("edge_max_frames"):
-        k = int(np.flatnonzero(bad)[0])
-        raise Failed(
-            f"TSTAMP {p.stamp[k] % (1 << STAMP_BITS)} at no fall of DRD_A", "the instant of one", frames=p.about(k)
-        )
-    return f"{len(p)} time stamps, each a fall of DRD_A"
+    known, fall_ns = sampled_ns(e, np.array([f.t_s for f in p.frames]))
+    conclusive(known.sum() >= LEAST, f"{known.sum()} samples with their fall of DRD_A were recorded")
+    wrap = 1 << STAMP_BITS
+    saw, due = p.stamp[known] % wrap, fall_ns[known] // round(unit_us(e) * 1e3) % wrap
+    if (n := first_of(saw != due)) is not None:
+        k = int(np.flatnonzero(known)[n])
+        raise Failed(f"TSTAMP {saw[n]}", f"{due[n]}, the fall of DRD_A of this sample", frames=p.about(k), lines=SAMPLED)
+    return f"{len(saw)} time stamps, each the fall of DRD_A of its sample"
+
+
+def sampled_ns(e: Capture, t_s: Floats) -> tuple[Bools, Ints]:
+    """Of frames (n,) that came at t_s: whether the recording has their sample, and its fall of DRD_A in ns.
+
+    A frame is queued when Int rises, and the transfer on the line begins after the read that follows the fall.
+    """
+    wires_needed(e, *SAMPLED)
+    drd, ints = e.wires.falls("DRD_A"), e.wires.pulses("Int", 0)
+    transfer = np.searchsorted(ints[1], np.rint(t_s * 1e9).astype(np.int64), "right") - 1
+    if not len(drd) or not len(ints[0]):
+        return np.zeros(len(t_s), bool), np.zeros(len(t_s), np.int64)
+    sample = np.searchsorted(drd, ints[0][np.maximum(transfer, 0)]) - 1
+    return (transfer >= 0) & (sample >= 0), drd[np.maximum(sample, 0)]
 
 
 @check("starts", "PSA2-CAN-06")

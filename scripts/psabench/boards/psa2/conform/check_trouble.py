@@ -109,8 +109,8 @@ def axes_go_on_without_temperatures(e: Capture, row: Requirement) -> str:
 def the_history_has_the_latest_first(e: Capture) -> str:
     """Compare 1003h with the emergencies of different codes that came."""
     due = [f.data[:2] for f in reversed(emcys(e)) if f.data[:2] != b"\0\0"]
-    if len(set(due)) < 2 or len(due) < 3:
-        raise Inconclusive(f"{len(due)} emergencies of {len(set(due))} codes came; expected three of two")
+    if due == due[::-1]:
+        raise Inconclusive(f"{len(due)} emergencies that read the same backwards; expected others")
     for n, (answer, code) in enumerate(zip(fact(e, "history"), due, strict=False), 1):
         saw = number(answer).to_bytes(4, "little")[:2]
         if saw != code:

@@ -21,6 +21,7 @@ from psabench.conform.dut import Dut, Take
 from psabench.conform.stimulus.streamed import recorded, while_streaming
 from psabench.conform.verdict import Failed, Inconclusive
 from psabench.errors import DeviceError
+from psabench.link.protocol_files import dbc_node, message
 
 ACCEL, TEMP = (OD.REG_X, OD.REG_Y, OD.REG_Z), OD.REG_T  # objects of registers; sub-index = address + 1
 CONFIG0, CONFIG1, OFC0, FSC0 = 2, 3, 6, 9  # sub-indices
@@ -34,6 +35,7 @@ RATES_HZ = (250, 500, 1000, 2000, 4000)  # by DR
 SETTLE_PERIODS = 64
 BUSY_ROUNDS = 3
 AGAIN = 6
+BLOCKS, MOST_LOOKS = 4, 200  # after which the latest sample is looked at; data periods until one comes
 FORM_S = (0.25, 0.25, 0.06, 0.06)  # the codes of forms 0 and 1 are compared in the mean
 
 
@@ -361,18 +363,36 @@ def _alone(e: Capture) -> dict[str, tuple[int, int]]:
 def forms(s: Dut, take: Take) -> None:
     """Every frame form for a while, the last one several times. Cuts "form 0" ..., "again 0" ...
 
-    facts: answer of each, bit 31 of the TPDOs, stamps before each time.
+    facts: answer of each, bit 31 of the TPDOs, stamps before each time; latest, the stamp of the latest sample after a
+    block, and how many frames had come with it.
     """
     for form in (0, 1, 2, 3):
         take.facts[f"answer {form}"] = tell(s, FORM, 0, form)
         take.facts[f"off {form}"] = [ask(s, OD.TPDO + k, 1) for k in range(5)]
         streamed(s, take, f"form {form}", FORM_S[form])
+    take.facts["latest"] = _after_blocks(s, take)
     stamps = []
     for k in range(AGAIN):  # stopped with another number of samples in the block each
         s.run_for(2 * PERIOD_S)
         stamps.append(ask(s, OD.FRAME_HEAD, 5))  # of the latest sample, us, before the start
         streamed(s, take, f"again {k}", (20 + k) * PERIOD_S)
     take.facts["stamps"] = stamps
+
+
+def _after_blocks(s: Dut, take: Take) -> list[tuple[Answer, int]]:
+    """2202h:5 as soon as a block has come, and the number of frames with it."""
+    block = int(message("PSA2_BLOCK").frame_id) - dbc_node("psa2") + s.node
+    found = []
+    with while_streaming(s):
+        for _ in range(BLOCKS):
+            at = len(take.frames)
+            for _ in range(MOST_LOOKS):
+                s.run_for(PERIOD_S)
+                came = [k for k, f in enumerate(take.frames[at:], at + 1) if f.can_id == block and not f.error]
+                if came:
+                    found.append((ask(s, OD.FRAME_HEAD, 5), came[-1]))
+                    break
+    return found
 
 
 @recorded("fit", boards=("psa2",), around=changed)

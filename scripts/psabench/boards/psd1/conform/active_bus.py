@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from psabench.boards.objects import Psd1Objects as OD
-from psabench.boards.psd1.conform.host import BOTH, calm, drive, has_host, period_s, run_cycles, status, word
+from psabench.boards.psd1.conform.host import (
+    BOTH,
+    TURN_DPS,
+    calm,
+    drive,
+    has_host,
+    period_s,
+    run_cycles,
+    status,
+    turning,
+    word,
+)
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
@@ -19,7 +28,6 @@ from psabench.errors import CycleRefused
 CYCLE = 0x08  # of STATUS
 OTHERS = tuple(f"R {a:X}" for a in range(4, 10))  # gyros and rate sensors
 GYROS = OD.GYRO
-TURN_DPS, TURN_DPS2 = 50.0, 400.0  # of the rate table: its rate, and what it speeds up with
 ATTEMPTS = 40  # to read twice within a millisecond
 ANGLE_DEG = 10.0  # more than half of what 16 bits of arc seconds hold
 ASKEW = 0.01  # what a gyro square to the axis may see of a turn
@@ -171,22 +179,8 @@ def registers_show_what_their_objects_show(s: Dut) -> str:
         line(s, "W F 0000")
         s.run_for(period_s(s.variant))
 
-    with _turning(s) as turns:
+    with turning(s) as turns:
         return one_value(s, "psd1", renew, told_apart=turns)
-
-
-@contextmanager
-def _turning(s: Dut) -> Iterator[bool]:
-    """The rate table turns within; False: there is none."""
-    if "table" not in s.probes:
-        yield False
-        return
-    s.bench.table.rate(TURN_DPS)
-    s.run_for(TURN_DPS / TURN_DPS2 + 0.1)
-    try:
-        yield True
-    finally:
-        s.bench.table.stop()
 
 
 @active("PSD1-BUS-10", needs={"bus"}, before=calm)
@@ -243,7 +237,7 @@ def the_service_signal_follows_the_supply(s: Dut, row: Requirement) -> str:
 @active("PSD1-BUS-12", needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Dut) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
-    with _turning(s) as turns:
+    with turning(s) as turns:
         first, later = _latched(s), _latched(s)
     calm(s)
     if turns and first[:3] == later[:3]:

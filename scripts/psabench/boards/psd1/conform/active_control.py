@@ -16,6 +16,7 @@ from psabench.boards.psd1.conform.host import (
     messages_on,
     period_s,
     run_cycles,
+    turning,
     word,
 )
 from psabench.boards.readings import Readings
@@ -403,10 +404,13 @@ def lost_conversions_are_told(s: Dut, row: Requirement) -> str:
 
 @active("PSD1-CAN-02", needs={"can"}, before=calm)
 def messages_tell_what_their_objects_hold(s: Dut) -> str:
-    """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h."""
+    """Switch all messages on, let cycles end, and compare the last with 2200h, 2202h, 2203h and 2204h.
+
+    Where there is a rate table it turns meanwhile, so that no two gyros and no two rate sensors say the same.
+    """
     messages_on(s, True)
     node = s.unit.node
-    with s.take(lines=False) as take, while_streaming(s):
+    with turning(s) as turns, s.take(lines=False) as take, while_streaming(s):
         run_cycles(s, 4)
         node.write_raw(OD.BUS, FLAGS + 1, bytes(2))  # no further cycle begins
         s.run_for(2 * period_s(s.variant))
@@ -422,6 +426,8 @@ def messages_tell_what_their_objects_hold(s: Dut) -> str:
         for signal, (index, sub) in objects.items():
             if last[name][signal] != held[index][sub - 1]:
                 raise Failed(f"{signal} {last[name][signal]} in {name}", f"{held[index][sub - 1]}, {index:04X}h:{sub}")
+    for index in (OD.GYRO_LOW, OD.RATE) if turns else ():
+        conclusive(len(set(held[index])) == len(held[index]), f"{index:04X}h {held[index]}: two of them are alike")
     return f"{sum(map(len, MAPPED.values()))} signals as their objects hold them"
 
 

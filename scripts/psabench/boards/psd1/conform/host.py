@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from psabench.boards.objects import Psd1Objects as OD
 from psabench.conform.bus_host import line
 from psabench.conform.dut import Dut
@@ -16,6 +19,7 @@ BOTH = 0x0003  # of FLAGS: INT0 and FL1
 BEGUN = ("PSD1_TIME", "PSD1_GYRO", "PSD1_RATE")
 TPDOS = {name: OD.TPDO + 1 + k for k, name in enumerate(BEGUN)}
 OFF = 0x80000000
+TURN_DPS, TURN_DPS2 = 50.0, 400.0  # of the rate table: its rate, and what it speeds up with
 
 
 def has_host(variant: Variant) -> bool:
@@ -47,6 +51,20 @@ def calm(s: Dut) -> None:
 def coefficients(s: Dut) -> list[int]:
     """Zero of X, Y, Z and full scale of X, Y, Z, as 2044h and 2045h show them."""
     return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in (1, 2, 3)]
+
+
+@contextmanager
+def turning(s: Dut) -> Iterator[bool]:
+    """The rate table turns within; False: there is none."""
+    if "table" not in s.probes:
+        yield False
+        return
+    s.bench.table.rate(TURN_DPS)
+    s.run_for(TURN_DPS / TURN_DPS2 + 0.1)
+    try:
+        yield True
+    finally:
+        s.bench.table.stop()
 
 
 def messages_on(s: Dut, on: bool) -> None:
