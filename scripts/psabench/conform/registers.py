@@ -86,7 +86,9 @@ def one_value(s: Dut, board: str, renew: Callable[[Dut], None], *, told_apart: b
             seen.setdefault(door.name, []).append(_both(s, door))
     alike = [f"{a} and {b}" for a, b in itertools.combinations(seen, 2) if seen[a] == seen[b]]
     conclusive(not (told_apart and alike), f"{', '.join(alike)} showed the same in {LOOKS} readings")
-    return f"{len(seen)} registers as their objects in {LOOKS} readings" + (f"; alike: {', '.join(alike)}" * bool(alike))
+    return f"{len(seen)} registers as their objects in {LOOKS} readings" + (
+        f"; alike: {', '.join(alike)}" * bool(alike)
+    )
 
 
 def _both(s: Dut, door: Door) -> int:

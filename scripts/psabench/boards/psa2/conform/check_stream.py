@@ -169,7 +169,7 @@ def tstamp_goes_by_the_data_period(e: Capture, row: Requirement) -> str:
     return f"{mean_us:.4f} us a sample over {n[-1]} periods, off by at most {off_us[k]:.1f} us"
 
 
-@check("stream", "PSA2-CAN-05", needs={"pins", "exact"})
+@check("stream", "PSA2-CAN-05", needs={"pins", "exact", "stamps"})
 def tstamp_is_the_fall_of_drd_a(e: Capture, row: Requirement) -> str:
     """Compare each TSTAMP with the fall of DRD_A of its own sample: the last before the Int that its frame follows."""
     p = pairs(e)
@@ -179,7 +179,9 @@ def tstamp_is_the_fall_of_drd_a(e: Capture, row: Requirement) -> str:
     saw, due = p.stamp[known] % wrap, fall_ns[known] // round(unit_us(e) * 1e3) % wrap
     if (n := first_of(saw != due)) is not None:
         k = int(np.flatnonzero(known)[n])
-        raise Failed(f"TSTAMP {saw[n]}", f"{due[n]}, the fall of DRD_A of this sample", frames=p.about(k), lines=SAMPLED)
+        raise Failed(
+            f"TSTAMP {saw[n]}", f"{due[n]}, the fall of DRD_A of this sample", frames=p.about(k), lines=SAMPLED
+        )
     return f"{len(saw)} time stamps, each the fall of DRD_A of its sample"
 
 

@@ -88,7 +88,9 @@ def coefficients_are_those_of_their_converters(e: Capture) -> str:
     for name, here, there, f in zip(COEFFICIENT_NAMES, seen, told, read, strict=True):
         expect(here == there, f"{name} {there:06X}h", f"{here:06X}h as on SDAT", at_ns=f.fall, lines=SETUP)
     for part in (seen[:3], seen[3:]):
-        conclusive(len(set(part)) == len(part), "two converters gave the same coefficient: no one can tell which is which")
+        conclusive(
+            len(set(part)) == len(part), "two converters gave the same coefficient: no one can tell which is which"
+        )
     return f"{', '.join(f'{w:06X}h' for w in seen)} on SDAT and in the objects"
 
 

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from psabench.boards.psd1.conform.host import calm, coefficients, has_host, messages_on, period_s, run_cycles, setup_s, word
+from psabench.boards.psd1.conform.host import (
+    calm,
+    coefficients,
+    has_host,
+    messages_on,
+    period_s,
+    run_cycles,
+    setup_s,
+    word,
+)
 from psabench.conform.bus_host import line
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut, Take
