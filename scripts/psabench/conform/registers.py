@@ -16,7 +16,6 @@ from psabench.conform.verdict import Inconclusive, conclusive, expect
 
 NO_ADDRESS, READ_ONLY, WRITE_ONLY = 0x06090011, 0x06010002, 0x06010001  # abort codes (docs/busport.md)
 ADDRESSES = 16
-NUMBER = (0x2202, 1)  # of the latest reading, whatever the board
 LOOKS, TRIES = 4, 40  # readings; to read two doors within one of them, in real time
 WORD = 0xFFFF
 
@@ -68,22 +67,22 @@ class Door:
     sub: int
 
 
-def doors(board: str) -> tuple[Door, ...]:
+def bus_doors(board: str) -> tuple[Door, ...]:
     """The registers of a board beside which its table names an object."""
     return tuple(Door(str(r["name"]), k, *r["object"]) for k, r in enumerate(table(board)) if "object" in r)
 
 
-def one_value(s: Dut, board: str, renew: Callable[[Dut], None], *, told_apart: bool = True) -> str:
+def one_value(s: Dut, board: str, next_reading: Callable[[Dut], None], number: int, *, told_apart: bool = True) -> str:
     """Every register beside its object in some readings; returns what was seen, raises Failed.
 
-    renew: lets the board make another reading. told_apart: raises Inconclusive where two registers showed the same in
-    all readings, so that no one could tell one from the other.
+    next_reading: lets the board make another. number: object whose sub-index 1 numbers readings. told_apart: raises
+    Inconclusive where two registers showed the same in all readings, so that no one could tell one from the other.
     """
     seen: dict[str, list[int]] = {}
     for _ in range(LOOKS):
-        renew(s)
-        for door in doors(board):
-            seen.setdefault(door.name, []).append(_both(s, door))
+        next_reading(s)
+        for door in bus_doors(board):
+            seen.setdefault(door.name, []).append(_both(s, door, number))
     alike = [f"{a} and {b}" for a, b in itertools.combinations(seen, 2) if seen[a] == seen[b]]
     conclusive(not (told_apart and alike), f"{', '.join(alike)} showed the same in {LOOKS} readings")
     return f"{len(seen)} registers as their objects in {LOOKS} readings" + (
@@ -91,13 +90,13 @@ def one_value(s: Dut, board: str, renew: Callable[[Dut], None], *, told_apart: b
     )
 
 
-def _both(s: Dut, door: Door) -> int:
+def _both(s: Dut, door: Door, number: int) -> int:
     """The word of a register and of its object within one reading."""
     read = s.unit.node.read
     for _ in range(TRIES):
-        number, told = int(read(*NUMBER)), int(read(door.index, door.sub)) & WORD
+        before, told = int(read(number, 1)), int(read(door.index, door.sub)) & WORD
         word = line(s, f"R {door.address:X}").data
-        if int(read(*NUMBER)) == number:
+        if int(read(number, 1)) == before:
             due = f"{told:04X}h as in {door.index:04X}h:{door.sub}"
             expect(word == told, f"{word:04X}h in {door.name}", due)
             return word

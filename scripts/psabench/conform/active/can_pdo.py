@@ -9,7 +9,7 @@ import itertools
 
 from psabench.boards.objects import Common
 from psabench.conform.capture.log import CanFrame, CanLog
-from psabench.conform.check.can_frames import numbered, pdos
+from psabench.conform.check.can_frames import number_signal, pdos
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 from psabench.conform.raw_can import OFF, Nmt, Talk, dialogue, flood, talk, words, write
@@ -207,7 +207,7 @@ def the_inhibit_time_keeps_tpdos_apart(t: Talk, row: Requirement) -> str:
 def numbers_go_on_to_their_modulus(t: Talk) -> str:
     """Let a whole round of numbers pass, an eighth at a time; compare numbers with 2030h:1, which counts on."""
     t.s.wait_ready()
-    name, signal = numbered(t.s.variant.family)
+    name, signal = number_signal(t.s.variant.family)
     modulus, can_id = 1 << message(name).get_signal_by_name(signal).length, pdos(t.s.variant.family)[name] + t.node
     base, seen, rate_hz = None, [], _rate_hz(t)
     for _ in range(EIGHTHS + 2):

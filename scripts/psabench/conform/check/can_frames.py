@@ -274,7 +274,7 @@ def lost_samples_are_told(e: Capture, row: Requirement) -> str:
 
 
 @cache
-def numbered(family: str) -> tuple[str, str]:
+def number_signal(family: str) -> tuple[str, str]:
     """The message and the signal that number a board's readings."""
     counter = "SEQ" if family == "psa2" else of_board(family).layout.counter
     return next(n for n in pdos(family) if counter in message(n).signal_tree), counter
@@ -282,7 +282,7 @@ def numbered(family: str) -> tuple[str, str]:
 
 def _numbers(e: Capture) -> np.ndarray:
     """Numbers (n,) of the readings of the log, unwrapped. Raises Inconclusive, and Failed for other lengths."""
-    name, counter = numbered(e.variant.family)
+    name, counter = number_signal(e.variant.family)
     frames = e.frames_of(name)
     conclusive(len(frames) >= 2, f"{len(frames)} frames {name} in the log")
     with damaged_data_are(Failed, "frames of the DBC's length"):

@@ -241,7 +241,7 @@ def silence(s: Dut, take: Take) -> None:
 
 
 @recorded("gaps", boards=("gyro",), before=levelled, after=calm, lines=False, streaming=True)
-def gaps(s: Dut, take: Take) -> None:
+def level_gaps(s: Dut, take: Take) -> None:
     """Every second frame of the level unit left out, by its sample mode 2; before and after all of them.
 
     facts: gaps, first and last frame of the while in which each frame lacks the one before.

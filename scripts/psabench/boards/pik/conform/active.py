@@ -195,11 +195,11 @@ def registers_have_their_names_and_rights(s: Dut) -> str:
 def registers_show_what_their_objects_show(s: Dut) -> str:
     """Latch by hand, read X, Y, Z and SEQ beside the objects of the same reading."""
 
-    def renew(s: Dut) -> None:
+    def next_reading(s: Dut) -> None:
         s.run_for(0.05)
         line(s, LATCH)
 
-    return one_value(s, "pik", renew)
+    return one_value(s, "pik", next_reading, OD.READING)
 
 
 @active("PIK-CAN-05", needs={"can"})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from psabench.boards.objects import PmkaObjects
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.stimulus import START_S, ts_s
 from psabench.conform.bus_host import burst, line, line_refused
@@ -89,7 +90,7 @@ def registers_have_their_names_and_rights(s: Dut) -> str:
 @active("BUS-PORT-11", needs={"bus", "can"}, before=calm, boards=("pmka",))
 def registers_show_what_their_objects_show(s: Dut) -> str:
     """Read codes, resets, number and temperature beside the objects of the same reading."""
-    return one_value(s, "pmka", lambda s: s.run_for(2 * ts_s()))
+    return one_value(s, "pmka", lambda s: s.run_for(2 * ts_s()), PmkaObjects.STATE)
 
 
 @active("PMKA-CAL-02", needs={"bus", "can"}, before=calm, after=calm)

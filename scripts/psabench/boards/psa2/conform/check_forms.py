@@ -121,7 +121,7 @@ def _evenly(e: Capture, row: Requirement, stamp_us: Ints, samples: int) -> str:
 
 @check("forms", "PSA2-FORM-04", needs={"fd"})
 def the_stamp_of_a_block_is_that_of_its_first_sample(e: Capture, row: Requirement) -> str:
-    """Read 2202h:5, the stamp of the latest sample, as soon as a block has come: the last of its samples or a later one."""
+    """Read 2202h:5, the stamp of the latest sample, once a block has come: its last sample or a later one."""
     apart_us = (row.limit("samples_count") - 1) * row_for(e, "PSA2-READ-06").limit("period_us")
     least_us = apart_us - row.limit("tolerance_us") - e.slack_ns(apart_us * 1e3) * 1e-3
     found = []

@@ -26,7 +26,7 @@ HISTORY, HISTORY_LOOKS = OD.ERROR_HISTORY, 4
 
 @recorded("trouble", boards=("psa2",), around=changed)
 def trouble(s: Dut, take: Take) -> None:
-    """The temperature converter silenced by its SYNC command without WAKEUP, a form rejected before it: emergencies that read differently backwards.
+    """The temperature converter silenced by its SYNC command without WAKEUP, a form rejected before it: two codes.
 
     facts: access, counters, history of errors.
     """

@@ -14,7 +14,7 @@ from psabench.boards.psd1.conform.host import (
     period_s,
     run_cycles,
     status,
-    turning,
+    while_turning,
     word,
 )
 from psabench.conform.bus_host import SHORT_S, burst, line, line_refused
@@ -171,16 +171,16 @@ def registers_have_their_names_and_rights(s: Dut) -> str:
 
 @active("BUS-PORT-11", needs={"bus", "can"}, before=calm, after=calm, boards=("psd1",))
 def registers_show_what_their_objects_show(s: Dut) -> str:
-    """Read gyros and rate sensors beside the objects of the same cycle; where there is a rate table it turns meanwhile."""
+    """Read gyros and rate sensors beside the objects of the same cycle, on a table that turns."""
 
-    def renew(s: Dut) -> None:
+    def next_reading(s: Dut) -> None:
         line(s, f"W F {BOTH:04X}")
         run_cycles(s, 2)
         line(s, "W F 0000")
         s.run_for(period_s(s.variant))
 
-    with turning(s) as turns:
-        return one_value(s, "psd1", renew, told_apart=turns)
+    with while_turning(s) as turns:
+        return one_value(s, "psd1", next_reading, OD.CYCLE, told_apart=turns)
 
 
 @active("PSD1-BUS-10", needs={"bus"}, before=calm)
@@ -237,7 +237,7 @@ def the_service_signal_follows_the_supply(s: Dut, row: Requirement) -> str:
 @active("PSD1-BUS-12", needs={"bus"})
 def gyros_are_latched_with_the_cycle(s: Dut) -> str:
     """Read the registers of gyros and rate sensors twice in a cycle; where there is a rate table it turns meanwhile."""
-    with turning(s) as turns:
+    with while_turning(s) as turns:
         first, later = _latched(s), _latched(s)
     calm(s)
     if turns and first[:3] == later[:3]:

@@ -1,4 +1,4 @@
-"""PSD-1's control words, coefficients, late hosts and identity, over CAN."""
+"""PSD-1's control words, kept_coefficients, late hosts and identity, over CAN."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from psabench.boards.psd1.conform.host import (
     BOTH,
     FLAGS,
     calm,
-    coefficients,
     drive,
     has_host,
+    kept_coefficients,
     messages_on,
     period_s,
     run_cycles,
-    turning,
+    while_turning,
     word,
 )
 from psabench.boards.readings import Readings
@@ -80,7 +80,7 @@ def control_words_are_read_as_they_are(s: Dut, row: Requirement) -> str:
 @active("PSD1-SETUP-01", needs={"can"}, before=calm)
 def coefficients_are_kept(s: Dut) -> str:
     """Read 2044h and 2045h after the set-up, twice."""
-    first, again = coefficients(s), coefficients(s)
+    first, again = kept_coefficients(s), kept_coefficients(s)
     expect(all(first) and first == again, f"{first}, then {again}", "six that are not 0, and the same again")
     return f"zero {first[:3]}, full scale {first[3:]}"
 
@@ -88,7 +88,7 @@ def coefficients_are_kept(s: Dut) -> str:
 @active("PSD1-SETUP-01", needs={"bus", "can"}, before=calm)
 def coefficients_are_shown_on_the_bus(s: Dut) -> str:
     """Read the six by COMMAND, UC_HIGH and UC_LOW, and compare them with 2044h and 2045h."""
-    for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), coefficients(s), strict=True):
+    for command, due in zip((0x10, 0x11, 0x12, 0x20, 0x21, 0x22), kept_coefficients(s), strict=True):
         line(s, f"W E {command:X}")
         got = line(s, "R C").data << 16 | line(s, "R D").data
         expect(got == due, f"{got:06X}h by COMMAND {command:02X}h", f"{due:06X}h as on CAN")
@@ -119,14 +119,14 @@ def converters_are_in_step_after_res(s: Dut) -> str:
 @active("PSD1-UC-03", needs={"can"}, before=calm, after=calm)
 def uc1_calibrates_anew(s: Dut, row: Requirement) -> str:
     """Write 2042h and 2043h as they are, look at the coefficients and at the time that each answer takes."""
-    before, (uc1, uc2) = coefficients(s), _control(s)
+    before, (uc1, uc2) = kept_coefficients(s), _control(s)
     most_s = row.limit("answer_max_periods") * period_s(s.variant) + row.limit("transfers_ms") * 1e-3 + QUANTUM_S
     took = []
     for index, value in ((OD.UC1, uc1), (OD.UC2, uc2)):
         begun_s = s.bench.time_s
         s.unit.node.write(index, 0, value)
         took.append(s.bench.time_s - begun_s)
-    after = coefficients(s)
+    after = kept_coefficients(s)
     expect(before != after, f"coefficients {before} before and after", "new ones")
     if s.lockstep and took[0] > most_s:
         raise Failed(f"an answer after {took[0] * 1e3:.1f} ms", f"{most_s * 1e3:.1f} ms at most")
@@ -410,7 +410,7 @@ def messages_tell_what_their_objects_hold(s: Dut) -> str:
     """
     messages_on(s, True)
     node = s.unit.node
-    with turning(s) as turns, s.take(lines=False) as take, while_streaming(s):
+    with while_turning(s) as turns, s.take(lines=False) as take, while_streaming(s):
         run_cycles(s, 4)
         node.write_raw(OD.BUS, FLAGS + 1, bytes(2))  # no further cycle begins
         s.run_for(2 * period_s(s.variant))

@@ -48,13 +48,13 @@ def calm(s: Dut) -> None:
     s.run_for(0.002 + setup_s(s.variant))
 
 
-def coefficients(s: Dut) -> list[int]:
+def kept_coefficients(s: Dut) -> list[int]:
     """Zero of X, Y, Z and full scale of X, Y, Z, as 2044h and 2045h show them."""
     return [int(s.unit.node.read(index, k)) for index in (OD.ZERO_COEF, OD.FULL_COEF) for k in (1, 2, 3)]
 
 
 @contextmanager
-def turning(s: Dut) -> Iterator[bool]:
+def while_turning(s: Dut) -> Iterator[bool]:
     """The rate table turns within; False: there is none."""
     if "table" not in s.probes:
         yield False

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from psabench.boards.psd1.conform.host import (
     calm,
-    coefficients,
     has_host,
+    kept_coefficients,
     messages_on,
     period_s,
     run_cycles,
@@ -26,9 +26,9 @@ MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than th
 
 @stimulus("power_on", boards=("psd1",))
 def power_on(s: Dut) -> Capture:
-    """From Res to the first cycles, streaming as soon as it has booted. facts: coefficients, as the objects show them."""
+    """From Res to the first cycles, streaming as soon as it has booted. facts: coefficients, as objects."""
     e = from_res(s, setup_s(s.variant))
-    return replace(e, facts={**e.facts, "coefficients": coefficients(s)})
+    return replace(e, facts={**e.facts, "coefficients": kept_coefficients(s)})
 
 
 @recorded("stream", boards=("psd1",), before=calm, streaming=True)
