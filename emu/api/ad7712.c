@@ -134,15 +134,17 @@ static uint64_t iout_na(const struct psabench_part *p)
 }
 
 #define N(field) API_COUNTER(#field, part_ad7712, chip.n.field)
+#define V(field) API_VIOLATION(#field, part_ad7712, chip.n.field)
 #define G        API_COUNTER_GET
 static const struct api_counter counters[] = {
     N(conversions),     N(calibrations),     N(restarts),         N(power_downs),   N(overruns),
-    N(lost_words),      N(torn_reads),       N(stale_reads),      N(blocked_reads), N(over_reads),
-    N(dropped),         N(refused),          N(over_writes),      N(clipped),       N(overloads),
-    N(cal_clamped),     N(bad_fs),           N(bad_channel),      N(bad_bit),       N(a0_violations),
-    N(sclk_violations), N(sdata_violations), N(frame_violations), G(sampling_hz),   G(iout_na),
+    N(lost_words),      V(torn_reads),       V(stale_reads),      V(blocked_reads), V(over_reads),
+    V(dropped),         V(refused),          V(over_writes),      N(clipped),       N(overloads),
+    N(cal_clamped),     V(bad_fs),           V(bad_channel),      N(bad_bit),       V(a0_violations),
+    V(sclk_violations), V(sdata_violations), V(frame_violations), G(sampling_hz),   G(iout_na),
 };
 #undef N
+#undef V
 #undef G
 
 #define COMMON                                                                                                         \

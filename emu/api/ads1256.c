@@ -106,15 +106,25 @@ static uint64_t clkout_hz(const struct psabench_part *p)
 #define N(field) API_COUNTER(#field, part_ads1256, chip.n.field)
 #define G        API_COUNTER_GET
 #define R(field) API_COUNTER(#field, part_ads1256, chip.regs.field)
+#define V(field) API_VIOLATION(#field, part_ads1256, chip.n.field)
 static const struct api_counter counters[] = {
-    N(conversions),    N(calibrations), N(restarts),       N(power_downs),    N(overruns),       N(torn_reads),
-    N(window_reads),   N(clipped),      N(buffer_clipped), N(range_exceeded), N(bad_mux),        N(cal_clamped),
-    N(bad_opcodes),    N(refused),      N(bad_drate),      N(dropped),        N(gap_violations), N(sclk_violations),
-    N(din_violations), R(bad_access),   R(ro_write),       R(unimp_access),   G(clkout_hz),
+    N(conversions),    N(calibrations),
+    N(restarts),       N(power_downs),
+    N(overruns),       V(torn_reads),
+    V(window_reads),   N(clipped),
+    N(buffer_clipped), N(range_exceeded),
+    V(bad_mux),        N(cal_clamped),
+    V(bad_opcodes),    V(refused),
+    V(bad_drate),      N(dropped),
+    V(gap_violations), V(sclk_violations),
+    V(din_violations), API_VIOLATION("bad_access", part_ads1256, chip.regs.bad_access),
+    R(ro_write),       R(unimp_access),
+    G(clkout_hz),
 };
 #undef N
 #undef G
 #undef R
+#undef V
 
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1256), .options = API_ROWS(options), .options_text = OPTIONS(API_OPTION_TEXT),       \

@@ -144,15 +144,25 @@ static void before_input(struct psabench_part *p, int64_t t_ns)
 }
 
 #define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
-#define L(field) API_COUNTER("limit_" #field, part_ads1282, chip.limit.field)
+#define V(field) API_VIOLATION(#field, part_ads1282, chip.count.field)
+#define L(field) API_VIOLATION("limit_" #field, part_ads1282, chip.limit.field)
 #define R(field) API_COUNTER(#field, part_ads1282, chip.regs.field)
+/* A SYNC pulse near an edge of CLK is chance: no violation. */
 static const struct api_counter counters[] = {
-    N(conversions),    N(overruns),   N(torn_reads), N(late_reads),   N(bad_opcodes),  N(refused),
-    N(gap_violations), N(restarts),   N(clipped),    N(realigned),    N(calibrations), L(sclk_period),
-    L(sclk_width),     L(din_setup),  L(din_hold),   L(drdy_to_sclk), L(sync_width),   L(sync_keepout),
-    L(reset_width),    R(bad_access), R(ro_write),   R(unimp_access),
+    N(conversions),    N(overruns),
+    V(torn_reads),     V(late_reads),
+    V(bad_opcodes),    V(refused),
+    V(gap_violations), N(restarts),
+    N(clipped),        N(realigned),
+    N(calibrations),   L(sclk_period),
+    L(sclk_width),     L(din_setup),
+    L(din_hold),       L(drdy_to_sclk),
+    L(sync_width),     API_COUNTER("limit_sync_keepout", part_ads1282, chip.limit.sync_keepout),
+    L(reset_width),    API_VIOLATION("bad_access", part_ads1282, chip.regs.bad_access),
+    R(ro_write),       R(unimp_access),
 };
 #undef N
+#undef V
 #undef L
 #undef R
 

@@ -28,6 +28,18 @@ struct api_watch {
     void *ctx;
 };
 
+struct api_interrupt {
+    psabench_interrupt_fn *fn;
+    void *ctx;
+    enum psabench_edge edge;
+};
+
+struct api_deadline {
+    int64_t t_ns;
+    psabench_deadline_fn *fn;
+    void *ctx;
+};
+
 struct api_edge {
     int64_t t_ns;
     uint8_t pin, level;
@@ -46,8 +58,12 @@ struct psabench_part {
     char name[API_NAME];
     uint32_t level;             /* as reported last, outputs; as set last, inputs */
     uint32_t watched, recorded; /* pins */
+    uint32_t counted;           /* pins whose edges are counted, because somebody has waited for one */
+    uint32_t armed, pending;    /* pins with an interrupt; those whose interrupt waits to be served */
     struct api_watch watch[API_PINS_MAX];
-    unsigned inside; /* a callback from within its own code is running */
+    struct api_interrupt interrupt[API_PINS_MAX];
+    uint32_t edges[API_PINS_MAX][2]; /* by the new level; they wrap */
+    unsigned inside;                 /* a callback from within its own code is running */
     psabench_input_fn *input;
     void *input_ctx;
     uint16_t by_fn; /* inputs that input() gives; the others are volts[] */
@@ -72,6 +88,11 @@ struct psabench {
     struct api_vcd *vcd;
     unsigned inside; /* time moves or a pin is being set: callbacks come from here */
     unsigned nested; /* psabench_set() within callbacks of psabench_set() */
+    struct api_deadline deadline;
+    unsigned polls; /* pins read since time has passed, poll_ns */
+    int64_t poll_ns;
+    bool masked, serving; /* interrupts wait; one is being served */
+    uint32_t served;      /* interrupts so far; it wraps */
     char error[API_ERROR];
 };
 
@@ -81,14 +102,45 @@ int api_fail(psabench *b, int code, const char *format, ...) __attribute__((form
 /* Whether time may move now; else a noted error. */
 int api_may_move(psabench *b, const char *function);
 
-/* Lets everything up to t_ns happen, each instant reported as it comes. The caller has raised b->inside. */
+/* Lets everything up to t_ns happen, each instant reported as it comes. The caller has raised b->inside. No interrupt is
+ * served, no deadline looked at. */
 void api_move(psabench *b, int64_t t_ns);
+
+/* The deadline is over: calls its function and returns PSABENCH_DEADLINE; else PSABENCH_OK. Outside callbacks. */
+int api_late(psabench *b);
+
+/* A program reads a pin: PSABENCH_DEADLINE if it does nothing else for ever. */
+int api_poll(psabench *b);
+
+/* Serves the interrupts that wait, if none is being served and they are not masked. Outside callbacks. */
+void api_serve(psabench *b);
+bool api_pending(const psabench *b);
 
 /* Reports what has changed since the last report. */
 void api_notify(psabench *b);
 
 /* A pin has changed: to the recording, then to its watcher. */
 void api_edge(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
+
+/* Pins whose changes somebody wants to hear of. */
+static inline uint32_t api_observed(const struct psabench_part *p)
+{
+    return p->watched | p->recorded | p->counted | p->armed;
+}
+
+/* Before a pin joins those: changes count from now. */
+void api_observe(struct psabench_part *p, unsigned pin);
+
+/* Row of a pin, NULL if there is none, and the error then. */
+const struct api_pin *api_pin_of(const struct psabench_part *p, int pin);
+int api_no_pin(const struct psabench_part *p, int pin);
+
+/* Level now. An error for lines that are known only afterwards. */
+bool api_level(const struct psabench_part *p, unsigned pin);
+int api_not_late(const struct psabench_part *p, const struct api_pin *row);
+
+/* For edges: an output of a part that reports them at once; else a noted error. */
+int api_edge_pin(const struct psabench_part *p, int pin, int edge, const char *function);
 
 /* An input pin takes a level, without telling the outputs that follow. */
 void api_drive(struct psabench_part *p, unsigned pin, bool level);

@@ -62,11 +62,16 @@ struct api_counter {
     const char *name;
     size_t offset; /* of a uint32_t in the part's struct, if there is no get */
     uint64_t (*get)(const struct psabench_part *p);
+    bool violation; /* 0 while the program keeps to the data sheet */
 };
 
 #define API_COUNTER(name, part, member)                                                                                \
     {                                                                                                                  \
-        name, offsetof(struct part, member), NULL                                                                      \
+        name, offsetof(struct part, member), NULL, false                                                               \
+    }
+#define API_VIOLATION(name, part, member)                                                                              \
+    {                                                                                                                  \
+        name, offsetof(struct part, member), NULL, true                                                                \
     }
 #define API_COUNTER_GET(member)                                                                                        \
     {                                                                                                                  \

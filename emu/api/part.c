@@ -61,12 +61,12 @@ int psabench_pin(const psabench_part *p, const char *name)
     return pin != API_NO_PIN ? (int)pin : no_such_pin(p, name);
 }
 
-static const struct api_pin *pin_of(const psabench_part *p, int pin)
+const struct api_pin *api_pin_of(const psabench_part *p, int pin)
 {
     return p && pin >= 0 && (unsigned)pin < p->kind->pin_count ? &p->kind->pins[pin] : NULL;
 }
 
-static int no_pin(const psabench_part *p, int pin)
+int api_no_pin(const psabench_part *p, int pin)
 {
     if (!p) return PSABENCH_BAD_ARGUMENT;
     return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: pin number: expected 0 to %u, got %d", p->name,
@@ -75,39 +75,38 @@ static int no_pin(const psabench_part *p, int pin)
 
 const char *psabench_pin_name(const psabench_part *p, int pin)
 {
-    const struct api_pin *row = pin_of(p, pin);
+    const struct api_pin *row = api_pin_of(p, pin);
     return row ? row->name : NULL;
 }
 
 int psabench_pin_is_input(const psabench_part *p, int pin)
 {
-    const struct api_pin *row = pin_of(p, pin);
-    return row ? row->dir != API_OUT : no_pin(p, pin);
+    const struct api_pin *row = api_pin_of(p, pin);
+    return row ? row->dir != API_OUT : api_no_pin(p, pin);
 }
 
-static int level_now(const psabench_part *p, int pin)
+bool api_level(const psabench_part *p, unsigned pin)
 {
     const struct api_pin *row = &p->kind->pins[pin];
-    return row->get ? row->get(p, row->arg) : (int)(p->level >> pin & 1);
+    return row->get ? row->get(p, row->arg) : p->level >> pin & 1;
 }
 
 /* Only known when the burst that it belongs to is over. */
-static bool is_late(const struct api_pin *row)
+int api_not_late(const psabench_part *p, const struct api_pin *row)
 {
-    return row->dir == API_OUT && !row->get;
-}
-
-static int too_late(const psabench_part *p, const struct api_pin *row)
-{
+    if (row->dir != API_OUT || row->get) return PSABENCH_OK;
     return api_fail(p->bench, PSABENCH_NOT_HERE, "%s: %s: the level is known only after the burst; watch or record it",
                     p->name, row->name);
 }
 
 int psabench_get(const psabench_part *p, int pin)
 {
-    const struct api_pin *row = pin_of(p, pin);
-    if (!row) return no_pin(p, pin);
-    return is_late(row) ? too_late(p, row) : level_now(p, pin);
+    const struct api_pin *row = api_pin_of(p, pin);
+    if (!row) return api_no_pin(p, pin);
+    const int late = api_not_late(p, row);
+    if (late) return late;
+    const int vain = api_poll(p->bench);
+    return vain ? vain : api_level(p, (unsigned)pin);
 }
 
 void api_drive(struct psabench_part *p, unsigned pin, bool level)
@@ -121,8 +120,8 @@ void api_drive(struct psabench_part *p, unsigned pin, bool level)
 int psabench_set(psabench_part *p, int pin, int level)
 {
     enum { NESTED_MAX = 16 };
-    const struct api_pin *row = pin_of(p, pin);
-    if (!row) return no_pin(p, pin);
+    const struct api_pin *row = api_pin_of(p, pin);
+    if (!row) return api_no_pin(p, pin);
     psabench *b = p->bench;
     if (row->dir == API_OUT || (level != 0 && level != 1))
         return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: %s: expected %s, got %d", p->name, row->name,
@@ -140,53 +139,27 @@ int psabench_set(psabench_part *p, int pin, int level)
     return PSABENCH_OK;
 }
 
+void api_observe(psabench_part *p, unsigned pin)
+{
+    const struct api_pin *row = &p->kind->pins[pin];
+    const uint32_t bit = UINT32_C(1) << pin;
+    if (!row->get || api_observed(p) & bit) return;
+    p->level = row->get(p, row->arg) ? p->level | bit : p->level & ~bit;
+}
+
 int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn, void *ctx)
 {
-    const struct api_pin *row = pin_of(p, pin);
-    if (!row) return no_pin(p, pin);
+    const struct api_pin *row = api_pin_of(p, pin);
+    if (!row) return api_no_pin(p, pin);
     if (row->dir == API_IN)
         return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: %s: expected an output, got an input", p->name,
                         row->name);
     const uint32_t bit = UINT32_C(1) << pin;
-    if (row->get && !((p->watched | p->recorded) & bit)) { /* changes count from now */
-        p->level = row->get(p, row->arg) ? p->level | bit : p->level & ~bit;
-    }
+    api_observe(p, (unsigned)pin);
     p->watch[pin] = (struct api_watch){fn, ctx};
     p->watched = fn ? p->watched | bit : p->watched & ~bit;
     if (!p->inside && p->kind->follow) p->kind->follow(p, p->bench->sched.now_ns);
     return PSABENCH_OK;
-}
-
-/* When an output of p may change next. */
-static int64_t next_ns(const psabench_part *p)
-{
-    const int64_t event_ns = sched_next_ns(&p->bench->sched);
-    const int64_t own_ns = p->kind->next_ns ? p->kind->next_ns(p) : INT64_MAX;
-    return event_ns < own_ns ? event_ns : own_ns;
-}
-
-int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeout_ns)
-{
-    const struct api_pin *row = pin_of(p, pin);
-    if (!row) return no_pin(p, pin);
-    psabench *b = p->bench;
-    const int may = api_may_move(b, "psabench_run_until_level()");
-    if (may) return may;
-    if (is_late(row)) return too_late(p, row);
-    if ((level != 0 && level != 1) || timeout_ns < 0 || timeout_ns > API_TIME_MAX_NS - b->sched.now_ns)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT,
-                        "%s: %s: expected a level of 0 or 1 and a span >= 0, got %d and %lld ns", p->name, row->name,
-                        level, (long long)timeout_ns);
-    const int64_t end_ns = b->sched.now_ns + timeout_ns;
-    b->inside++;
-    while (level_now(p, pin) != level && b->sched.now_ns < end_ns) {
-        const int64_t t_ns = next_ns(p);
-        api_move(b, t_ns < end_ns ? t_ns : end_ns);
-    }
-    b->inside--;
-    if (level_now(p, pin) == level) return PSABENCH_OK;
-    return api_fail(b, PSABENCH_TIMEOUT, "%s: %s: expected %d within %lld ns, got no change", p->name, row->name, level,
-                    (long long)timeout_ns);
 }
 
 /* ---- inputs ---- */
@@ -283,14 +256,4 @@ int psabench_peek(const psabench_part *p, unsigned address)
     if (value >= 0) return value;
     return api_fail(p->bench, PSABENCH_BAD_ARGUMENT, "%s: expected a register of %s, got %03Xh", p->name, p->kind->name,
                     address);
-}
-
-const char *psabench_counter(const psabench_part *p, int i, uint64_t *value)
-{
-    if (!p || i < 0 || (unsigned)i >= p->kind->counter_count) return NULL;
-    const struct api_counter *c = &p->kind->counters[i];
-    uint32_t v = 0;
-    if (!c->get) memcpy(&v, (const char *)p + c->offset, sizeof v);
-    if (value) *value = c->get ? c->get(p) : v;
-    return c->name;
 }

@@ -321,7 +321,8 @@ static int no_access(psabench_part *p, unsigned group, unsigned address, int64_t
         return api_fail(p->bench, PSABENCH_BAD_ARGUMENT,
                         "%s: %s: expected a group of 0 to 3, a register of 0 to 255 and a time, got %u, %u, %lld ns",
                         p->name, function, group, address, (long long)timeout_ns);
-    return api_may_move(p->bench, function);
+    const int may = api_may_move(p->bench, function);
+    return may ? may : api_late(p->bench);
 }
 
 static int fail_request(const struct part_psa2 *s, enum psa2_result result, unsigned group, unsigned address)
@@ -352,20 +353,22 @@ static int access_register(psabench_part *p, unsigned group, unsigned address, s
     r.done = on_request_done;
     r.ctx = s;
     const enum psa2_result result = carry_out(s, &r, timeout_ns);
-    return result == PSA2_OK ? PSABENCH_OK : fail_request(s, result, group, address);
+    const int answer = s->request.answer[group % 3];
+    api_serve(p->bench); /* whose handlers may ask the board, too */
+    return result == PSA2_OK ? answer : fail_request(s, result, group, address);
 }
 
 int psabench_board_read(psabench_part *p, unsigned group, unsigned address, int64_t timeout_ns)
 {
     const struct psa2_request r = {.op = PSA2_READ_REG};
-    const int code = access_register(p, group, address, r, timeout_ns, "psabench_board_read()");
-    return code ? code : part_of(p)->request.answer[group % 3];
+    return access_register(p, group, address, r, timeout_ns, "psabench_board_read()");
 }
 
 int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value, int64_t timeout_ns)
 {
     const struct psa2_request r = {.op = PSA2_WRITE_REG, .value = value};
-    return access_register(p, group, address, r, timeout_ns, "psabench_board_write()");
+    const int code = access_register(p, group, address, r, timeout_ns, "psabench_board_write()");
+    return code < 0 ? code : PSABENCH_OK;
 }
 
 int psabench_on_frame(psabench_part *p, psabench_frame_fn *fn, void *ctx)
@@ -386,8 +389,8 @@ static const struct api_counter counters[] = {
     API_COUNTER("timeouts", part_psa2, board.counters.timeouts),
     API_COUNTER("overruns", part_psa2, board.counters.overruns),
     API_COUNTER("int_late", part_psa2, board.counters.int_late),
-    API_COUNTER("edges_dropped", part_psa2, board.base.trace.dropped),
-    API_COUNTER("edges_late", part_psa2, board.base.trace.late),
+    API_VIOLATION("edges_dropped", part_psa2, board.base.trace.dropped),
+    API_VIOLATION("edges_late", part_psa2, board.base.trace.late),
 };
 
 const struct api_kind api_psa2 = {

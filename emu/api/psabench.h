@@ -17,7 +17,8 @@
  * Time: int64_t nanoseconds since the bench was made. It moves only in psabench_run_*(), psabench_spi() and
  * psabench_board_*(). Callbacks come from in there, from psabench_set() and from the functions that change an input; they
  * get PSABENCH_BAD_ARGUMENT from whatever would move time, make or record, and psabench_free() does nothing there. They may
- * read everything and set pins, but an input or frame callback and a watcher of a board not those of its own part.
+ * read everything and set pins, but an input or frame callback and a watcher of a board not those of its own part. Only the
+ * handler of an interrupt may do everything, but psabench_free().
  * Levels: 0 or 1, the level on the wire (DRDY and CS are active low: 0 is active).
  * Errors: functions that can fail return NULL or a negative enum psabench_error; psabench_error_text() has the reason in
  * one line: what, where, what would be right. NULL for a bench or a part is such an error. Nothing is printed, nothing
@@ -59,7 +60,9 @@ enum psabench_error {
     PSABENCH_NOT_HERE = -2, /* this part has nothing of the kind: SPI of a board, frames of a chip */
     PSABENCH_REFUSED = -3,  /* a board rejects a register write: read-only, or a value its chip does not take */
     PSABENCH_TIMEOUT = -4,  /* it did not happen within the time given */
-    PSABENCH_SYSTEM = -5    /* file, memory */
+    PSABENCH_SYSTEM = -5,   /* file, memory */
+    PSABENCH_DEADLINE = -6, /* psabench_deadline() is over: time stands still */
+    PSABENCH_VIOLATED = -7  /* psabench_check(): the program did what the data sheet forbids */
 };
 
 /* ---- The bench ---- */
@@ -73,6 +76,13 @@ PSABENCH_API int64_t psabench_now_ns(const psabench *b);
 PSABENCH_API int64_t psabench_next_ns(const psabench *b); /* when something will happen by itself; INT64_MAX: never */
 PSABENCH_API int psabench_run_until(psabench *b, int64_t t_ns); /* from psabench_now_ns() up to 2^60: 36 years */
 PSABENCH_API int psabench_run_for(psabench *b, int64_t dt_ns);
+
+/* The program under test has until t_ns; INT64_MAX: no deadline. Then time stands still: what would move it calls fn (NULL:
+ * nothing) and gives PSABENCH_DEADLINE, a psabench_spi() or psabench_board_*() that has begun before is finished. So does
+ * psabench_get() when it is called a million times while no time passes. fn may exit, or leave the program by longjmp() or an
+ * exception: the bench is as between two calls. psabench_error_text() has the levels of the pins: what is waited for. */
+typedef void psabench_deadline_fn(void *ctx, psabench *b);
+PSABENCH_API int psabench_deadline(psabench *b, int64_t t_ns, psabench_deadline_fn *fn, void *ctx);
 
 /* Records the pins of the parts that are on the bench (VCD, 1 ns, a scope named after each part) from now until
  * psabench_vcd_close(), psabench_free() or the next call. The picture of what a driver did, for GTKWave, PulseView,
@@ -126,6 +136,23 @@ PSABENCH_API int psabench_watch(psabench_part *p, int pin, psabench_watch_fn *fn
 /* Lets time pass until an output pin has the level, at once if it has it now; PSABENCH_TIMEOUT after timeout_ns. */
 PSABENCH_API int psabench_run_until_level(psabench_part *p, int pin, int level, int64_t timeout_ns);
 
+/* The same until the next edge of an output pin of a chip, never at once. */
+enum psabench_edge { PSABENCH_FALLING = 0, PSABENCH_RISING = 1, PSABENCH_EITHER = 2 };
+PSABENCH_API int psabench_run_until_edge(psabench_part *p, int pin, int edge, int64_t timeout_ns);
+
+/* ---- Interrupts ---- */
+
+/* An edge of a chip's output calls fn (NULL: no more), in place of the program, where time moves: between two instants of
+ * psabench_run_*(), at the end of psabench_spi() and psabench_board_*(), which are not interrupted. fn may do what the program
+ * may: exchange bytes, wait. What it interrupted then ends later, if need be. One at a time: an edge meanwhile waits, once a
+ * pin, until the program's time moves again; parts in the order of their making first, then pins by number. */
+typedef void psabench_interrupt_fn(void *ctx, psabench_part *p, int pin);
+PSABENCH_API int psabench_on_interrupt(psabench_part *p, int pin, int edge, psabench_interrupt_fn *fn, void *ctx);
+PSABENCH_API int psabench_mask(psabench *b, int masked); /* 1: all wait until 0. Returns what it was, or an error */
+
+/* Lets time pass until one has been served, or, where none can be (masked, in a handler), is waiting. */
+PSABENCH_API int psabench_run_until_interrupt(psabench *b, int64_t timeout_ns);
+
 /* ---- Inputs ---- */
 
 /* Input of a part, volts (PSA-2 with a current input: amperes), at t_ns: never earlier than the last call for the same
@@ -153,6 +180,11 @@ PSABENCH_API int psabench_spi_clock(psabench_part *p, uint32_t sclk_hz, int64_t 
 PSABENCH_API int psabench_peek(const psabench_part *p, unsigned address);
 /* Counters of what the part did, suffered and rejected: name of number i, NULL behind the last. */
 PSABENCH_API const char *psabench_counter(const psabench_part *p, int i, uint64_t *value);
+PSABENCH_API int64_t psabench_count(const psabench_part *p, const char *name); /* value of that counter, or an error */
+/* Those that stay 0 while the program keeps to the data sheet, listed like psabench_counter(). psabench_check():
+ * PSABENCH_OK if all are 0; else PSABENCH_VIOLATED, and psabench_error_text() names them. */
+PSABENCH_API const char *psabench_violation(const psabench_part *p, int i, uint64_t *value);
+PSABENCH_API int psabench_check(const psabench_part *p);
 
 /* ---- Frames of a board ---- */
 

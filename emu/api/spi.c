@@ -64,6 +64,8 @@ static int check_exchange(psabench_part *p, size_t n)
     if (may) return may;
     if (p->level >> p->sclk & 1)
         return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: psabench_spi(): expected SCLK low, got high", p->name);
+    const int late = api_late(b);
+    if (late) return late;
     const int64_t byte_ns = clk_span_ns(p->sclk_hz, 8) + 1 + p->gap_ns;
     if (n > (uint64_t)((API_TIME_MAX_NS - b->sched.now_ns) / byte_ns))
         return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: expected fewer bytes (they end after the last time), got %zu",
@@ -84,6 +86,7 @@ int psabench_spi(psabench_part *p, const uint8_t *tx, uint8_t *rx, size_t n)
         u.offset_ns += p->gap_ns;
     }
     p->bench->inside--;
+    api_serve(p->bench);
     return PSABENCH_OK;
 }
 

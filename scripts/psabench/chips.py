@@ -12,11 +12,11 @@
         code = int.from_bytes(adc.spi(bytes(3)), "big", signed=True)
         print(ads1256_volts(code, vref_v=2.5))
 
-Simulated time stands still between calls: it moves in `run_for`, `run_until_ns`, `run_until_level`, `spi`, `board_read`
-and `board_write`. Functions given to `watch`, `set_input` and `on_frame` are called from in there and must not call
-these or `close`; what they raise comes out of the call that moved time. Durations are float seconds and end in _s,
-instants are whole nanoseconds since the bench was made and end in _ns. The same calls give the same answers on every
-machine.
+Simulated time stands still between calls: it moves in `run_for`, `run_until_...`, `spi`, `board_read` and
+`board_write`. Functions given to `watch`, `set_input` and `on_frame` are called from in there and must not call these
+or `close`; those given to `interrupt` may, but for `close`. What they raise comes out of the call that moved time.
+Durations are float seconds and end in _s, instants are whole nanoseconds since the bench was made and end in _ns. The
+same calls give the same answers on every machine.
 
 `psabench.errors`: BadInput for what does not exist (part, option, pin, register), TimeOut, BenchError for the rest.
 """
@@ -24,19 +24,20 @@ machine.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
 from psabench.errors import BadInput, BenchError, TimeOut, expected
-from psabench.native.clib import FRAME, INPUT, WATCH, FrameStruct, library
+from psabench.native.clib import DEADLINE, FRAME, INPUT, INTERRUPT, WATCH, FrameStruct, library
 
 NEVER_NS = 2**63 - 1
 SLICE_NS = 100_000_000  # time runs in slices of this length, so that Ctrl-C and what callbacks raise come out soon
-BAD_ARGUMENT, NOT_HERE, REFUSED, TIMEOUT, SYSTEM = -1, -2, -3, -4, -5  # enum psabench_error
-ERRORS = {BAD_ARGUMENT: BadInput, NOT_HERE: BadInput, REFUSED: BenchError, TIMEOUT: TimeOut, SYSTEM: BenchError}
+BAD_ARGUMENT, NOT_HERE, REFUSED, TIMEOUT, SYSTEM, LATE, VIOLATED = -1, -2, -3, -4, -5, -6, -7  # enum psabench_error
+ERRORS = {BAD_ARGUMENT: BadInput, NOT_HERE: BadInput, TIMEOUT: TimeOut, LATE: TimeOut}  # BenchError: the others
+EDGES = ("falling", "rising", "either")  # enum psabench_edge
 
 
 def parts() -> tuple[str, ...]:
@@ -135,9 +136,30 @@ class Bench(AbstractContextManager["Bench"]):
     def run_until_ns(self, t_ns: int) -> None:
         """Lets time pass until an instant; BadInput when it is over already."""
         handle = self.live()
-        while (slice_ns := self.now_ns + SLICE_NS) < t_ns:
-            self.done(self._lib.run_until(handle, slice_ns))
-        self.done(self._lib.run_until(handle, t_ns))
+        while True:
+            self.done(self._lib.run_until(handle, min(t_ns, self.now_ns + SLICE_NS)))
+            if self.now_ns >= t_ns:  # later than that if an interrupt took long
+                return
+
+    def run_until_interrupt(self, timeout_s: float = 10.0) -> None:
+        """Lets time pass until a handler of `Pin.interrupt` has run. TimeOut after timeout_s."""
+        if not self.wait(lambda left_ns: self._lib.run_until_interrupt(self.live(), left_ns), timeout_s):
+            raise TimeOut(expected(f"an interrupt within {timeout_s:g} s", "none", "bench"))
+
+    @contextmanager
+    def masked(self) -> Iterator[None]:
+        """Interrupts wait within the block."""
+        was = self.done(self._lib.mask(self.live(), 1))
+        try:
+            yield
+        finally:
+            self._lib.mask(self.live(), was)
+
+    def deadline(self, dt_s: float | None) -> None:
+        """The program under test has dt_s from now (None: no end). Then what would move time raises TimeOut, and so
+        does the millionth look at a pin while no time passes: a loop that waits in vain comes to an end."""
+        t_ns = NEVER_NS if dt_s is None else self.now_ns + round(dt_s * 1e9)
+        self.done(self._lib.deadline(self.live(), t_ns, DEADLINE(), None))
 
     def part(self, part: str, *, name: str | None = None, **options: float | str | bool) -> Part:
         """Puts a part on the bench, with supplies and clock. `options(part)` lists its options; name: for the
@@ -174,6 +196,14 @@ class Bench(AbstractContextManager["Bench"]):
             raise ERRORS.get(result, BenchError)(self._error_text())
         return result
 
+    def wait(self, call: Callable[[int], int], timeout_s: float) -> bool:
+        """Whether what call(left_ns) waits for came within timeout_s; in slices."""
+        end_ns = self.now_ns + round(timeout_s * 1e9)
+        while (left_ns := end_ns - self.now_ns) > SLICE_NS:
+            if self.done(call(SLICE_NS), allow=TIMEOUT) != TIMEOUT:
+                return True
+        return self.done(call(left_ns if timeout_s < 0 else max(left_ns, 0)), allow=TIMEOUT) != TIMEOUT
+
     def _error_text(self) -> str:
         return str(self._lib.error_text(self.live()).decode(errors="replace"))
 
@@ -204,6 +234,11 @@ class Pin:
         order of time). None: no more; one watcher a pin."""
         self._part.install("watch", WATCH, fn and (lambda _ctx, _part, _pin, *args: fn(*args)), self.number)
 
+    def interrupt(self, fn: Callable[[], None] | None, edge: str = "falling") -> None:
+        """Calls fn() at each such edge of a chip's output ("falling", "rising", "either") in place of the program, between
+        two instants of what moves time: it may exchange bytes and wait. One runs at a time. None: no more."""
+        self._part.install("on_interrupt", INTERRUPT, fn and (lambda *_: fn()), self.number, _edge_number(edge))
+
 
 class _Pins(dict[str, Pin]):
     def __init__(self, part: Part) -> None:
@@ -222,6 +257,7 @@ class Part:
     def __init__(self, bench: Bench, handle: int) -> None:
         self.bench, self._lib, self._handle = bench, library(), handle
         self._callbacks: dict[tuple[str, tuple[int, ...]], object] = {}  # C knows only their addresses: kept alive here
+        self._replaced: list[object] = []
         self.name = str(self._lib.part_name(handle).decode())
         self.pins: Mapping[str, Pin] = _Pins(self)
 
@@ -260,13 +296,16 @@ class Part:
     def run_until_level(self, pin: str, level: int, timeout_s: float = 10.0) -> None:
         """Lets time pass until an output pin has the level, at once if it has it now. TimeOut after timeout_s."""
         number = self.pins[pin].number
-        end_ns = self.bench.now_ns + round(timeout_s * 1e9)
-        while (left_ns := end_ns - self.bench.now_ns) > SLICE_NS:
-            result = self._lib.run_until_level(self.live(), number, level, SLICE_NS)
-            if self.bench.done(result, allow=TIMEOUT) != TIMEOUT:
-                return
-        if self.bench.done(self._lib.run_until_level(self.live(), number, level, left_ns), allow=TIMEOUT) == TIMEOUT:
+        call = self._lib.run_until_level
+        if not self.bench.wait(lambda left_ns: call(self.live(), number, level, left_ns), timeout_s):
             raise TimeOut(expected(f"{level} within {timeout_s:g} s", "no change", f"{self.name}: {pin}"))
+
+    def run_until_edge(self, pin: str, edge: str = "falling", timeout_s: float = 10.0) -> None:
+        """Lets time pass until the next edge of a chip's output, never at once: "falling", "rising" or "either"."""
+        number, kind = self.pins[pin].number, _edge_number(edge)
+        call = self._lib.run_until_edge
+        if not self.bench.wait(lambda left_ns: call(self.live(), number, kind, left_ns), timeout_s):
+            raise TimeOut(expected(f"an edge within {timeout_s:g} s", "none", f"{self.name}: {pin}"))
 
     # Inside
 
@@ -277,8 +316,20 @@ class Part:
     @property
     def counters(self) -> dict[str, int]:
         """What the part did, suffered and rejected so far."""
+        return self._counted(self._lib.counter)
+
+    @property
+    def violations(self) -> dict[str, int]:
+        """Those of the counters that stay 0 while the program keeps to the data sheet."""
+        return self._counted(self._lib.violation)
+
+    def check(self) -> None:
+        """BenchError if one of the violations is not 0; its text names them."""
+        self.bench.done(self._lib.check(self.live()))
+
+    def _counted(self, listed: Callable[..., bytes | None]) -> dict[str, int]:
         handle, value, found = self.live(), ctypes.c_uint64(), dict[str, int]()
-        while name := self._lib.counter(handle, len(found), value):
+        while name := listed(handle, len(found), value):
             found[name.decode()] = value.value
         return found
 
@@ -309,6 +360,9 @@ class Part:
         """Hands fn to the library as its callback of a kind; NULL for None."""
         callback = kind(self._guarded(fn)) if fn else kind()
         self.bench.done(getattr(self._lib, function)(self.live(), *where, callback, None))
+        if not self.bench.inside:
+            self._replaced.clear()
+        self._replaced.append(self._callbacks.get((function, where)))  # it may be running: it replaces itself
         self._callbacks[function, where] = callback
 
     def _guarded(self, fn: Callable[..., Any]) -> Callable[..., Any]:
@@ -344,6 +398,12 @@ def _word(what: str, value: int, bits: int = 32) -> int:
     if not isinstance(value, int) or not 0 <= value < 1 << bits:
         raise BadInput(expected(f"a whole number, 0 to {(1 << bits) - 1}", repr(value), what))
     return value
+
+
+def _edge_number(name: str) -> int:
+    if name not in EDGES:
+        raise BadInput(expected(", ".join(EDGES), name, "edge"))
+    return EDGES.index(name)
 
 
 def _option(value: float | str | bool) -> str:

@@ -20,7 +20,7 @@ struct world {
 
 static int error(const struct world *w, int result)
 {
-    assert(result >= PSABENCH_SYSTEM);
+    assert(result >= PSABENCH_VIOLATED);
     if (result < 0) assert(psabench_error_text(w->b)[0] && !strchr(psabench_error_text(w->b), '\n'));
     return result;
 }
@@ -30,6 +30,23 @@ static void changed(void *ctx, psabench_part *p, int pin, int level, int64_t t_n
     const struct world *w = ctx;
     assert((level == 0 || level == 1) && psabench_pin_name(p, pin));
     assert(psabench_of(p) == w->b && t_ns >= 0 && t_ns <= psabench_now_ns(w->b));
+}
+
+/* A handler does what a driver does; the deadline is over when the script's time is. */
+static void serve(void *ctx, psabench_part *p, int pin)
+{
+    const struct world *w = ctx;
+    uint8_t word[3];
+    assert(psabench_get(p, pin) >= PSABENCH_DEADLINE);
+    error(w, psabench_spi(p, NULL, word, sizeof word));
+    error(w, psabench_run_until_edge(p, pin, PSABENCH_EITHER, 10000));
+    psabench_free(w->b); /* does nothing here */
+}
+
+static void late(void *ctx, psabench *b)
+{
+    const struct world *w = ctx;
+    assert(w->b == b && strstr(psabench_error_text(b), "deadline: "));
 }
 
 static double volts(void *ctx, psabench_part *p, int input, int64_t t_ns)
@@ -117,6 +134,35 @@ static void op_run(struct world *w, psabench_part *p)
     else error(w, psabench_run_for(w->b, dt_ns));
 }
 
+static void op_wait(struct world *w, psabench_part *p)
+{
+    const uint8_t b = script_byte(w->s);
+    const int pin = script_byte(w->s) % 20;
+    const int64_t dt_ns = script_span_ns(w->s) - 1;
+    const int edge = b >> 3 & 3;
+    switch (b & 7) {
+    case 0:
+    case 1:
+        error(w, psabench_run_until_edge(p, pin, edge, dt_ns));
+        break;
+    case 2:
+    case 3:
+        error(w, psabench_on_interrupt(p, pin, edge, b & 128 ? serve : NULL, w));
+        break;
+    case 4:
+        error(w, psabench_mask(w->b, edge));
+        break;
+    case 5:
+        error(w, psabench_run_until_interrupt(w->b, dt_ns));
+        break;
+    case 6:
+        error(w, psabench_deadline(w->b, b & 128 ? INT64_MAX : psabench_now_ns(w->b) + dt_ns, b & 64 ? late : NULL, w));
+        break;
+    default:
+        error(w, psabench_check(p));
+    }
+}
+
 static void op_next(struct world *w, psabench_part *p)
 {
     const int64_t next_ns = psabench_next_ns(w->b);
@@ -129,7 +175,8 @@ static void op_look(struct world *w, psabench_part *p)
     uint64_t v;
     const unsigned address = (unsigned)script_uint(w->s, 2);
     assert(error(w, psabench_peek(p, address)) <= 255);
-    for (int i = 0; psabench_counter(p, i, &v); i++) assert(i < 200);
+    for (int i = 0; psabench_counter(p, i, &v); i++)
+        assert(i < 200 && psabench_count(p, psabench_counter(p, i, NULL)) == (int64_t)v);
 }
 
 static void op_board(struct world *w, psabench_part *p)
@@ -149,7 +196,7 @@ static void op_vcd(struct world *w, psabench_part *p)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static void (*const ops[])(struct world * w, psabench_part * p) = {
-        op_run, op_pins, op_watch, op_input, op_spi, op_clock, op_next, op_look, op_board, op_vcd, op_part,
+        op_run, op_pins, op_watch, op_input, op_spi, op_clock, op_next, op_look, op_board, op_vcd, op_wait, op_part,
     };
     struct script s = script_of(data, size);
     struct world w = {.b = psabench_new(1), .s = &s};

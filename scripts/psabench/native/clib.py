@@ -12,6 +12,8 @@ ABI = 0  # PSABENCH_ABI of the header that PROTOTYPES was written from
 NAME = f"libpsabench.so.{ABI}"
 
 WATCH = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.c_int, c.c_int, c.c_int64)
+INTERRUPT = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.c_int)
+DEADLINE = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
 INPUT = c.CFUNCTYPE(c.c_double, c.c_void_p, c.c_void_p, c.c_int, c.c_int64)
 
 
@@ -47,6 +49,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "next_ns": (_TIME, _PTR),
     "run_until": (_INT, _PTR, _TIME),
     "run_for": (_INT, _PTR, _TIME),
+    "deadline": (_INT, _PTR, _TIME, DEADLINE, _PTR),
     "vcd": (_INT, _PTR, _TEXT),
     "vcd_close": (_INT, _PTR),
     "part_new": (_PTR, _PTR, _TEXT, _TEXT, _TEXT),
@@ -61,12 +64,19 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "get": (_INT, _PTR, _INT),
     "watch": (_INT, _PTR, _INT, WATCH, _PTR),
     "run_until_level": (_INT, _PTR, _INT, _LEVEL, _TIME),
+    "run_until_edge": (_INT, _PTR, _INT, _INT, _TIME),
+    "on_interrupt": (_INT, _PTR, _INT, _INT, INTERRUPT, _PTR),
+    "mask": (_INT, _PTR, _INT),
+    "run_until_interrupt": (_INT, _PTR, _TIME),
     "set_input": (_INT, _PTR, INPUT, _PTR),
     "set_volts": (_INT, _PTR, _INT, c.c_double),
     "spi": (_INT, _PTR, _TEXT, _PTR, c.c_size_t),
     "spi_clock": (_INT, _PTR, c.c_uint32, _TIME),
     "peek": (_INT, _PTR, c.c_uint),
     "counter": (_TEXT, _PTR, _INT, c.POINTER(c.c_uint64)),
+    "count": (_TIME, _PTR, _TEXT),
+    "violation": (_TEXT, _PTR, _INT, c.POINTER(c.c_uint64)),
+    "check": (_INT, _PTR),
     "on_frame": (_INT, _PTR, FRAME, _PTR),
     "board_read": (_INT, _PTR, c.c_uint, c.c_uint, _TIME),
     "board_write": (_INT, _PTR, c.c_uint, c.c_uint, c.c_uint8, _TIME),

@@ -170,6 +170,99 @@ def test_what_does_not_happen_in_time_is_a_timeout(adc: Part, monkeypatch: pytes
     assert adc.bench.now_ns == began_ns + 10_000
 
 
+def test_the_next_edge_is_waited_for_in_slices_too(adc: Part, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chips, "SLICE_NS", 1_000)
+    fell_ns = adc.bench.now_ns
+    adc.run_until_edge("DRDY")
+    assert SPS_30000_NS <= adc.bench.now_ns - fell_ns <= SPS_30000_NS + 1
+    assert adc.pins["DRDY"].level == 0
+    adc.run_until_edge("DRDY", "either")
+    assert adc.pins["DRDY"].level == 1
+    with pytest.raises(TimeOut, match=r"^adc: DRDY: expected an edge within 1e-06 s, got none$"):
+        adc.run_until_edge("DRDY", "rising", timeout_s=1e-6)
+    with pytest.raises(BadInput, match="edge: expected falling, rising, either, got up"):
+        adc.run_until_edge("DRDY", "up")
+    adc.pins["SYNC"].set(0)
+    with pytest.raises(TimeOut, match="expected an edge within 1e-05 s"):
+        adc.run_until_edge("DRDY", timeout_s=1e-5)
+
+
+def test_a_deadline_ends_a_program_that_waits_in_vain(adc: Part, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chips, "SLICE_NS", 1_000)
+    adc.pins["SYNC"].set(0)
+    end_ns = adc.bench.now_ns + 10_500
+    adc.bench.deadline(10.5e-6)
+    with pytest.raises(TimeOut, match=r"^deadline: expected the program to end by .* adc.DRDY=1 .*adc.SYNC=0"):
+        while adc.pins["DRDY"].level:
+            adc.bench.run_for(1e-7)
+    assert adc.bench.now_ns == end_ns
+    for call in (
+        lambda: adc.run_until_level("DRDY", 0),
+        lambda: adc.run_until_edge("DRDY"),
+        lambda: adc.bench.run_until_interrupt(),
+        lambda: adc.spi(bytes(1)),
+    ):
+        with pytest.raises(TimeOut, match="^deadline"):
+            call()
+    adc.bench.deadline(None)
+    adc.bench.run_for(1e-6)
+
+
+# ---- interrupts
+
+
+def test_a_handler_reads_what_drdy_announces(adc: Part, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chips, "SLICE_NS", 10_000)
+    adc.set_volts(0, 1.25)
+    adc.bench.run_for(SETTLED_S)
+    adc.run_until_level("DRDY", 0)
+    adc.spi_clock(1_900_000)
+    codes: list[int] = []
+
+    def on_drdy() -> None:
+        adc.spi(bytes([RDATA]))
+        adc.bench.run_for(T6_S)
+        codes.append(int.from_bytes(adc.spi(bytes(3)), "big", signed=True))
+        if len(codes) == 10:
+            adc.pins["DRDY"].interrupt(None)
+
+    adc.pins["DRDY"].interrupt(on_drdy)
+    with adc.bench.masked():
+        adc.bench.run_for(1e-4)
+        assert codes == []
+    adc.bench.run_for(20 * SPS_30000_NS * 1e-9)
+    assert len(codes) == 10
+    assert [ads1256_volts(code) for code in codes] == pytest.approx([1.25] * 10, abs=2e-6)
+    adc.check()
+    assert not any(adc.violations.values())
+    adc.pins["DRDY"].interrupt(on_drdy, "rising")
+    adc.bench.run_until_interrupt()
+    assert len(codes) == 11
+    adc.pins["DRDY"].interrupt(None)
+    with pytest.raises(TimeOut, match="expected an interrupt within 1e-05 s, got none"):
+        adc.bench.run_until_interrupt(1e-5)
+
+
+def test_what_a_handler_raises_comes_out_of_the_call(adc: Part) -> None:
+    def fails() -> None:
+        adc.bench.run_for(1e-6)
+        raise KeyError("in the handler")
+
+    adc.pins["DRDY"].interrupt(fails)
+    with pytest.raises(KeyError, match="in the handler"):
+        adc.bench.run_for(1e-3)
+    adc.pins["DRDY"].interrupt(lambda: adc.bench.close())
+    with pytest.raises(BenchError, match="from a callback"):
+        adc.bench.run_for(1e-3)
+
+
+def test_violations_are_named(adc: Part) -> None:
+    adc.spi(bytes([RDATA, 0, 0, 0]))  # no t6
+    assert {name: n for name, n in adc.violations.items() if n} == {"gap_violations": 1}
+    with pytest.raises(BenchError, match=r"^adc: expected no violations of the data sheet, got gap_violations 1$"):
+        adc.check()
+
+
 # ---- callbacks
 
 

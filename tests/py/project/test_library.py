@@ -118,6 +118,8 @@ C_TYPES: dict[str, object] = {
     "psabench_part *": ctypes.c_void_p,
     "void *": ctypes.c_void_p,
     "psabench_watch_fn *": clib.WATCH,
+    "psabench_interrupt_fn *": clib.INTERRUPT,
+    "psabench_deadline_fn *": clib.DEADLINE,
     "psabench_input_fn *": clib.INPUT,
     "psabench_frame_fn *": clib.FRAME,
 }
@@ -317,3 +319,13 @@ def test_the_picture_shows_the_recording_of_the_example(tmp_path: Path) -> None:
     if os.environ.get("GOLDEN") == "rewrite":
         picture.write_text(svg, encoding="utf-8")
     assert picture.read_text(encoding="utf-8") == svg
+
+
+def test_the_page_lists_the_violations_of_every_part() -> None:
+    page = (
+        (ROOT / "docs/library.md").read_text().partition("| part | violations |\n|---|---|\n")[2].partition("\n\n")[0]
+    )
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines()]
+    listed = {part: re.findall(r"`(\w+)`", text) for names, text in rows for part in names.split(", ")}
+    with Bench() as bench:
+        assert listed == {part: list(bench.part(part).violations) for part in parts()}
