@@ -235,8 +235,8 @@ class Pin:
         self._part.install("watch", WATCH, fn and (lambda _ctx, _part, _pin, *args: fn(*args)), self.number)
 
     def interrupt(self, fn: Callable[[], None] | None, edge: str = "falling") -> None:
-        """Calls fn() at each such edge of a chip's output ("falling", "rising", "either") in place of the program, between
-        two instants of what moves time: it may exchange bytes and wait. One runs at a time. None: no more."""
+        """Calls fn() at each such edge of a chip's output ("falling", "rising", "either") in place of the program,
+        between two instants of what moves time: it may exchange bytes and wait. One runs at a time. None: no more."""
         self._part.install("on_interrupt", INTERRUPT, fn and (lambda *_: fn()), self.number, _edge_number(edge))
 
 

@@ -192,9 +192,13 @@ def test_a_deadline_ends_a_program_that_waits_in_vain(adc: Part, monkeypatch: py
     adc.pins["SYNC"].set(0)
     end_ns = adc.bench.now_ns + 10_500
     adc.bench.deadline(10.5e-6)
-    with pytest.raises(TimeOut, match=r"^deadline: expected the program to end by .* adc.DRDY=1 .*adc.SYNC=0"):
+
+    def poll() -> None:
         while adc.pins["DRDY"].level:
             adc.bench.run_for(1e-7)
+
+    with pytest.raises(TimeOut, match=r"^deadline: expected the program to end by .* adc.DRDY=1 .*adc.SYNC=0"):
+        poll()
     assert adc.bench.now_ns == end_ns
     for call in (
         lambda: adc.run_until_level("DRDY", 0),
@@ -202,7 +206,7 @@ def test_a_deadline_ends_a_program_that_waits_in_vain(adc: Part, monkeypatch: py
         lambda: adc.bench.run_until_interrupt(),
         lambda: adc.spi(bytes(1)),
     ):
-        with pytest.raises(TimeOut, match="^deadline"):
+        with pytest.raises(TimeOut, match=r"^deadline"):
             call()
     adc.bench.deadline(None)
     adc.bench.run_for(1e-6)
