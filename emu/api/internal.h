@@ -99,48 +99,8 @@ struct psabench {
 /* Notes why, for psabench_error_text(), and returns code. b may be NULL. */
 int api_fail(psabench *b, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
-/* Whether time may move now; else a noted error. */
-int api_may_move(psabench *b, const char *function);
-
-/* Lets everything up to t_ns happen, each instant reported as it comes. The caller has raised b->inside. No interrupt is
- * served, no deadline looked at. */
-void api_move(psabench *b, int64_t t_ns);
-
-/* The deadline is over: calls its function and returns PSABENCH_DEADLINE; else PSABENCH_OK. Outside callbacks. */
-int api_late(psabench *b);
-
-/* A program reads a pin: PSABENCH_DEADLINE if it does nothing else for ever. */
-int api_poll(psabench *b);
-
-/* Serves the interrupts that wait, if none is being served and they are not masked. Outside callbacks. */
-void api_serve(psabench *b);
-bool api_pending(const psabench *b);
-
-/* Reports what has changed since the last report. */
-void api_notify(psabench *b);
-
 /* A pin has changed: to the recording, then to its watcher. */
 void api_edge(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
-
-/* Pins whose changes somebody wants to hear of. */
-static inline uint32_t api_observed(const struct psabench_part *p)
-{
-    return p->watched | p->recorded | p->counted | p->armed;
-}
-
-/* Before a pin joins those: changes count from now. */
-void api_observe(struct psabench_part *p, unsigned pin);
-
-/* Row of a pin, NULL if there is none, and the error then. */
-const struct api_pin *api_pin_of(const struct psabench_part *p, int pin);
-int api_no_pin(const struct psabench_part *p, int pin);
-
-/* Level now. An error for lines that are known only afterwards. */
-bool api_level(const struct psabench_part *p, unsigned pin);
-int api_not_late(const struct psabench_part *p, const struct api_pin *row);
-
-/* For edges: an output of a part that reports them at once; else a noted error. */
-int api_edge_pin(const struct psabench_part *p, int pin, int edge, const char *function);
 
 /* An input pin takes a level, without telling the outputs that follow. */
 void api_drive(struct psabench_part *p, unsigned pin, bool level);
@@ -177,5 +137,7 @@ int api_vcd_begin(psabench *b, const char *path);
 void api_vcd_put(struct psabench_part *p, unsigned pin, bool level, int64_t t_ns);
 void api_vcd_follow(psabench *b);
 int api_vcd_end(psabench *b); /* what is still on its way, closing time */
+
+#include "api/run.h" /* IWYU pragma: export */
 
 #endif

@@ -72,13 +72,13 @@ static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
     return a_ns < b_ns ? a_ns : b_ns;
 }
 
-static bool before(const psabench *b, int64_t t_ns)
+static bool has_time(const psabench *b, int64_t t_ns)
 {
     return b->sched.now_ns < t_ns || sched_next_ns(&b->sched) <= t_ns;
 }
 
 /* To the next instant at which something happens, at most to t_ns: so a change is reported when it happens. */
-static void step(psabench *b, int64_t t_ns)
+static void step_time(psabench *b, int64_t t_ns)
 {
     const int64_t next_ns = earlier_ns(sched_next_ns(&b->sched), next_notify_ns(b));
     sched_run_until(&b->sched, earlier_ns(next_ns, t_ns));
@@ -87,7 +87,7 @@ static void step(psabench *b, int64_t t_ns)
 
 void api_move(psabench *b, int64_t t_ns)
 {
-    while (before(b, t_ns)) step(b, t_ns);
+    while (has_time(b, t_ns)) step_time(b, t_ns);
 }
 
 /* What a call waits for. p NULL: only for the end of its time. */
@@ -117,11 +117,11 @@ static int wait_until(psabench *b, const struct wait *w, int64_t end_ns)
 {
     api_serve(b);
     while (!is_met(w)) {
-        if (!before(b, end_ns)) return PSABENCH_TIMEOUT;
+        if (!has_time(b, end_ns)) return PSABENCH_TIMEOUT;
         const int late = api_late(b);
         if (late) return late;
         b->inside++;
-        step(b, earlier_ns(look_ns(w, end_ns), b->deadline.t_ns));
+        step_time(b, earlier_ns(look_ns(w, end_ns), b->deadline.t_ns));
         b->inside--;
         const bool met = is_met(w); /* before a handler changes it */
         api_serve(b);

@@ -1,0 +1,50 @@
+/* What moves the time of a bench, and who is to hear of its pins. Included by api/internal.h, whose structs it takes. */
+#ifndef PSABENCH_API_RUN_H
+#define PSABENCH_API_RUN_H
+
+#include "api/internal.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Whether time may move now; else a noted error. */
+int api_may_move(psabench *b, const char *function);
+
+/* Lets everything up to t_ns happen, each instant reported as it comes. The caller has raised b->inside. No interrupt is
+ * served, no deadline looked at. */
+void api_move(psabench *b, int64_t t_ns);
+
+/* The deadline is over: calls its function and returns PSABENCH_DEADLINE; else PSABENCH_OK. Outside callbacks. */
+int api_late(psabench *b);
+
+/* A program reads a pin: PSABENCH_DEADLINE if it does so without end. */
+int api_poll(psabench *b);
+
+/* Serves the interrupts that wait, if none is being served and they are not masked. Outside callbacks. */
+void api_serve(psabench *b);
+bool api_pending(const psabench *b);
+
+/* Reports what has changed since the last report. */
+void api_notify(psabench *b);
+
+/* Pins whose changes somebody wants to hear of. */
+static inline uint32_t api_observed(const struct psabench_part *p)
+{
+    return p->watched | p->recorded | p->counted | p->armed;
+}
+
+/* Before a pin joins those: changes count from now. */
+void api_observe(struct psabench_part *p, unsigned pin);
+
+/* Row of a pin, NULL if there is none, and the error then. */
+const struct api_pin *api_pin_of(const struct psabench_part *p, int pin);
+int api_no_pin(const struct psabench_part *p, int pin);
+
+/* Level now. An error for lines that are known only afterwards. */
+bool api_level(const struct psabench_part *p, unsigned pin);
+int api_not_late(const struct psabench_part *p, const struct api_pin *row);
+
+/* For edges: an output of a part that reports them at once; else a noted error. */
+int api_edge_pin(const struct psabench_part *p, int pin, int edge, const char *function);
+
+#endif
