@@ -51,7 +51,7 @@ def deviations(tests: int) -> float:
 
 
 def quality_limit(f: Fit, s: Sensitivity) -> float:
-    """Of |hypot(s, c) - 1|: the library's, or what the random drift makes of it in a short run."""
+    """Of |hypot(s, c) - 1|: the library's, or what drift, noise and the operator's latitude make of it."""
     sd = math.sqrt(float(s.hypot_s @ rate_covariance(f) @ s.hypot_s))
     return max(QUALITY_LEAST, deviations(1) * sd)
 
@@ -67,7 +67,6 @@ def doubts_of(e: Evidence) -> tuple[str, ...]:
     checks = (
         _latitude,
         _passport,
-        _unseen_latitude,
         _open,
         _few,
         _running,
@@ -86,6 +85,7 @@ def notes_of(e: Evidence, windows: Sequence[Window]) -> list[str]:
     said = Flag.POOR_QUALITY | Flag.NOT_CONVERGED | Flag.SIMPLIFIED
     raised = [f for f in Flag if f in c.flags]
     notes = [text for f, text in zip(raised, c.warnings, strict=True) if f not in said]
+    notes += [words] if (words := _unseen_latitude(e)) else []
     if p.calibrate_s and not good_calibration(windows, p):
         notes.append(f"the calibration does not count: {'; '.join(why_not(windows[-1]))}")
     blind = [f"{a.number + 1} and {b.number + 1}" for a, b in _pairs(e.fit) if a.missed != b.missed]
@@ -94,6 +94,23 @@ def notes_of(e: Evidence, windows: Sequence[Window]) -> list[str]:
             f"readings were lost between positions {', '.join(blind)}: whether the vehicle turned is not known"
         )
     return notes
+
+
+def _unseen_latitude(e: Evidence) -> str:
+    """On a tilt near the equator wrong latitudes do not show, and turn the heading.
+
+    No doubt: it says nothing against the latitude given, whose own error is in the heading's interval.
+    """
+    f, latitude = e.fit, e.latitude
+    limit = LIMIT_CI * f.compass.alpha1_half95_rad + heading_allowance_rad(f.params, f.attitude)
+    if latitude.unseen_deg <= limit * DEG:
+        return ""
+    return (
+        f"latitudes from {latitude.low_deg:.2f} to {latitude.high_deg:.2f} deg cannot be told from "
+        f"{f.params.latitude_deg:g} deg here, and on this tilt turn the heading by up to {latitude.unseen_deg:.2f} "
+        f"deg: the interval holds for a latitude known to {f.params.latitude_sd_arcmin:g}'; for one that is not, level "
+        "the vehicle, or give drift2_degph and drift2_limit_degph of the passport"
+    )
 
 
 # ---- the checks: "" where there is nothing to say
@@ -124,19 +141,6 @@ def _passport(e: Evidence) -> str:
     return (
         f"the azimuth axis drifts by {e.drift2_radps / DEGPH:.2f} deg/h where its passport says {p.drift2_degph:g} +- "
         f"{p.drift2_limit_degph:g} deg/h: {would}, or the vehicle turns all the time"
-    )
-
-
-def _unseen_latitude(e: Evidence) -> str:
-    """On a tilt near the equator wrong latitudes do not show, and turn the heading."""
-    f, latitude = e.fit, e.latitude
-    limit = LIMIT_CI * f.compass.alpha1_half95_rad + heading_allowance_rad(f.params, f.attitude)
-    if latitude.unseen_deg <= limit * DEG:
-        return ""
-    return (
-        f"latitudes from {latitude.low_deg:.2f} to {latitude.high_deg:.2f} deg cannot be told from "
-        f"{f.params.latitude_deg:g} deg here, and on this tilt turn the heading by up to {latitude.unseen_deg:.2f} "
-        "deg: level the vehicle, or give drift2_degph and drift2_limit_degph of the passport"
     )
 
 

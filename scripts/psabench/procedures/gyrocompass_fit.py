@@ -10,7 +10,7 @@ import numpy as np
 
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
-from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS
+from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
 from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
 from psabench.procedures.platform_bench import Floats, Window
@@ -109,20 +109,36 @@ def sensitivity(f: Fit) -> Sensitivity:
 
 
 def rate_covariance(f: Fit) -> Floats:
-    """Of the windows' rates, from the random drift, noise, angles and level sensors, (rad/s)^2."""
-    n = f.noise
-    rows = [r.position for r in f.rows]
-    cov = np.array(
-        [
-            [
-                nav.gm_window_cov(n.gm_sigma_radps, n.gm_tau_s, a.window_s, b.window_s, abs(a.t_mid_s - b.t_mid_s))
-                for b in rows
-            ]
-            for a in rows
-        ]
-    )
-    alone = n.window_sd_radps**2 + (f.params.we_radps * n.angle_sd_rad) ** 2 + (EARTH_RADPS * n.level_sd_rad) ** 2
-    return np.asarray(cov + alone * np.eye(len(rows)))
+    """Of what the windows' rates miss the model by, (n, n), (rad/s)^2: the random drift, and all else."""
+    return drift_covariance(f) + error_covariance(f)
+
+
+def drift_covariance(f: Fit) -> Floats:
+    """Of the means of the random drift over the windows, (n, n), (rad/s)^2."""
+    n, rows = f.noise, [r.position for r in f.rows]
+
+    def of(a: nav.Position, b: nav.Position) -> float:
+        return nav.gm_window_cov(n.gm_sigma_radps, n.gm_tau_s, a.window_s, b.window_s, abs(a.t_mid_s - b.t_mid_s))
+
+    return np.array([[of(a, b) for b in rows] for a in rows])
+
+
+def error_covariance(f: Fit) -> Floats:
+    """Of what else the rates miss the model by, (n, n), (rad/s)^2.
+
+    Noise, angles and level sensors are new in each window, the latitude's error is one for all: at another latitude the
+    Earth's horizontal rate and the compensation of gamma are others.
+    """
+    n, p, rows = f.noise, f.params, [r.position for r in f.rows]
+    turned = np.array([f.compass.alpha1_rad + r.delta_rad for r in rows])
+    alone = (p.we_radps * n.angle_sd_rad * np.cos(turned)) ** 2
+    alone += n.window_sd_radps**2 + (p.wz_radps * n.level_sd_rad) ** 2
+    by_latitude = [
+        p.wz_radps * _earth_part(r, f.compass, p) + p.we_radps * math.sin(r.gamma_rad) * math.cos(r.beta_rad)
+        for r in rows
+    ]
+    shared = n.latitude_sd_rad * np.array(by_latitude)
+    return np.asarray(np.diag(alone) + np.outer(shared, shared))
 
 
 def _attitude(q_rad: Floats, windows: Sequence[Window]) -> nav.Attitude:
@@ -160,9 +176,14 @@ def _positions(
 
 def _residual(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
     """What a window's rate misses the model by, rad/s."""
+    return r.s_radps - p.we_radps * _earth_part(r, c, p) - c.drift1_radps
+
+
+def _earth_part(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
+    """What a window sees of the Earth's horizontal rate: (13) or (14) over We."""
     a = c.alpha1_rad + r.delta_rad
     tilt = 0.0 if p.simplified else math.sin(r.gamma_rad) * math.sin(r.beta_rad)
-    return r.s_radps - p.we_radps * (math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt) - c.drift1_radps
+    return math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt
 
 
 # ---- the azimuth axis

@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 Array = npt.NDArray[np.float64]
 
 STEP_S = 0.01  # of its controller
+MIDDLES = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of the fifths of a window
 U_DEGPH = 15.041067
 DEGPH = math.radians(1.0) / 3600.0
 ARCMIN = math.radians(1.0 / 60.0)
@@ -104,18 +105,26 @@ class FakePlatform:
         phi = math.radians(self.latitude_deg)
         return np.asarray(r.T @ np.array([0.0, math.cos(phi), math.sin(phi)]) * U_DEGPH * DEGPH)
 
-    def settled(self, q_rad: float) -> tuple[float, float, float, float, float]:
-        """(S, u1, u2, beta true, gamma true) of a platform that holds the gimbal still; rates in rad/s."""
+    def settled(self, q_rad: float, length_s: float = 0.0) -> tuple[float, float, float, float, float]:
+        """(S, u1, u2, beta true, gamma true) of a platform that holds the gimbal still; rates in rad/s.
+
+        length_s: of the window about this instant that they are means over.
+        """
         beta = 0.0
+        drift1, drift2 = (self._mean(d, length_s) * DEGPH for d in (self.drift1_degph, self.drift2_degph))
         wz = U_DEGPH * DEGPH * math.sin(self._told_rad)
         for _ in range(5):  # beta is some 1e-4: each round is that much nearer
             alpha, gamma = self.attitude(q_rad, beta)
             w = self.earth_p(turn(2, alpha) @ turn(0, beta) @ turn(1, gamma))
-            u1 = (w[0] + self.drift1_degph(self.t_s) * DEGPH) / (1.0 + self.scale1)
+            u1 = (w[0] + drift1) / (1.0 + self.scale1)
             beta_n, gamma_n = beta + self.bias_beta_arcmin * ARCMIN, gamma + self.bias_gamma_arcmin * ARCMIN
             s = u1 + wz * math.cos(beta_n) * math.sin(gamma_n)
             beta = -s / self._m1 - self.bias_beta_arcmin * ARCMIN
-        return s, u1, float(w[2]) + self.drift2_degph(self.t_s) * DEGPH, beta, gamma
+        return s, u1, float(w[2]) + drift2, beta, gamma
+
+    def _mean(self, drift_degph: Callable[[float], float], length_s: float) -> float:
+        """Of a drift over the window about this instant, deg/h."""
+        return sum(drift_degph(self.t_s + length_s * x) for x in MIDDLES) / len(MIDDLES)
 
     # ---- PlatformBench
 
@@ -150,7 +159,7 @@ class FakePlatform:
         n = round(length_s / STEP_S)
         t_mid_s = self.t_s + length_s / 2.0
         self.t_s = t_mid_s
-        s, u1, u2, _, gamma = self.settled(self._q)
+        s, u1, u2, _, gamma = self.settled(self._q, length_s)
         shift = self.level_sd_arcmin * ARCMIN * self.rng.standard_normal(2)  # of the setting: seen, not felt by S
         read = self.read_sd_arcmin * ARCMIN * self.rng.standard_normal()
         encoder = self._q + read if self.stuck_deg is None else math.radians(self.stuck_deg)
