@@ -162,9 +162,9 @@ RULES = {
     "one-word-functions-python": Rule(one_word_functions, 925, 925),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 57_590, 57_590),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_541, 44_316),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_672, 1_669),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_001, 58_001),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_933, 44_933),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_678, 1_678),
 }
 
 

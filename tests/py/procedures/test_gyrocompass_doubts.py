@@ -230,7 +230,7 @@ def test_near_the_equator_a_tilt_calls_for_a_note_and_level_for_none() -> None:
 @pytest.mark.parametrize("true_deg", [-51.0, 51.0])
 def test_a_latitude_that_is_off_by_what_the_operator_admits_is_no_doubt(true_deg: float) -> None:
     """1 deg makes 2 % of the Earth's horizontal rate, twice the limit of a latitude that is known."""
-    given = {"latitude_deg": math.copysign(50.0, true_deg)}
+    given: dict[str, Any] = {"latitude_deg": math.copysign(50.0, true_deg)}
     assert "it would be right at latitude 5" in run(FakePlatform(latitude_deg=true_deg), **given).doubts[0]
     assert run(FakePlatform(latitude_deg=true_deg), **given, latitude_sd_arcmin=60.0).doubts == ()
     far = FakePlatform(latitude_deg=math.copysign(55.0, true_deg))
