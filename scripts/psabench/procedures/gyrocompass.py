@@ -15,7 +15,7 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
-from psabench.procedures.gyrocompass_fit import Fit, Row, drift2_of, fit, sensitivity
+from psabench.procedures.gyrocompass_fit import Fit, Row, attitude_sd_rad, drift2_of, fit, sensitivity
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
 from psabench.procedures.gyrocompass_params import NAME, GyrocompassParams
 from psabench.procedures.gyrocompass_windows import good_calibration, sorted_out
@@ -130,14 +130,14 @@ def _evidence(f: Fit, planned: int, drift2: tuple[float, float]) -> Evidence:
 
 def _estimates(f: Fit, drift2_radps: float, drift2_sd_radps: float) -> tuple[Estimate, ...]:
     c, attitude = f.compass, f.attitude
-    tilt_sd_rad = f.params.level_sd_arcmin * ARCMIN
+    pitch_sd_rad, roll_sd_rad, _ = attitude_sd_rad(f)
     return (
         _estimate("heading_deg", "ψ", "deg", f.heading_rad * DEG, c.alpha1_sd_rad * DEG),
         _estimate("alpha1_deg", "α_1", "deg", c.alpha1_rad * DEG, c.platform_sd_rad * DEG),
         _estimate("drift1_degph", "ω_d1", "deg/h", c.drift1_radps / DEGPH, c.drift1_sd_radps / DEGPH),
         _estimate("drift2_degph", "ω_d2", "deg/h", drift2_radps / DEGPH, drift2_sd_radps / DEGPH),
-        _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, tilt_sd_rad * DEG),
-        _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, tilt_sd_rad * DEG),
+        _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, pitch_sd_rad * DEG),
+        _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, roll_sd_rad * DEG),
     )
 
 
@@ -153,12 +153,16 @@ def allowance(result: GyrocompassResult) -> dict[str, float]:
     level_rad, latitude_rad = p.level_zero_arcmin * ARCMIN, p.latitude_sd_arcmin * ARCMIN
     heading_rad = heading_allowance_rad(p, result.attitude)
     drift1_radps = abs(p.wz_radps) * level_rad + p.torquer_scale * abs(c.drift1_radps)
+    # the zero of gamma is fitted, that of beta enters as its square; the gimbal's zero turns pitch into roll
+    tilt_rad = level_rad**2 + p.angle_zero_arcmin * ARCMIN * math.hypot(
+        result.attitude.pitch_rad, result.attitude.roll_rad
+    )
     drift2_radps = p.we_radps * (math.sqrt(2.0) * level_rad + latitude_rad) + p.torquer_scale * abs(result.drift2_radps)
     return {
         "heading_deg": heading_rad * DEG,
         "alpha1_deg": (heading_rad - p.angle_zero_arcmin * ARCMIN) * DEG,
         "drift1_degph": drift1_radps / DEGPH,
         "drift2_degph": drift2_radps / DEGPH,
-        "pitch_deg": p.level_zero_arcmin / 60.0 * 2.0,
-        "roll_deg": p.level_zero_arcmin / 60.0 * 2.0,
+        "pitch_deg": tilt_rad * DEG,
+        "roll_deg": tilt_rad * DEG,
     }

@@ -16,7 +16,7 @@ import numpy as np
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
-from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, rate_covariance
+from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, attitude_sd_rad, rate_covariance
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.gyrocompass_windows import LEVEL_CODE_RAD, good_calibration, unsteady, why_not
@@ -258,9 +258,7 @@ def _tilted(e: Evidence) -> str:
 def _biased(e: Evidence) -> str:
     """A level sensor that tells what it told shows a gamma that does not turn with the gimbal: all of it a constant."""
     f, p = e.fit, e.fit.params
-    q = np.array([r.q_rad for r in f.rows])
-    design = np.column_stack([np.cos(q), np.sin(q), np.ones(len(q))])
-    sd = p.level_sd_arcmin * ARCMIN * float(np.linalg.norm(np.linalg.pinv(design)[2]))
+    sd = attitude_sd_rad(f)[2]
     bias = f.attitude.gamma_bias_rad
     if abs(bias) <= p.level_zero_arcmin * ARCMIN + deviations(1) * sd + LEVEL_CODE_RAD:
         return ""

@@ -147,6 +147,20 @@ def _attitude(q_rad: Floats, windows: Sequence[Window]) -> nav.Attitude:
     return nav.attitude_from_level(q_rad, gamma_rad, beta_rad, bias=True)
 
 
+def attitude_sd_rad(f: Fit) -> tuple[float, float, float]:
+    """Standard deviations of pitch, roll and gamma's constant error, rad, by the positions' geometry.
+
+    gamma = roll cos q - pitch sin q + constant, to the first order; the errors of the level sensor and of the gimbal
+    angle are new in each position.
+    """
+    q = np.array([r.q_rad for r in f.rows])
+    design = np.column_stack([np.sin(q), np.cos(q), np.ones(len(q))])
+    swing = f.attitude.pitch_rad * np.cos(q) + f.attitude.roll_rad * np.sin(q)
+    sd_rad = np.hypot(f.params.level_sd_arcmin * ARCMIN, f.noise.angle_sd_rad * swing)
+    pitch, roll, constant = np.linalg.norm(np.linalg.pinv(design) * sd_rad, axis=1)
+    return float(pitch), float(roll), float(constant)
+
+
 def alpha_turns(q_rad: Floats, windows: Sequence[Window], attitude: nav.Attitude) -> Floats:
     """Increments of alpha from the first window to each, rad: those of the gimbal, corrected for the tilt."""
     beta_rad = [w.mean_beta_rad for w in windows]

@@ -19,6 +19,7 @@ from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.gyrocompass_windows import s_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.platform_bench import Window
+from scipy import stats
 
 EARTH_DEG = 2e-5  # the fake's 15.041067 deg/h has 1e-8 less than the library's Earth; (14) leaves more
 
@@ -127,6 +128,24 @@ def test_a_torquer_s_scale_shows_in_the_drift_alone() -> None:
 
 
 # ---- with noise: intervals
+
+
+@pytest.mark.parametrize(("reading", "runs"), [("article", 200), ("improved", 60)])
+def test_intervals_of_pitch_and_roll_are_those_of_the_positions(reading: str, runs: int) -> None:
+    """Errors over their standard deviations. A fixed one, that of a single reading, was 0.82 and 1.4 or 3.5 of them."""
+    rng = seeded(f"gyrocompass attitude {reading}")
+    p = params_of(reading, {})
+    angle = {"article": "set_sd_arcmin", "improved": "read_sd_arcmin"}[reading]
+    errors: dict[str, float] = {"level_sd_arcmin": p.level_sd_arcmin, angle: p.angle_sd_arcmin}
+    z = []
+    for _ in range(runs):
+        tilt = dict(zip(("pitch_deg", "roll_deg"), rng.uniform(-5.0, 5.0, 2).tolist(), strict=True))
+        bench = FakePlatform(heading_deg=float(rng.uniform(0, 360)), rng=rng, **tilt, **errors)  # type: ignore[arg-type]
+        r = g.estimate(g.measure(bench, p, Silent()), p)
+        z.append([(r.get(name).value - true) / r.get(name).sd for name, true in tilt.items()])
+    least, most = np.sqrt(stats.chi2.ppf([1e-4, 1.0 - 1e-4], runs) / runs)  # of both rows: two in 2500
+    found = np.sqrt(np.mean(np.square(z), axis=0))
+    assert ((least < found) & (found < most)).all(), f"pitch and roll: z {found}, expected {least:.3f} to {most:.3f}"
 
 
 @pytest.mark.parametrize("reading", ["article", "improved"])
