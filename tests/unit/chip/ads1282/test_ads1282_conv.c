@@ -351,6 +351,27 @@ static void output_noise_is_the_published_one(void **state)
     }
 }
 
+/* The published SNR of every rate and gain, as the scale of the draws: what statistics see to 4 %, to the last digits. */
+static void noise_scale_is_the_published_one_exactly(void **state)
+{
+    (void)state;
+    for (unsigned dr = 0; dr < 5; dr++) {
+        for (unsigned pga = 0; pga < 7; pga++) {
+            struct rig r;
+            struct ads1282_cfg cfg = quiet;
+            cfg.noise_scale = 1.0;
+            cfg.chain = ADS1282_CHAIN_DIRECT; /* whose draws are those of the output */
+            unpowered(&r, &cfg, 1);
+            ads1282_power_up(&r.a, 0);
+            wreg(&r, 2, (uint8_t)(8 | pga));
+            wreg(&r, 1, config0_of((uint8_t)dr, 0));
+            to_fall(&r);
+            const double sigma = sqrt(0.5) * pow(10.0, -snr_db[dr][pga] / 20.0);
+            near(r.a.noise_lsb / (ldexp(sigma, ADS1282_BLOCK_LOG2) / 16.0), 1.0, 1e-9);
+        }
+    }
+}
+
 static void noise_scales_and_can_be_switched_off(void **state)
 {
     (void)state;
@@ -402,6 +423,7 @@ int main(void)
         cmocka_unit_test(a_new_gain_holds_from_the_block_after_its_write),
         cmocka_unit_test(a_step_settles_to_a_millionth_in_52_or_58_words),
         cmocka_unit_test(output_noise_is_the_published_one),
+        cmocka_unit_test(noise_scale_is_the_published_one_exactly),
         cmocka_unit_test(noise_scales_and_can_be_switched_off),
         cmocka_unit_test(same_seed_same_words_with_any_compiler),
     };
