@@ -38,7 +38,7 @@ OTHER = {  # checks of rows that hold for another variant, or want another link
     "bursts_damage_words_where_nothing_gates_them": ("psa2", "ungated"),
     "clk_is_a_division_of_the_crystal": ("psa2", "w24"),
 }
-FD = ("form_2_is", "form_3_is", "a_block_begins", "fd_frames_are")
+FD = ("form_2_is", "form_3_is", "a_block_begins", "the_stamp_of_a_block", "fd_frames_are")
 
 
 class Stage:

@@ -95,6 +95,11 @@ WRONG_CAN: Mapping[str, Sequence[Bad]] = {
         told("stamps", lambda old: [*old[:-1], Answer(old[-1].value + 100_000)]),
         gone("PSA2_BLOCK"),
     ],
+    "the_stamp_of_a_block_is_that_of_its_first_sample": [
+        told("latest", lambda found: [(Answer(a.value - 4000), came) for a, came in found]),
+        told("latest", lambda found: [(REFUSED, came) for _, came in found]),
+        signal("PSA2_BLOCK", "TSTAMP", lambda v: v + 4000),
+    ],
     "a_form_switches_its_tpdos": [told("off 2", lambda old: [Answer(a.value ^ 1 << 31) for a in old])],
     "fd_frames_are_those_of_two_forms": [each("PSA2_XY", lambda f: f._replace(fd=True))],
     "each_sync_takes_one_sample": [gone("PSA2_XY", 3), signal("PSA2_XY", "SEQ", lambda v: 1)],

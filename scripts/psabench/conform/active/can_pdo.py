@@ -203,14 +203,9 @@ def the_inhibit_time_keeps_tpdos_apart(t: Talk, row: Requirement) -> str:
     return f"{min(apart_s):.6f} s and more apart; of {most} readings {left_out} left out"
 
 
-@dialogue("PSA2-CAN-04", "PIK-CAN-03", "PSD1-CAN-03", needs=LONG, reset=True)
+@dialogue("BUS-PDO-05", needs=LONG, reset=True)
 def numbers_go_on_to_their_modulus(t: Talk) -> str:
     """Let a whole round of numbers pass, an eighth at a time; compare numbers with 2030h:1, which counts on."""
-    return follow_numbers(t)
-
-
-def follow_numbers(t: Talk) -> str:
-    """Numbers of readings of any board, through their whole modulus and a little more."""
     t.s.wait_ready()
     name, signal = number_signal(t.s.variant.family)
     modulus, can_id = 1 << message(name).get_signal_by_name(signal).length, pdos(t.s.variant.family)[name] + t.node

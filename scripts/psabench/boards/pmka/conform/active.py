@@ -7,13 +7,11 @@ from itertools import pairwise
 from psabench.boards.objects import PmkaObjects
 from psabench.boards.pmka import estimate as est
 from psabench.boards.pmka.conform.stimulus import START_S, ts_s
-from psabench.conform.active.can_pdo import LONG, follow_numbers
 from psabench.conform.bus_host import burst, line, line_refused
 from psabench.conform.capture.log import CanLog
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
-from psabench.conform.raw_can import Talk, dialogue
 from psabench.conform.registers import names_and_rights, one_value
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.stimulus.streamed import while_streaming
@@ -286,9 +284,3 @@ def the_board_says_what_it_is(s: Dut) -> str:
 def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "pmka")
-
-
-@dialogue("PMKA-CAN-02", needs=LONG, reset=True)
-def seq_goes_on_to_its_modulus(t: Talk) -> str:
-    """Let a whole round of SEQ pass, an eighth at a time; compare SEQ with 2030h:1, which counts on."""
-    return follow_numbers(t)

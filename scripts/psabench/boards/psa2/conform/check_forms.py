@@ -127,8 +127,8 @@ def the_stamp_of_a_block_is_that_of_its_first_sample(e: Capture, row: Requiremen
     found = []
     for answer, came in fact(e, "latest", "no stamp was read after a block"):
         with damaged_data_are(Failed, "messages of their length", frames=e.can.frames[came - 1 : came]):
-            block = CanLog(frames=e.can.frames[came - 1 : came]).raw("PSA2_BLOCK")
-        found.append((number(answer) - int(block["TSTAMP"][0])) % (1 << 32))
+            stamps = CanLog(frames=e.can.frames[came - 1 : came]).raw("PSA2_BLOCK")["TSTAMP"]
+        found += [(number(answer) - int(stamp)) % (1 << 32) for stamp in stamps]
     conclusive(found, "no block came")
     due = f"{apart_us:.0f} us or more: the first of its samples"
     expect(least_us <= min(found) <= max(found) < 1 << 31, f"TSTAMP {min(found)} us before the latest sample", due)
