@@ -189,6 +189,9 @@ static void a_mode_that_cannot_be_is_refused_with_the_reason(void **state)
     assert_non_null(strstr(mode(GYRO_COMPASS), "127"));
     r.b.set.repeat = 3;
     assert_null(mode(GYRO_COMPASS));
+    r.b.set.count = 1;
+    r.b.set.repeat = GYRO_RUN_MAX;
+    assert_null(mode(GYRO_COMPASS)); /* as many as there may be */
     r.mute = true;
     rig_run(&r, 0.2);
     assert_non_null(strstr(mode(GYRO_LEVEL), "silent"));
@@ -200,6 +203,21 @@ static void a_mode_that_cannot_be_is_refused_with_the_reason(void **state)
     gyro_reset(&r.b, r.s.now_ns);
     assert_non_null(strstr(mode(GYRO_OFF), "runs up"));
     assert_int_equal(r.b.counters.refused, 4);
+}
+
+/* A hold keeps the gimbal where it is; every other servoed mode goes on from the reference of the one before it. */
+static void a_mode_takes_over_the_reference_of_the_servo(void **state)
+{
+    (void)state;
+    assert_null(mode(GYRO_LEVEL)); /* no servo */
+    r.b.run.q_ref_rad = 1.0;
+    assert_null(mode(GYRO_CALIBRATE));
+    assert_true(r.b.run.q_ref_rad == r.b.servo_rad);
+    r.b.run.q_ref_rad = r.b.servo_rad + 0.25;
+    assert_null(mode(GYRO_CALIBRATE));
+    assert_true(r.b.run.q_ref_rad == r.b.servo_rad + 0.25);
+    assert_null(mode(GYRO_HOLD));
+    assert_true(r.b.run.q_ref_rad == r.b.servo_rad);
 }
 
 /* ---- what goes wrong */
@@ -338,6 +356,7 @@ int main(void)
         cmocka_unit_test_setup(navigation_keeps_the_azimuth_in_flight_as_well, up),
         cmocka_unit_test_setup(a_wrong_drift_turns_the_azimuth_away_by_as_much, up),
         cmocka_unit_test_setup(a_mode_that_cannot_be_is_refused_with_the_reason, up),
+        cmocka_unit_test_setup(a_mode_takes_over_the_reference_of_the_servo, up),
         cmocka_unit_test_setup(a_lost_frame_is_told_with_the_step_that_lacks_it, up),
         cmocka_unit_test_setup(without_the_level_unit_the_levelling_rate_stays, up),
         cmocka_unit_test_setup(a_stuck_angle_sensor_ends_the_run_in_its_first_turn, up),
