@@ -3,7 +3,7 @@
     from psabench import Bench
 
     with Bench.start("quiet") as bench:
-        bench.unit.register("x", 1)           # CONFIG0 of the converter of channel X
+        bench.unit.register("x", "CONFIG0")   # of the converter of channel X
         bench.unit.stream(100).axis("x")      # volts at the load, shape (100,)
 
 Conventions, everywhere: SI inside, the unit at the end of a name (u_v, t_s, angle_deg); voltages are at the board's

@@ -63,18 +63,32 @@ class Unit:
         """Addresses and names of the registers of a bank, from the EDS. Raises ValueError for a bank it has not."""
         return {sub - 1: name for sub, name in self.node.names(self._bank(bank)).items()}
 
-    def register(self, bank: str, address: int) -> int:
-        """A register: of converter "x", "y", "z" or "t", or by a read cycle on the board's "bus"."""
+    def register(self, bank: str, register: int | str) -> int:
+        """A register, by address or name: of converter "x", "y", "z" or "t", or by a read cycle on the board's "bus".
+
+        Raises ValueError for a bank or a name it has not.
+        """
+        address = self._address(bank, register)
         if bank == "bus":
             return self.bus_read(address)
         return int(self.node.read(self._bank(bank), address + 1))
 
-    def write_register(self, bank: str, address: int, value: int) -> None:
-        """Write one register."""
+    def write_register(self, bank: str, register: int | str, value: int) -> None:
+        """Write one register, by address or name. Raises ValueError as `register`."""
+        address = self._address(bank, register)
         if bank == "bus":
             self.bus_write(address, value)
             return
         self.node.write(self._bank(bank), address + 1, value)
+
+    def _address(self, bank: str, register: int | str) -> int:
+        if isinstance(register, int):
+            return register
+        names = self.registers(bank)
+        for address, name in names.items():
+            if register.upper() == name.upper():
+                return address
+        raise ValueError(expected(", ".join(names.values()), repr(register), f"register of {bank}"))
 
     def _bank(self, bank: str) -> int:
         if bank not in self.banks:

@@ -134,7 +134,12 @@ def test_registers_by_the_names_of_the_eds() -> None:
     assert psa2.registers("x")[1] == "CONFIG0"
     with pytest.raises(ValueError, match="bank of a PSA-2: expected x, y, z, t"):
         psa2.register("bus", 0)
-    assert node.sent == []
+    assert psa2.register("x", "config0") == psa2.register("x", "CONFIG0") == psa2.register("x", 1) == 0x56
+    with pytest.raises(ValueError, match=r"register of x: expected ID, CONFIG0.*, got 'CONFIG9'"):
+        psa2.write_register("x", "CONFIG9", 0)
+    assert node.wrote == []
+    psa2.write_register("x", "CONFIG0", 0x52)
+    assert node.wrote == [(0x2000, 2, b"\x52")]
 
 
 def test_words_of_a_psd1_as_volts() -> None:

@@ -2,7 +2,7 @@
 
 with CanHost(open_bus("socketcand:127.0.0.1:29536"), WallClock()) as host:
     unit = Psa2(host, node_id=5)
-    unit.register("x", 1)          # CONFIG0 of converter X: 0x56
+    unit.register("x", "CONFIG0")  # of converter X: 0x56
     frames = unit.stream(100)      # 100 samples, volts at the loads
 """
 
