@@ -68,20 +68,20 @@ class Unit:
 
         Raises ValueError for a bank or a name it has not.
         """
-        address = self._address(bank, register)
+        address = self._register_address(bank, register)
         if bank == "bus":
             return self.bus_read(address)
         return int(self.node.read(self._bank(bank), address + 1))
 
     def write_register(self, bank: str, register: int | str, value: int) -> None:
         """Write one register, by address or name. Raises ValueError as `register`."""
-        address = self._address(bank, register)
+        address = self._register_address(bank, register)
         if bank == "bus":
             self.bus_write(address, value)
             return
         self.node.write(self._bank(bank), address + 1, value)
 
-    def _address(self, bank: str, register: int | str) -> int:
+    def _register_address(self, bank: str, register: int | str) -> int:
         if isinstance(register, int):
             return register
         names = self.registers(bank)

@@ -160,6 +160,7 @@ def test_cycles_with_and_without_a_strobe() -> None:
     psd1.bus_write(15, 0x1234, strobe_ns=1600)
     assert node.wrote == [(0x2051, 0, (1600).to_bytes(4, "little")), (0x2002, 16, b"\x34\x12")]
     psd1.write_register("bus", 15, 3)
+    assert psd1.register("bus", psd1.registers("bus")[3]) == 0xBEEF
     assert node.wrote[-1] == (0x2002, 16, b"\x03\x00")
     with pytest.raises(ValueError, match="expected a 16-bit word"):
         psd1.bus_write(0, -1)
@@ -196,3 +197,13 @@ def test_counters_and_serial() -> None:
 )  # fmt: skip
 def test_names_of_frames_follow_the_boards_on_the_bus(can_id: int, name: str) -> None:
     assert message_name(can_id, {5: "psa2", 3: "psd1"}) == name
+
+
+@pytest.mark.parametrize(("kind", "node"), [(Psd1, 6), (Pmka, 7)])
+def test_registers_of_a_bus_by_name(kind: type[Unit], node: int) -> None:
+    """No board's own look-up of names is in the way."""
+    unit, _ = at_node(kind, node, {(0x2002, a + 1): 100 + a for a in range(8)})
+    names = unit.registers("bus")
+    assert {name: unit.register("bus", name) for a, name in names.items() if a < 8} == {
+        name: 100 + a for a, name in names.items() if a < 8
+    }
