@@ -58,7 +58,7 @@ struct psabench_part {
     char name[API_NAME];
     uint32_t level;             /* as reported last, outputs; as set last, inputs */
     uint32_t watched, recorded; /* pins */
-    uint32_t counted;           /* pins whose edges are counted, because somebody has waited for one */
+    uint32_t counted;           /* pins whose edges are counted for psabench_run_until_edge() */
     uint32_t armed, pending;    /* pins with an interrupt; those whose interrupt waits to be served */
     struct api_watch watch[API_PINS_MAX];
     struct api_interrupt interrupt[API_PINS_MAX];

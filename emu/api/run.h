@@ -1,4 +1,4 @@
-/* What moves the time of a bench, and who is to hear of its pins. Included by api/internal.h, whose structs it takes. */
+/* What moves the time of a bench, and which pins it reports. Included by api/internal.h, whose structs it takes. */
 #ifndef PSABENCH_API_RUN_H
 #define PSABENCH_API_RUN_H
 
@@ -27,7 +27,7 @@ bool api_pending(const psabench *b);
 /* Reports what has changed since the last report. */
 void api_notify(psabench *b);
 
-/* Pins whose changes somebody wants to hear of. */
+/* Pins whose changes are reported: watched, recorded, counted or armed. */
 static inline uint32_t api_observed(const struct psabench_part *p)
 {
     return p->watched | p->recorded | p->counted | p->armed;

@@ -67,11 +67,6 @@ static int64_t next_notify_ns(const psabench *b)
 
 /* ---- moving ---- */
 
-static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
-{
-    return a_ns < b_ns ? a_ns : b_ns;
-}
-
 static bool has_time(const psabench *b, int64_t t_ns)
 {
     return b->sched.now_ns < t_ns || sched_next_ns(&b->sched) <= t_ns;
@@ -80,8 +75,8 @@ static bool has_time(const psabench *b, int64_t t_ns)
 /* To the next instant at which something happens, at most to t_ns: so a change is reported when it happens. */
 static void step_time(psabench *b, int64_t t_ns)
 {
-    const int64_t next_ns = earlier_ns(sched_next_ns(&b->sched), next_notify_ns(b));
-    sched_run_until(&b->sched, earlier_ns(next_ns, t_ns));
+    const int64_t next_ns = ns_earlier(sched_next_ns(&b->sched), next_notify_ns(b));
+    sched_run_until(&b->sched, ns_earlier(next_ns, t_ns));
     api_notify(b);
 }
 
@@ -108,7 +103,7 @@ static bool is_met(const struct wait *w)
 static int64_t look_ns(const struct wait *w, int64_t end_ns)
 {
     const int64_t own_ns = w->p && w->p->kind->next_ns ? w->p->kind->next_ns(w->p) : INT64_MAX;
-    return earlier_ns(own_ns, end_ns);
+    return ns_earlier(own_ns, end_ns);
 }
 
 /* Lets time pass until what w waits for, at most to end_ns; interrupts are served between two instants and may take time
@@ -121,7 +116,7 @@ static int wait_until(psabench *b, const struct wait *w, int64_t end_ns)
         const int late = api_late(b);
         if (late) return late;
         b->inside++;
-        step_time(b, earlier_ns(look_ns(w, end_ns), b->deadline.t_ns));
+        step_time(b, ns_earlier(look_ns(w, end_ns), b->deadline.t_ns));
         b->inside--;
         const bool met = is_met(w); /* before a handler changes it */
         api_serve(b);

@@ -25,6 +25,9 @@ class Result(Enum):
     INTERRUPTED = "interrupted"
 
 
+STATUS = {Result.CONFORMS: 0, Result.VIOLATED: 1, Result.NO_VIOLATION: 4, Result.INTERRUPTED: 130}
+
+
 @dataclass(frozen=True, slots=True)
 class Least:
     """How many requirements a run must judge: a number of them, or a percentage of those that can be judged."""
@@ -120,8 +123,5 @@ class Coverage:
     @property
     def status(self) -> int:
         """Exit status of the command."""
-        if self.interrupted:
-            return 130
-        if self.count_of(Verdict.FAILED):
-            return 1
-        return 0 if self.sufficient else 4
+        found = self.result
+        return 0 if found is Result.NO_VIOLATION and self.sufficient else STATUS[found]

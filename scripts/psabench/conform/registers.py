@@ -85,9 +85,8 @@ def one_value(s: Dut, board: str, next_reading: Callable[[Dut], None], number: i
             seen.setdefault(door.name, []).append(_both(s, door, number))
     alike = [f"{a} and {b}" for a, b in itertools.combinations(seen, 2) if seen[a] == seen[b]]
     conclusive(not (told_apart and alike), f"{', '.join(alike)} showed the same in {LOOKS} readings")
-    return f"{len(seen)} registers as their objects in {LOOKS} readings" + (
-        f"; alike: {', '.join(alike)}" * bool(alike)
-    )
+    told = f"; alike: {', '.join(alike)}" if alike else ""
+    return f"{len(seen)} registers as their objects in {LOOKS} readings{told}"
 
 
 def _both(s: Dut, door: Door, number: int) -> int:

@@ -84,8 +84,7 @@ static void a_handler_exchanges_bytes_while_the_program_waits(void **state)
     psabench_free(b);
 }
 
-/* The call that is interrupted ends when the handler has, even if its time was over before; a level that the handler took
- * away has been there. */
+/* The call that is interrupted ends when the handler has, even if its time was over before. */
 static void what_is_interrupted_ends_after_the_handler(void **state)
 {
     (void)state;
@@ -102,6 +101,22 @@ static void what_is_interrupted_ends_after_the_handler(void **state)
     assert_int_equal(d.words, 2);
     good(b, psabench_run_until_interrupt(b, MS));
     assert_int_equal(d.words, 3);
+    psabench_free(b);
+}
+
+static void a_level_that_the_handler_took_away_has_been_there(void **state)
+{
+    (void)state;
+    psabench *b = psabench_new(1);
+    psabench_part *p = converting(b, "u");
+    struct driver d = {.wrong = 0};
+    psabench_spi_clock(p, 1900000, 0); /* a handler takes 24 us of a period of 33 us */
+    good(b, psabench_on_interrupt(p, pin(p, "DRDY"), PSABENCH_FALLING, read_word, &d));
+    good(b, psabench_run_until_interrupt(b, MS));
+    assert_int_equal(get(p, "DRDY"), 1);
+    good(b, psabench_run_until_level(p, pin(p, "DRDY"), 0, 10000)); /* over when the handler ends */
+    assert_int_equal(get(p, "DRDY"), 1);
+    assert_int_equal(d.words, 2);
     psabench_free(b);
 }
 
@@ -304,6 +319,7 @@ int main(void)
         cmocka_unit_test(the_next_edge_is_never_the_level_that_is_there),
         cmocka_unit_test(a_handler_exchanges_bytes_while_the_program_waits),
         cmocka_unit_test(what_is_interrupted_ends_after_the_handler),
+        cmocka_unit_test(a_level_that_the_handler_took_away_has_been_there),
         cmocka_unit_test(interrupts_wait_while_they_are_masked_once_a_pin),
         cmocka_unit_test(one_handler_runs_at_a_time),
         cmocka_unit_test(an_exchange_is_not_interrupted),

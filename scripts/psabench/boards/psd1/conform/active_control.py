@@ -1,4 +1,4 @@
-"""PSD-1's control words, kept_coefficients, late hosts and identity, over CAN."""
+"""PSD-1's control words, coefficients, late hosts and identity, over CAN."""
 
 from __future__ import annotations
 
