@@ -61,6 +61,13 @@ const char *psabench_error_text(const psabench *b)
     return b ? b->error : "no bench: the pointer is NULL";
 }
 
+int api_may_move(psabench *b, const char *function)
+{
+    if (!b->inside) return PSABENCH_OK;
+    return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: expected a call outside callbacks, where time may advance",
+                    function);
+}
+
 /* ---- recording ---- */
 
 int psabench_vcd_close(psabench *b)

@@ -85,12 +85,6 @@ int psabench_pin_is_input(const psabench_part *p, int pin)
     return row ? row->dir != API_OUT : api_no_pin(p, pin);
 }
 
-bool api_level(const psabench_part *p, unsigned pin)
-{
-    const struct api_pin *row = &p->kind->pins[pin];
-    return row->get ? row->get(p, row->arg) : p->level >> pin & 1;
-}
-
 /* Only known when the burst that it belongs to is over. */
 int api_not_late(const psabench_part *p, const struct api_pin *row)
 {
