@@ -15,6 +15,15 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Component:
+    """One line of an uncertainty budget."""
+
+    name: str
+    u: float  # standard uncertainty that it gives the estimate, in the estimate's unit
+    dof: float = math.inf  # degrees of freedom; inf: type B, known without readings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
     """One number of a report. `name` carries the unit; value, sd and CI are in `unit`."""
 
@@ -22,10 +31,12 @@ class Estimate:
     symbol: str  # as in the article
     unit: str
     value: float
-    sd: float
+    sd: float  # standard uncertainty: of the scatter, or of all components of `budget`
     ci_half: float  # 95 % confidence interval is value +- ci_half
     identifiable: bool = True
     reason: str = ""  # why not identifiable, for people
+    dof: float = math.inf
+    budget: tuple[Component, ...] = ()  # of psabench.estimate.budget; (): the scatter alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,11 +51,12 @@ class Correlation:
         return float(self.matrix[self.names.index(a), self.names.index(b)])
 
 
-def t_quantile(dof: int, confidence: float = CONFIDENCE) -> float:
+def t_quantile(dof: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided Student quantile: the half width of the interval in standard deviations."""
-    from scipy.special import stdtrit  # slow to import: the shell and --help do without
+    from scipy.special import ndtri, stdtrit  # slow to import: the shell and --help do without
 
-    return float(stdtrit(dof, 0.5 + confidence / 2))
+    p = 0.5 + confidence / 2
+    return float(stdtrit(dof, p) if math.isfinite(dof) else ndtri(p))
 
 
 def propagate(jacobian: Array, cov: Array) -> Array:
@@ -72,6 +84,7 @@ def estimate(name: str, symbol: str, unit: str, value: float, sd: float, dof: in
         value=float(value) * scale,
         sd=sd_scaled,
         ci_half=t_quantile(dof) * sd_scaled,
+        dof=dof,
     )
 
 

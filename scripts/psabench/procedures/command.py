@@ -375,16 +375,21 @@ _EXAMPLES: Mapping[str, str] = {
 
 
 def _of_the_head(name: str) -> Parameters:
+    from psabench.procedures.accuracy import EXACT, BenchAccuracy
     from psabench.procedures.registry import PROCEDURES
 
-    return Parameters(fields=PROCEDURES[name].params.__dataclass_fields__)
+    fields = {**PROCEDURES[name].params.__dataclass_fields__, **BenchAccuracy.__dataclass_fields__}
+    return Parameters(fields=fields, defaults={c.label: EXACT for c in CONDITIONS.values() if c.exact})
 
 
 def _of_all() -> Parameters:
+    from psabench.procedures.accuracy import EXACT
+
     each = {name: _of_the_head(name).fields for name in ON_THE_HEAD}
     return Parameters(
         fields={name: f for fields in each.values() for name, f in fields.items()},
-        defaults={label: {name: f.default for name, f in fields.items()} for label, fields in each.items()},
+        defaults={label: {name: f.default for name, f in fields.items()} for label, fields in each.items()}
+        | {c.label: EXACT for c in CONDITIONS.values() if c.exact},
     )
 
 

@@ -68,7 +68,7 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
     jacobian = np.concatenate([model.one_face_jacobian(c), model.measured_jacobian(c)[:4], np.eye(5)])
     cov = propagate(jacobian, face.fit.unit_cov * float(face.fit.sigma_v) ** 2)
     table = (*ONE_FACE, *_MEASURED, *_COEFFICIENTS)
-    flagged = _flag(estimates_of(table, values, cov, face.fit.dof), p.quadratic_bound_v_per_g2)
+    flagged = flag_fourier(estimates_of(table, values, cov, face.fit.dof), p)
     shown = len(ONE_FACE)
     return ProcedureResult(
         procedure="fourier",
@@ -84,9 +84,10 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
     )
 
 
-def _flag(estimates: Sequence[Estimate], bound_v_per_g2: float | None) -> list[Estimate]:
+def flag_fourier(estimates: Sequence[Estimate], p: FourierParams) -> list[Estimate]:
+    """What one face does not determine, by the interval of alpha0 and the known bound on k_xx - k_yy."""
     by_name = {e.name: e for e in estimates}
-    doubt = alpha0_doubt(by_name["alpha0_deg"], by_name["kxy_v_per_g2"].value, bound_v_per_g2)
+    doubt = alpha0_doubt(by_name["alpha0_deg"], by_name["kxy_v_per_g2"].value, p.quadratic_bound_v_per_g2)
     if not doubt:
         return list(estimates)
     reasons = {
@@ -107,7 +108,7 @@ def _notes(face: FaceFit) -> list[str]:
     ]
 
 
-def expected_fourier(truth: model.Sensor) -> Mapping[str, float]:
+def expected_fourier(truth: model.Sensor, _: model.Sensor) -> Mapping[str, float]:
     """What each estimate should have been: hidden parameters, and the combinations one face measures."""
     c = model.harmonics_of(truth)
     kx_eff, angle, ky_sum, second, _ = model.measured(c)

@@ -86,6 +86,7 @@ class RecordedHead:
         self.setup = self._read_setup()
         self.g_mps2 = float(self.setup["g_mps2"])
         self._node, self._average = int(self.setup["node"]), int(self.setup["average"])
+        self._filter_gain = float(self.setup.get("filter_gain", 1.0))  # recordings of earlier versions: not taken out
         self._frames = _read_frames(path)
         self._calls.check_frames(len(self._frames))
 
@@ -115,8 +116,8 @@ class RecordedHead:
         self._calls.next_call("read", f"{axis} {readings}")
         frames = self._frames[begin : self._calls.frames]
         if self._average:
-            return self._streamed(frames, axis, readings)
-        return self._words(frames, axis, readings)
+            return self._streamed(frames, axis, readings) / self._filter_gain
+        return self._words(frames, axis, readings) / self._filter_gain
 
     def _streamed(self, frames: Sequence[CanFrame], axis: str, readings: int) -> npt.NDArray[np.float64]:
         reader = FrameReader(self._node)

@@ -7,12 +7,13 @@ params)`, which is pure: an interrupted run is estimated from the readings that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from psabench.estimate.model import Sensor
-from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, fourier
+from psabench.estimate.uncertainty import Estimate
+from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, flag_fourier, fourier
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
 from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
@@ -26,14 +27,20 @@ class Procedure:
     params: type[Any]
     run: Callable[..., ProcedureResult]  # (bench, params, watch) -> result
     estimate: Callable[..., ProcedureResult]  # (readings, params, g_mps2) -> result
-    expected: Callable[[Sensor], Mapping[str, float]]  # truth -> what each estimate should have been
+    expected: Callable[[Sensor, Sensor], Mapping[str, float]]  # truth, and at the side faces -> what each should have been
+    flag: Callable[[Sequence[Estimate], Any], list[Estimate]]  # which estimates the data do not determine
+
+
+def _keep_flags(estimates: Sequence[Estimate], _: Any) -> list[Estimate]:
+    """Its flags do not hang on the intervals."""
+    return list(estimates)
 
 
 PROCEDURES: Mapping[str, Procedure] = {
     p.name: p
     for p in (
-        Procedure("turns", TurnsParams, turns, estimate_turns, expected_turns),
-        Procedure("fourier", FourierParams, fourier, estimate_fourier, expected_fourier),
-        Procedure("reversal", ReversalParams, reversal, estimate_reversal, expected_reversal),
+        Procedure("turns", TurnsParams, turns, estimate_turns, expected_turns, _keep_flags),
+        Procedure("fourier", FourierParams, fourier, estimate_fourier, expected_fourier, flag_fourier),
+        Procedure("reversal", ReversalParams, reversal, estimate_reversal, expected_reversal, _keep_flags),
     )
 }

@@ -130,7 +130,7 @@ def _remount_notes(estimates: Sequence[Estimate]) -> list[str]:
     ]
 
 
-def expected_reversal(truth: model.Sensor) -> Mapping[str, float]:
+def expected_reversal(truth: model.Sensor, at_side: model.Sensor) -> Mapping[str, float]:
     """What each estimate should have been; u0 with the quadratic terms that no turn in 1 g removes."""
     alpha0_deg = truth.alpha0_rad * DEG
     return {
@@ -140,7 +140,7 @@ def expected_reversal(truth: model.Sensor) -> Mapping[str, float]:
         "ky_v_per_g": truth.ky_v_per_g,
         "kxy_v_per_g2": truth.kxy_v_per_g2,
         "kxx_minus_kyy_v_per_g2": truth.kxx_v_per_g2 - truth.kyy_v_per_g2,
-        "u0_side_v": truth.u0_v + (truth.kxx_v_per_g2 + truth.kzz_v_per_g2) / 2,
+        "u0_side_v": at_side.u0_v + (truth.kxx_v_per_g2 + truth.kzz_v_per_g2) / 2,
         "alpha0_side_deg": alpha0_deg,
         "kx_side_v_per_g": truth.kx_v_per_g,
         "kz_v_per_g": truth.kz_v_per_g,

@@ -18,28 +18,19 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
+from psabench.procedures.accuracy import EXACT, BenchAccuracy
+from psabench.procedures.budget import expand_result
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder
 from psabench.procedures.registry import PROCEDURES, Procedure
-from psabench.procedures.result import ProcedureResult, made_params
+from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration as report
 from psabench.report.grading import Section
 
-# Error of the measuring chain that no interval contains: load, divider, reference and the DC gain of the converter's
-# integer filter taps (1.000169) within 0.05 %; 1 mV of offset at the load; a step of the code or word.
-ZERO_SIGNALS = ("u0_v", "u0_side_v", "c0_v")
-CHAIN_GAIN, CHAIN_ZERO_V, CODE_V, WORD_V = 5e-4, 1e-3, 1.2e-6, 1e-8
-
-
-def allowance(result: ProcedureResult, average: int) -> dict[str, float]:
-    """What the chain may add to each estimate, in the estimate's own unit."""
-    step_v = CODE_V if average else WORD_V
-    added = {"V": step_v, "V/g": step_v, "V/g²": step_v, "deg": 0.0}
-    of = {e.name: CHAIN_GAIN * abs(e.value) + added.get(e.unit, 0.0) for e in result.estimates if e.unit in added}
-    return of | {name: of[name] + CHAIN_ZERO_V for name in ZERO_SIGNALS if name in of}
+CODE_V, WORD_V = 10.0 / 2**23, 10.0 / 2**30  # resolution at the load: of a code of the stream, of a whole word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +79,7 @@ def _conditions(options: RunOptions) -> list[Condition]:
 
 def _one(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
     params = made_params(procedure.params, procedure.name, options.params or {})
+    accuracy = _accuracy(condition.exact, options)
     average = condition.average if options.average is None else options.average
     g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
@@ -97,12 +89,25 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
         on_head: HeadBench = wired
         if options.record:
             setup = {"procedure": procedure.name, "condition": condition.label, "average": average, "g_mps2": g_mps2}
-            setup |= {"node": bench.unit.node.node_id, "facts": _facts(options)}
+            setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "exact": condition.exact}
+            setup |= {"facts": _facts(options)}
             on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
         result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
         truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
-    return Section(label=condition.label, result=result, truth=truth, allowance=allowance(result, average))
+    result = expand_result(result, procedure, params, accuracy, _step_v(average))
+    return Section(label=condition.label, result=result, truth=truth)
+
+
+def _accuracy(exact: bool, options: RunOptions) -> BenchAccuracy:
+    """Of the bench: what the user gave, else that of our chain and head, or none where the bench is exact."""
+    given = fields_of(BenchAccuracy, options.params or {})
+    return made_params(BenchAccuracy, "accuracy of the bench", (EXACT if exact else {}) | given)
+
+
+def _step_v(average: int) -> float:
+    """Resolution of one reading: the mean of `average` codes, or a whole word."""
+    return CODE_V if average else WORD_V
 
 
 def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
@@ -119,7 +124,9 @@ def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Sec
     params = made_params(procedure.params, name, options.params or {})
     with CsvRecorder(options.out / f"{'-'.join(x for x in (name, label) if x)}.csv") as recorder:
         result = procedure.run(head, params, Watch(progress=progress, record=recorder))
-    section = Section(label=label, result=result, truth=None, allowance=allowance(result, int(head.setup["average"])))
+    accuracy = _accuracy(bool(head.setup.get("exact", False)), options)
+    result = expand_result(result, procedure, params, accuracy, _step_v(int(head.setup["average"])))
+    section = Section(label=label, result=result, truth=None)
     facts = {str(k): str(v) for k, v in head.setup["facts"].items()}
     return report.write(options.out, [section], facts=facts), [section]
 

@@ -226,9 +226,9 @@ def _series(readings: Sequence[Reading], face: Face) -> FaceSeries:
     )
 
 
-def expected_turns(truth: model.Sensor) -> Mapping[str, float]:
+def expected_turns(truth: model.Sensor, at_side: model.Sensor) -> Mapping[str, float]:
     """What each estimate should have been: the harmonics at 0, 90, 180, 270 deg of the head (no search)."""
-    c, side = model.harmonics_of(truth), model.harmonics_of(truth, Face.SIDE)
+    c, side = model.harmonics_of(truth), model.harmonics_of(at_side, Face.SIDE)
     return {
         "u0_v": c[0] - c[4],  # holds kxx, as every turn in 1 g does
         "kx_v_per_g": truth.kx_v_per_g,

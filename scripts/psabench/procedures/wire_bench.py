@@ -15,7 +15,7 @@ class WireBench:
     """A `procedures.head_bench.HeadBench` of a unit and the head that it is mounted on.
 
     average: settled samples in one reading, from the stream of 24-bit codes; 0: one whole 32-bit conversion word by
-    SDO, for boards whose profile reads 32 bits.
+    SDO, for boards whose profile reads 32 bits. The known gain of the converters' filter is taken out of the readings.
     """
 
     def __init__(self, unit: Psa2, head: Head, *, average: int = 1, g_mps2: float = G_MPS2) -> None:
@@ -25,6 +25,7 @@ class WireBench:
         self._average = average
         unit.wait_ready()
         self._period_s = 1.0 / unit.data_hz
+        self.filter_gain = unit.filter_gain
         self._settle_s = SETTLE_PERIODS * self._period_s
         self._settled_at_s = self.t_s
 
@@ -50,8 +51,11 @@ class WireBench:
             self._unit.host.advance(dwell_s)
 
     def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
-        """Settled readings, each the mean of `average` samples (or one whole word)."""
+        """Settled readings, each the mean of `average` samples (or one whole word), volts at the load."""
         self.wait(self._settled_at_s - self.t_s)
+        return self._read_v(axis, readings) / self.filter_gain
+
+    def _read_v(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
         if self._average:
             u_v = self._unit.stream(readings * self._average).axis(axis)
             return np.asarray(u_v.reshape(readings, self._average).mean(axis=1), dtype=np.float64)

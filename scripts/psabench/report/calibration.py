@@ -12,6 +12,7 @@ from html import escape
 from pathlib import Path
 
 from psabench.errors import expected
+from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.result import LIMIT_CI
 from psabench.procedures.run_table import ON_THE_HEAD
 from psabench.report.grading import (
@@ -19,6 +20,7 @@ from psabench.report.grading import (
     Graded,
     Section,
     as_printed,
+    as_ratio,
     console_table,
     grade,
     result_dict,
@@ -130,6 +132,7 @@ def _section(s: Section, ident: str) -> str:
         s.title,
         f"<p class=facts>{escape(ON_THE_HEAD[r.procedure])}<br>{' · '.join(facts)}</p>",
         _estimates(s),
+        _budget(s),
         bullets([_symbol(escape(n)) for n in r.notes]),
         *pictures,
         _correlation(s),
@@ -137,8 +140,8 @@ def _section(s: Section, ident: str) -> str:
 
 
 def _estimates(s: Section) -> str:
-    truth_head = "<th>truth</th><th>error</th><th>z</th>" if s.truth is not None else ""
-    head = f"<tr><th></th><th>estimate</th><th>± 95 %</th><th>unit</th><th>in SI</th>{truth_head}<th></th></tr>"
+    truth_head = "<th>truth</th><th>error</th><th>z</th><th>E<sub>n</sub></th>" if s.truth is not None else ""
+    head = f"<tr><th></th><th>estimate</th><th>U</th><th>unit</th><th>in SI</th>{truth_head}<th></th></tr>"
     rows = "".join(_estimate_row(g, s.truth is not None, s.result.g_mps2) for g in grade(s))
     why = [
         f"{_DAGGER} {_symbol(e.symbol)} not identifiable: {_symbol(escape(e.reason))}"
@@ -156,7 +159,8 @@ def _estimate_row(g: Graded, with_truth: bool, g_mps2: float) -> str:
         cells = (
             "" if g.truth is None else f"{g.truth:.7g}",
             "" if g.error is None else f"{g.error:+.2g}",
-            "" if g.z is None else f"{g.z:+.1f}",
+            as_ratio(g.z, 1),
+            as_ratio(g.en, 2),
         )
         truth = "".join(f"<td class=num>{c}</td>" for c in cells)
     mark = "<span class=bad>out of limits</span>" if g.within is False else ""
@@ -166,6 +170,25 @@ def _estimate_row(g: Graded, with_truth: bool, g_mps2: float) -> str:
         f"<td class=num>{ci}</td><td class=unit>{e.unit}</td><td class='num si'>{_si(e.value, e.unit, g_mps2)}</td>"
         f"{truth}<td class=mark>{mark}</td></tr>"
     )
+
+
+def _budget(s: Section) -> str:
+    """Components of each estimate's uncertainty; "" where no budget was made."""
+    rows = [e for e in s.result.estimates if e.budget]
+    names = list(dict.fromkeys(c.name for e in rows for c in e.budget))
+    head = "".join(f"<th>{escape(n)}</th>" for n in (*names, "u", "degrees of freedom", "k", "U", "unit"))
+    body = "".join(f"<tr><th>{_symbol(e.symbol)}</th>{_budget_cells(e, names)}</tr>" for e in rows)
+    text = "Uncertainty budget: standard uncertainties by cause, combined u, expanded U = k u"
+    return folded(text, html_table(f"<tr><th></th>{head}</tr>", body)) if rows else ""
+
+
+def _budget_cells(e: Estimate, names: Sequence[str]) -> str:
+    of = {c.name: c.u for c in e.budget}
+    dof = f"{e.dof:.0f}" if e.dof < 1e4 else "∞"
+    cells = (*(f"{of.get(n, 0.0):.2g}" for n in names), f"{e.sd:.2g}", dof)
+    k = e.ci_half / e.sd if e.sd > 0.0 else 0.0
+    numbers = "".join(f"<td class=num>{c}</td>" for c in (*cells, f"{k:.2f}", f"{e.ci_half:.2g}"))
+    return f"{numbers}<td class=unit>{e.unit}</td>"
 
 
 def _si(value: float, unit: str, g_mps2: float) -> str:
@@ -203,9 +226,11 @@ def _symbol(text: str) -> str:
 def _method() -> str:
     return section(
         "How to read this",
-        "<p>Voltages are at the load resistor; coefficients are per local g. Intervals are 95 %, by the delta method "
-        "from the residual. A measured number is out of limits when it misses the truth by more than "
-        f"{LIMIT_CI:g} half widths of its interval and what the chain is allowed. "
+        "<p>Voltages are at the load resistor, less the known gain of the converter's filter; coefficients are per local g. "
+        "U is the expanded uncertainty (GUM, 95.45 %, k = 2 for many degrees of freedom): the scatter of the readings by "
+        "the delta method, and what no reading shows (chain, temperature, head, resolution) by the estimator's own "
+        "sensitivities. The truth is exact: z = error/u, E<sub>n</sub> = error/U. "
+        f"A number is out of limits beyond {LIMIT_CI:g} U. "
         "u<sub>0</sub> contains the quadratic terms that no turn in 1 g can take out of it.</p>"
         "<p>Repairs to the article: position 1 of its fig. 2 has a<sub>x</sub> = +g; "
         "(17) needs least squares (80 × 5); "

@@ -1,16 +1,18 @@
 """Estimates beside the truth and beside the article: tables as data, for the console, the report and result.json.
 
 Truth comes from the truth port after the run, as a mapping with the names of the emulator's scenario (u0_v, alpha0_deg,
-kx_v_per_g, ... kyy_v_per_g2); no procedure ever sees it.
+kx_v_per_g, ... kyy_v_per_g2, drift_v_per_s); no procedure ever sees it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 from psabench.errors import expected
+from psabench.estimate.budget import COVERAGE
+from psabench.estimate.face import Face
 from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.registry import PROCEDURES
@@ -33,7 +35,6 @@ class Section:
     label: str
     result: ProcedureResult
     truth: Mapping[str, float] | None = None  # the sensor's hidden parameters
-    allowance: Mapping[str, float] = field(default_factory=dict)  # by estimate: error of the chain that no CI contains
 
     @property
     def title(self) -> str:
@@ -47,8 +48,22 @@ class Graded:
     estimate: Estimate
     truth: float | None
     error: float | None  # estimate - truth
-    z: float | None  # error / sd
     within: bool | None  # None: nothing to compare, or flagged as not identifiable
+
+    @property
+    def z(self) -> float | None:
+        """Error in standard uncertainties. None: no truth."""
+        return None if self.error is None else _ratio(self.error, self.estimate.sd)
+
+    @property
+    def en(self) -> float | None:
+        """Normalised error: error over the expanded uncertainty, the truth being exact (ISO 13528 9.6). None: no truth."""
+        return None if self.error is None else _ratio(self.error, self.estimate.ci_half)
+
+
+def _ratio(error: float, u: float) -> float:
+    """Of an error to an uncertainty; without uncertainty any error is infinitely many of them."""
+    return error / u if u > 0.0 else math.copysign(math.inf, error) if error else 0.0
 
 
 def sensor_of(truth: Mapping[str, float]) -> Sensor:
@@ -68,17 +83,30 @@ def sensor_of(truth: Mapping[str, float]) -> Sensor:
 def grade(section: Section) -> tuple[Graded, ...]:
     """Every estimate of a section beside the truth, when there is one."""
     result = section.result
-    want = PROCEDURES[result.procedure].expected(sensor_of(section.truth)) if section.truth is not None else {}
-    return tuple(_graded(e, want.get(e.name), section.allowance.get(e.name, 0.0)) for e in result.estimates)
+    if section.truth is None:
+        return tuple(_graded(e, None) for e in result.estimates)
+    upright, side = (_sensor_when(section, faces) for faces in (_UPRIGHT, _SIDE))
+    want = PROCEDURES[result.procedure].expected(upright, side)
+    return tuple(_graded(e, want.get(e.name)) for e in result.estimates)
 
 
-def _graded(e: Estimate, truth: float | None, allowance: float) -> Graded:
+_UPRIGHT, _SIDE = (Face.DIRECT, Face.REVERSED), (Face.SIDE, Face.SIDE_REVERSED)
+
+
+def _sensor_when(section: Section, faces: Collection[Face]) -> Sensor:
+    """The sensor at the mean time of the readings on these faces: its zero drifts."""
+    assert section.truth is not None
+    sensor, t_s = sensor_of(section.truth), [r.t_s for r in section.result.readings if r.face in faces]
+    drift_v = float(section.truth.get("drift_v_per_s", 0.0)) * sum(t_s) / max(len(t_s), 1)
+    return replace(sensor, u0_v=sensor.u0_v + drift_v)
+
+
+def _graded(e: Estimate, truth: float | None) -> Graded:
     if truth is None:
-        return Graded(estimate=e, truth=None, error=None, z=None, within=None)
+        return Graded(estimate=e, truth=None, error=None, within=None)
     error = e.value - float(truth)
-    within = abs(error) <= LIMIT_CI * e.ci_half + allowance if e.identifiable else None
-    z = error / e.sd if e.sd > allowance else None  # below it the chain's tolerance speaks, not the noise
-    return Graded(estimate=e, truth=float(truth), error=error, z=z, within=within)
+    within = abs(error) <= LIMIT_CI * e.ci_half if e.identifiable else None
+    return Graded(estimate=e, truth=float(truth), error=error, within=within)
 
 
 def within_limits(sections: Sequence[Section]) -> bool:
@@ -122,7 +150,14 @@ def result_dict(section: Section) -> dict[str, object]:
         "residual_rms_v": r.residual_rms_v,
         "drift": None if r.drift is None else _estimate_dict(r.drift),
         "estimates": [
-            {**_estimate_dict(g.estimate), "truth": g.truth, "error": g.error, "z": g.z, "within_limits": g.within}
+            {
+                **_estimate_dict(g.estimate),
+                "truth": g.truth,
+                "error": g.error,
+                "z": _finite(g.z),
+                "en": _finite(g.en),
+                "within_limits": g.within,
+            }
             for g in grade(section)
         ],
         "correlation": {"names": list(r.correlation.names), "matrix": r.correlation.matrix.tolist()},
@@ -131,7 +166,19 @@ def result_dict(section: Section) -> dict[str, object]:
 
 
 def _estimate_dict(e: Estimate) -> dict[str, object]:
-    return {**numbers_of(e), "identifiable": e.identifiable, "reason": e.reason}
+    return {
+        **numbers_of(e),
+        "expanded_u": e.ci_half,
+        "dof": _finite(e.dof),
+        "budget": {c.name: c.u for c in e.budget},
+        "identifiable": e.identifiable,
+        "reason": e.reason,
+    }
+
+
+def _finite(x: float | None) -> float | None:
+    """JSON has no infinity."""
+    return x if x is not None and math.isfinite(x) else None
 
 
 def numbers_of(e: Estimate) -> dict[str, object]:
@@ -144,32 +191,41 @@ def console_table(section: Section) -> str:
     """What the terminal shows at the end of a run: one line an estimate, then the notes."""
     r = section.result
     head = f"{section.title}: {len(r.readings)} readings, residual {r.residual_rms_v * 1e6:.4g} uV rms"
-    rows = [("", "estimate", "+- 95 %", "unit", "truth", "error", "z", "")]
+    rows = [("", "estimate", "U", "unit", "truth", "error", "z", "En", "")]
     for g in grade(section):
         value, ci = with_ci(g.estimate.value, g.estimate.ci_half)
         truth = "" if g.truth is None else f"{g.truth:.7g}"
         error = "" if g.error is None else f"{g.error:+.2g}"
-        z = "" if g.z is None else f"{g.z:+.1f}"
-        rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, z, _mark(g)))
-    lines = [f"  {line}" for line in aligned(rows, left=(0, 7))]
+        z, en = as_ratio(g.z, 1), as_ratio(g.en, 2)
+        rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, z, en, _mark(g)))
+    lines = [f"  {line}" for line in aligned(rows, left=(0, 8))]
     notes = [f"  note: {n}" for n in r.notes]
     why = [f"  {e.name}: {e.reason}" for e in r.estimates if not e.identifiable]
     return "\n".join([head, *lines, *why, *notes])
 
 
+def as_ratio(x: float | None, decimals: int) -> str:
+    """z or En as text; "" without a truth."""
+    return "" if x is None else f"{x:+.{decimals}f}"
+
+
 def verdict(sections: Sequence[Section]) -> str:
-    """One or two sentences on everything that was compared with a truth."""
+    """What was compared with what, and how it came out."""
     graded = [g for s in sections for g in grade(s)]
     compared = [g for g in graded if g.within is not None]
     out = sum(g.within is False for g in compared)
     flagged = sum(not g.estimate.identifiable for g in graded)
     if not compared:
         text = "No truth given: the numbers stand alone."
-    elif out == 0:
-        text = f"All {len(compared)} measured numbers lie within their limits of the truth."
     else:
-        text = f"{out} of {len(compared)} measured numbers lie outside their limits."
-    return text + (f" {flagged} numbers are flagged: the data do not determine them." if flagged else "")
+        head = "All" if out == 0 else f"{out} of"
+        within = "within" if out == 0 else "not within"
+        beyond = sum(abs(g.en or 0.0) > 1.0 for g in compared)
+        text = (
+            f"{head} {len(compared)} numbers compared with the sensor's true parameters are {within} {LIMIT_CI:g} U; "
+            f"{beyond} are beyond U (expected: {(1.0 - COVERAGE) * len(compared):.1f})."
+        )
+    return text + (f" {flagged} numbers are flagged and not compared: the data do not determine them." if flagged else "")
 
 
 def console_comparison(sections: Sequence[Section]) -> str:

@@ -216,7 +216,7 @@ def test_search_for_the_extreme_returns_the_hypotenuse_and_leaves_10_uv_in_u0() 
 
 def test_intervals_of_test_turns_cover() -> None:
     rng = seeded("turns_coverage")
-    want = expected_turns(ARTICLE)
+    want = expected_turns(ARTICLE, ARTICLE)
     hits = []
     for _ in range(1500):
         result = turns(FakeBench(noise_v=1e-3, rng=rng), TurnsParams(readings=1))
@@ -359,4 +359,4 @@ def test_registry_names_procedures_whose_options_explain_themselves() -> None:
         result = p.run(FakeBench(noise_v=1e-6), p.params())
         again = p.estimate(result.readings, p.params(), result.g_mps2)
         assert again.estimates == result.estimates
-        assert set(p.expected(ARTICLE)) == {e.name for e in result.estimates}
+        assert set(p.expected(ARTICLE, ARTICLE)) == {e.name for e in result.estimates}
