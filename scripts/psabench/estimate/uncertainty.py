@@ -36,7 +36,7 @@ class Estimate:
     identifiable: bool = True
     reason: str = ""  # why not identifiable, for people
     dof: float = math.inf
-    budget: tuple[Component, ...] = ()  # of psabench.estimate.budget; (): the scatter alone
+    budget: tuple[Component, ...] = ()  # of psabench.budget.gum; (): the scatter alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -375,7 +375,7 @@ _EXAMPLES: Mapping[str, str] = {
 
 
 def _of_the_head(name: str) -> Parameters:
-    from psabench.procedures.accuracy import EXACT, BenchAccuracy
+    from psabench.budget.accuracy import EXACT, BenchAccuracy
     from psabench.procedures.registry import PROCEDURES
 
     fields = {**PROCEDURES[name].params.__dataclass_fields__, **BenchAccuracy.__dataclass_fields__}
@@ -383,7 +383,7 @@ def _of_the_head(name: str) -> Parameters:
 
 
 def _of_all() -> Parameters:
-    from psabench.procedures.accuracy import EXACT
+    from psabench.budget.accuracy import EXACT
 
     each = {name: _of_the_head(name).fields for name in ON_THE_HEAD}
     return Parameters(

@@ -27,7 +27,9 @@ class Procedure:
     params: type[Any]
     run: Callable[..., ProcedureResult]  # (bench, params, watch) -> result
     estimate: Callable[..., ProcedureResult]  # (readings, params, g_mps2) -> result
-    expected: Callable[[Sensor, Sensor], Mapping[str, float]]  # truth, and at the side faces -> what each should have been
+    expected: Callable[
+        [Sensor, Sensor], Mapping[str, float]
+    ]  # truth, and at the side faces -> what each should have been
     flag: Callable[[Sequence[Estimate], Any], list[Estimate]]  # which estimates the data do not determine
 
 

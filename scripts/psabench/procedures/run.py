@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
+from psabench.budget.accuracy import EXACT, BenchAccuracy
+from psabench.budget.influences import expand_result
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
-from psabench.procedures.accuracy import EXACT, BenchAccuracy
-from psabench.procedures.budget import expand_result
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder
@@ -65,7 +65,7 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
     sections = []
     for condition in _conditions(options):
         for name in options.procedures:
-            sections.append(_one(PROCEDURES[name], condition, options, progress))
+            sections.append(measure_section(PROCEDURES[name], condition, options, progress))
     page = report.write(options.out, sections, facts=_facts(options))
     return page, sections
 
@@ -77,9 +77,10 @@ def _conditions(options: RunOptions) -> list[Condition]:
     return [CONDITIONS[c] for c in options.conditions]
 
 
-def _one(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
+def measure_section(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
+    """One procedure on one bench, with its budget; stores the readings and the resolved scenario. Raises BenchError."""
     params = made_params(procedure.params, procedure.name, options.params or {})
-    accuracy = _accuracy(condition.exact, options)
+    accuracy = _accuracy(EXACT if condition.exact else {}, options)
     average = condition.average if options.average is None else options.average
     g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
@@ -89,8 +90,8 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
         on_head: HeadBench = wired
         if options.record:
             setup = {"procedure": procedure.name, "condition": condition.label, "average": average, "g_mps2": g_mps2}
-            setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "exact": condition.exact}
-            setup |= {"facts": _facts(options)}
+            setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "facts": _facts(options)}
+            setup |= {"accuracy": asdict(accuracy)}
             on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
         result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
@@ -99,10 +100,10 @@ def _one(procedure: Procedure, condition: Condition, options: RunOptions, progre
     return Section(label=condition.label, result=result, truth=truth)
 
 
-def _accuracy(exact: bool, options: RunOptions) -> BenchAccuracy:
-    """Of the bench: what the user gave, else that of our chain and head, or none where the bench is exact."""
-    given = fields_of(BenchAccuracy, options.params or {})
-    return made_params(BenchAccuracy, "accuracy of the bench", (EXACT if exact else {}) | given)
+def _accuracy(known: Mapping[str, float], options: RunOptions) -> BenchAccuracy:
+    """What the user gave, else what is known of this bench, else the figures of our chain and head."""
+    given = {**known, **fields_of(BenchAccuracy, options.params or {})}
+    return made_params(BenchAccuracy, "accuracy of the bench", given)
 
 
 def _step_v(average: int) -> float:
@@ -124,7 +125,7 @@ def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Sec
     params = made_params(procedure.params, name, options.params or {})
     with CsvRecorder(options.out / f"{'-'.join(x for x in (name, label) if x)}.csv") as recorder:
         result = procedure.run(head, params, Watch(progress=progress, record=recorder))
-    accuracy = _accuracy(bool(head.setup.get("exact", False)), options)
+    accuracy = _accuracy(dict(head.setup.get("accuracy", {})), options)
     result = expand_result(result, procedure, params, accuracy, _step_v(int(head.setup["average"])))
     section = Section(label=label, result=result, truth=None)
     facts = {str(k): str(v) for k, v in head.setup["facts"].items()}

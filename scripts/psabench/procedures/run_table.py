@@ -35,8 +35,8 @@ class Condition:
     exact: bool = False  # the chain and the head have no tolerances: their uncertainties are 0
 
 
-# quiet: no noise, no tolerances, whole 32-bit words: the printed figures. realistic: another unit for each seed, with 1 mV
-# of sensor noise, quadratic terms, drift, the chain's tolerances, and a head that errs: what a bench would find.
+# quiet: no noise, no tolerances, whole 32-bit words: the printed figures. realistic: another unit for each seed, with
+# 1 mV of sensor noise, quadratic terms, drift, the chain's tolerances, and a head that errs: what a bench would find.
 CONDITIONS: Mapping[str, Condition] = {
     "quiet": Condition(label="quiet", scenario="quiet", average=0, exact=True),
     "realistic": Condition(label="realistic", scenario="realistic", average=16),

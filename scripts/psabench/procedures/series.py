@@ -164,7 +164,7 @@ def fit_notes(faces: Sequence[FaceFit]) -> list[str]:
     return [
         f"face {', '.join(repeating)}: the residual repeats from turn to turn "
         f"(F test, p < {max(max(repeating.values()), 1e-15):.1e}); "
-        "the model misses something that small, and the intervals are too short"
+        "the model misses something that small, and the scatter does not contain it"
     ]
 
 

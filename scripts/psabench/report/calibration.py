@@ -132,7 +132,7 @@ def _section(s: Section, ident: str) -> str:
         s.title,
         f"<p class=facts>{escape(ON_THE_HEAD[r.procedure])}<br>{' · '.join(facts)}</p>",
         _estimates(s),
-        _budget(s),
+        _budget_table(s),
         bullets([_symbol(escape(n)) for n in r.notes]),
         *pictures,
         _correlation(s),
@@ -172,7 +172,7 @@ def _estimate_row(g: Graded, with_truth: bool, g_mps2: float) -> str:
     )
 
 
-def _budget(s: Section) -> str:
+def _budget_table(s: Section) -> str:
     """Components of each estimate's uncertainty; "" where no budget was made."""
     rows = [e for e in s.result.estimates if e.budget]
     names = list(dict.fromkeys(c.name for e in rows for c in e.budget))
@@ -226,10 +226,10 @@ def _symbol(text: str) -> str:
 def _method() -> str:
     return section(
         "How to read this",
-        "<p>Voltages are at the load resistor, less the known gain of the converter's filter; coefficients are per local g. "
-        "U is the expanded uncertainty (GUM, 95.45 %, k = 2 for many degrees of freedom): the scatter of the readings by "
-        "the delta method, and what no reading shows (chain, temperature, head, resolution) by the estimator's own "
-        "sensitivities. The truth is exact: z = error/u, E<sub>n</sub> = error/U. "
+        "<p>Voltages are at the load resistor, less the known gain of the converter's filter; coefficients are per "
+        "local g. U is the expanded uncertainty (GUM, 95.45 %, k = 2 for many degrees of freedom): the scatter of the "
+        "readings by the delta method, and what no reading shows (chain, temperature, head, resolution) by the "
+        "estimator's own sensitivities. The truth is exact: z = error/u, E<sub>n</sub> = error/U. "
         f"A number is out of limits beyond {LIMIT_CI:g} U. "
         "u<sub>0</sub> contains the quadratic terms that no turn in 1 g can take out of it.</p>"
         "<p>Repairs to the article: position 1 of its fig. 2 has a<sub>x</sub> = +g; "

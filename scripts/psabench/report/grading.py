@@ -10,8 +10,8 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
+from psabench.budget.gum import COVERAGE
 from psabench.errors import expected
-from psabench.estimate.budget import COVERAGE
 from psabench.estimate.face import Face
 from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
@@ -53,15 +53,15 @@ class Graded:
     @property
     def z(self) -> float | None:
         """Error in standard uncertainties. None: no truth."""
-        return None if self.error is None else _ratio(self.error, self.estimate.sd)
+        return None if self.error is None else _ratio_of(self.error, self.estimate.sd)
 
     @property
     def en(self) -> float | None:
-        """Normalised error: error over the expanded uncertainty, the truth being exact (ISO 13528 9.6). None: no truth."""
-        return None if self.error is None else _ratio(self.error, self.estimate.ci_half)
+        """Normalised error, ISO 13528 9.6: error over U, for the truth is exact. None: no truth."""
+        return None if self.error is None else _ratio_of(self.error, self.estimate.ci_half)
 
 
-def _ratio(error: float, u: float) -> float:
+def _ratio_of(error: float, u: float) -> float:
     """Of an error to an uncertainty; without uncertainty any error is infinitely many of them."""
     return error / u if u > 0.0 else math.copysign(math.inf, error) if error else 0.0
 
@@ -154,8 +154,8 @@ def result_dict(section: Section) -> dict[str, object]:
                 **_estimate_dict(g.estimate),
                 "truth": g.truth,
                 "error": g.error,
-                "z": _finite(g.z),
-                "en": _finite(g.en),
+                "z": _finite_or_none(g.z),
+                "en": _finite_or_none(g.en),
                 "within_limits": g.within,
             }
             for g in grade(section)
@@ -169,14 +169,14 @@ def _estimate_dict(e: Estimate) -> dict[str, object]:
     return {
         **numbers_of(e),
         "expanded_u": e.ci_half,
-        "dof": _finite(e.dof),
+        "dof": _finite_or_none(e.dof),
         "budget": {c.name: c.u for c in e.budget},
         "identifiable": e.identifiable,
         "reason": e.reason,
     }
 
 
-def _finite(x: float | None) -> float | None:
+def _finite_or_none(x: float | None) -> float | None:
     """JSON has no infinity."""
     return x if x is not None and math.isfinite(x) else None
 
@@ -225,7 +225,9 @@ def verdict(sections: Sequence[Section]) -> str:
             f"{head} {len(compared)} numbers compared with the sensor's true parameters are {within} {LIMIT_CI:g} U; "
             f"{beyond} are beyond U (expected: {(1.0 - COVERAGE) * len(compared):.1f})."
         )
-    return text + (f" {flagged} numbers are flagged and not compared: the data do not determine them." if flagged else "")
+    return text + (
+        f" {flagged} numbers are flagged and not compared: the data do not determine them." if flagged else ""
+    )
 
 
 def console_comparison(sections: Sequence[Section]) -> str:

@@ -83,11 +83,11 @@ def test_without_noise_every_measured_number_is_what_was_to_be_expected(
     s: Sensor,
     run: Callable[[HeadBench, object], ProcedureResult],
     params: object,
-    expected: Callable[[Sensor], dict[str, float]],
+    expected: Callable[[Sensor, Sensor], dict[str, float]],
 ) -> None:
     """All that is not flagged must be right, for quadratic terms, a negative kxy and a large alpha0 too."""
     result = run(bench_of(s, drift_v_per_s=0.0), params)
-    want = expected(s)
+    want = expected(s, s)
     assert {e.name for e in result.estimates} == set(want)
     wrong = {
         e.name: (e.value, want[e.name])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,11 +12,15 @@ from pathlib import Path
 
 import pytest
 from fake_bench import FakeBench, seeded
+from psabench.budget.accuracy import BenchAccuracy
+from psabench.budget.influences import expand_result
 from psabench.procedures.fourier import FourierParams, fourier
+from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.reversal import ReversalParams, reversal
 from psabench.procedures.turns import TurnsParams, turns
 from psabench.report import calibration as report
 from psabench.report.grading import (
+    Graded,
     Section,
     as_printed,
     console_comparison,
@@ -129,8 +134,11 @@ def test_a_measured_number_off_its_interval_is_out_of_limits_and_a_flagged_one_i
     quiet = sections({**TRUTH, "u0_v": 2.4999})[:1]
     assert not within_limits(quiet)
     assert "OUT OF LIMITS" in console_table(quiet[0])
-    assert "outside their limits" in report.html_page(quiet, {})
-    assert verdict(quiet).startswith("2 of 10 measured numbers lie outside their limits.")  # u0 and c0
+    assert "are not within 2 U" in report.html_page(quiet, {})
+    words = (
+        "2 of 10 numbers compared with the sensor's true parameters are not within 2 U; 2 are beyond U (expected: 0.5)."
+    )
+    assert verdict(quiet).startswith(words)  # u0 and c0
     twisted = sections({**TRUTH, "alpha0_deg": 0.1121, "kxy_v_per_g2": 0.001})[2:3]  # turns: ky misses by 2 mV, flagged
     assert within_limits(twisted)
     ky = next(g for g in grade(twisted[0]) if g.estimate.name == "ky_v_per_g")
@@ -155,12 +163,38 @@ def test_the_terminal_shows_the_articles_digits_beside_ours() -> None:
     assert "?" not in "".join(row.split()[3] for row in rows)  # the reversal knows
 
 
-def test_what_the_chain_is_allowed_is_added_to_the_limit_of_that_estimate_alone() -> None:
-    off = sections({**TRUTH, "u0_v": 2.501})[0]
+def test_the_budget_is_the_limit_and_every_component_is_shown(tmp_path: Path) -> None:
+    off = sections({**TRUTH, "u0_v": 2.5003})[0]
     assert not within_limits([off])
-    assert within_limits([replace(off, allowance={"u0_v": 1.001e-3, "c0_v": 1.001e-3})])
-    assert not within_limits([replace(off, allowance={"u0_v": 1.001e-3})])
-    assert not within_limits([replace(off, allowance={"u0_v": 0.999e-3, "c0_v": 0.999e-3})])
+    budgeted = expand_result(
+        off.result, PROCEDURES["fourier"], FourierParams(), BenchAccuracy(chain_zero_uv=160.0), 0.0
+    )
+    wide = replace(off, result=budgeted)
+    assert within_limits([wide])
+    data = json.loads((report.write(tmp_path, [wide]).parent / "result.json").read_text(encoding="utf-8"))
+    u0 = next(e for e in data["sections"][0]["estimates"] if e["name"] == "u0_v")
+    assert u0["budget"]["chain zero"] == pytest.approx(160e-6)
+    assert u0["sd"] == pytest.approx(math.hypot(*u0["budget"].values()))
+    assert u0["en"] == pytest.approx(u0["error"] / u0["expanded_u"])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(f"<th>{name}</th>" in page for name in u0["budget"])
+
+
+def test_z_is_shown_whatever_its_size() -> None:
+    for g in grade(sections({**TRUTH, "kx_v_per_g": 0.5})[0]):
+        assert g.z is not None
+        assert g.en is not None
+    exact = replace(sections(TRUTH)[0].result.estimates[0], sd=0.0, ci_half=0.0)
+    assert math.isinf(Graded(estimate=exact, truth=0.0, error=-1e-9, within=False).z or 0.0)
+    assert Graded(estimate=exact, truth=0.0, error=0.0, within=True).en == 0.0
+
+
+def test_the_zero_is_compared_as_it_was_while_it_was_measured() -> None:
+    """10 nV a second over a run: without the drift of the truth u0 is out of its limits."""
+    bench = FakeBench(noise_v=2e-9, drift_v_per_s=1e-8, rng=seeded("drifting"))
+    result = reversal(bench, SHORT_PAIR)
+    assert within_limits([Section(label="", result=result, truth={**TRUTH, "drift_v_per_s": 1e-8})])
+    assert not within_limits([Section(label="", result=result, truth=TRUTH)])
 
 
 def test_console_names_every_estimate_and_says_why_a_flag_is_down() -> None:

@@ -36,6 +36,8 @@ class FakeBench:
     remount_arcsec: float = 0.0  # sd of the turn about the head axis at each mounting
     setting_error_deg: float = 0.0  # sd; the readout shows it
     lsb_v: float = 0.0  # converter step at the load, 0: none
+    chain: tuple[float, float] = (0.0, 0.0)  # relative error of the gain, zero in V
+    circle_arcsec: tuple[float, float] = (0.0, 0.0)  # error that the scale does not show: of the sine, of the cosine
     reading_s: float = 1.0
     stop_after: int | None = None  # raise KeyboardInterrupt instead of reading number N
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED))
@@ -61,7 +63,9 @@ class FakeBench:
 
     def gravity_g(self) -> npt.NDArray[np.float64]:
         """Gravity in the sensor's axes, in g: head about z, then the face about the sensor's own x."""
-        th = np.radians(self._readout_deg + self._mount_deg)
+        scale_rad = np.radians(self._readout_deg)
+        circle_arcsec = np.array(self.circle_arcsec) @ [np.sin(scale_rad), np.cos(scale_rad)]
+        th = scale_rad + np.radians(self._mount_deg + circle_arcsec / 3600)
         ph = np.radians(ABOUT_OX_DEG[self._face])
         c_head = np.array([[np.cos(th), -np.sin(th), 0], [np.sin(th), np.cos(th), 0], [0, 0, 1]])
         c_face = np.array([[1, 0, 0], [0, np.cos(ph), -np.sin(ph)], [0, np.sin(ph), np.cos(ph)]])
@@ -78,5 +82,6 @@ class FakeBench:
         self.t_s += self.reading_s * readings
         level_v = self.u0_v + a @ self.k + self.kxy * a[0] * a[1] + a**2 @ self.k_square
         u_v = level_v + self.drift_v_per_s * t_s + self.noise_v * self.rng.standard_normal(readings)
+        u_v = u_v * (1.0 + self.chain[0]) + self.chain[1]
         out_v: npt.NDArray[np.float64] = np.round(u_v / self.lsb_v) * self.lsb_v if self.lsb_v else u_v
         return out_v

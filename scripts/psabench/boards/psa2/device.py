@@ -20,8 +20,8 @@ CONFIG0 = 0x01
 
 # Output words a second at 4.096 MHz by the DR field of CONFIG0 (converter data sheet).
 DATA_HZ = {0: 250, 1: 500, 2: 1000, 3: 2000, 4: 4000}
-# Gain at DC of the converter's FIR by the PHASE bit of CONFIG0: the integer taps of its last two stages sum to these over 2^27
-# (converter data sheet, coefficient table; docs/chips/ads1282.md). Without the FIR (FILTR 1) it is 1.
+# Gain at DC of the converter's FIR by the PHASE bit of CONFIG0: the integer taps of its last two stages sum to these,
+# over 2^27 (converter data sheet, coefficient table; docs/chips/ads1282.md). Without the FIR (FILTR 1) it is 1.
 FIR_GAIN = {0: 134201050 * 134238266 / 2**54, 1: 134259543 * 134198608 / 2**54}
 SINC_ONLY = 1
 SETTLE_PERIODS = 64  # 62.98 data periods and 468 clocks from a step to a settled word, rounded up

@@ -27,4 +27,4 @@ class BenchAccuracy:
 
 
 # Of a bench in which nothing is hidden: the emulator with all tolerances and errors at zero.
-EXACT = {name: 0.0 for name in BenchAccuracy.__dataclass_fields__}
+EXACT = dict.fromkeys(BenchAccuracy.__dataclass_fields__, 0.0)

@@ -23,8 +23,8 @@ def effective_dof(components: Iterable[Component]) -> float:
     return combined_u(each) ** 4 / spread if spread > 0.0 else math.inf
 
 
-def expand(e: Estimate, added: Iterable[Component]) -> Estimate:
-    """The estimate with its scatter (type A) and the components that no reading shows; its interval becomes +- U = k u_c."""
+def expand_estimate(e: Estimate, added: Iterable[Component]) -> Estimate:
+    """The estimate with its scatter (type A) and the components added: its interval becomes +- U = k u_c."""
     components = (Component(name="scatter", u=e.sd, dof=e.dof), *added)
     u_c, dof = combined_u(components), effective_dof(components)
     return replace(e, sd=u_c, dof=dof, ci_half=t_quantile(dof, COVERAGE) * u_c, budget=components)
