@@ -82,6 +82,9 @@ class Track:
     t_s: Floats  # (n,) of the readings, s of the bench; the first is where the integral is 0
     s_vs: Floats  # (n, 3) V s of X, Y, Z
     note: str = ""
+    # Standard uncertainties from the scatter of the unit's own calibrations, 0: it makes none.
+    gain_u: float = 0.0  # relative
+    zero_u_v: float = 0.0  # at the load
 
     @property
     def title(self) -> str:
@@ -150,9 +153,10 @@ def _psd1(r: Readings, name: str) -> Track:
 
 def _psa2(unit: Psa2, name: str) -> Track:
     """Of frames on a whole number of periods: the converter's crystal is taken at its word."""
-    frames = unit.frames.take()
+    frames, gain = unit.frames.take(), unit.filter_gain
     t_s = frames.t_rx_s[0] + np.arange(len(frames)) / unit.data_hz
-    return _means(name, PSA2_LSB_V, t_s, frames.u_v, "24-bit codes at the load, a mean of the filter each")
+    note = f"24-bit codes at the load, a mean of the filter each, less the filter's gain of {gain:.7g}"
+    return _means(name, PSA2_LSB_V / gain, t_s, frames.u_v / gain, note)
 
 
 def _pmka(unit: Pmka, r: Readings, name: str) -> Track:
@@ -164,13 +168,21 @@ def _pmka(unit: Pmka, r: Readings, name: str) -> Track:
     except ValueError as e:
         raise LinkError(f"{name}: {e}") from e
     nr = float(np.mean([c.nr.mean() for c in calibrations]))
+    gain_u, zero_u = (max(map(scatter_of, x)) for x in zip(*((c.nr / nr, c.zero) for c in calibrations), strict=True))
     return Track(
         name=name,
         quantum_vs=pmka.quantum_vs(nr, rom.ts_s),
         t_s=r.t_rx_s[0] + np.arange(len(periods)) * rom.ts_s,
         s_vs=pmka.integrals_vs(periods, rom, calibrations),
         note=f"eqs (1)-(7), {nr:.0f} codes a reset, corrections of the ROM",
+        gain_u=gain_u,
+        zero_u_v=zero_u / nr * pmka.UREF_V,
     )
+
+
+def scatter_of(x: Floats) -> float:
+    """Standard uncertainty of the mean of calibrations, shape (k, ...): of the column that scatters most."""
+    return float(np.max(np.std(x, axis=0, ddof=1))) / len(x) ** 0.5 if len(x) > 1 else 0.0
 
 
 def _track(unit: Unit, name: str) -> Track:

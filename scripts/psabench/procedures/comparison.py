@@ -8,6 +8,7 @@ where the delay of a converter's filter drops out.
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -18,6 +19,8 @@ from typing import Any
 import numpy as np
 
 from psabench.bench import Bench
+from psabench.budget.accuracy import BenchAccuracy
+from psabench.budget.gum import COVERAGE
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.own import output_text
 from psabench.link.signals import Floats
@@ -26,27 +29,29 @@ from psabench.procedures import compare_converters as measured
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
+from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import aligned
 
 TRUTH_EVERY_S = 0.01
 G_MPS2 = 9.8094  # of the scenario's site: an operator knows the gravity of the laboratory
 MAX_LAG_S = 0.05
 AXES = "XYZ"
+COVERAGE_K = 2.0  # of U
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Article:
-    """What the article says of a generation, and what a unit may miss the integral by.
+    """What the article says of a generation, and the budget of its unit: standard uncertainties.
 
-    printed: texts of the article (E1), "": nothing. scale: error of the coefficient, zero_v: of the zero at the load;
-    k_source says whence the first, zero_source whence the second. error: of the coefficient as printed, "": nothing.
-    why: what its figures come from, where the board's page has to be known to understand them.
+    printed: texts of the article (E1), "": nothing. gain_u: of the coefficient, relative, zero_u_v: of the zero at the
+    load; k_source says whence the first, zero_source whence the second. error: of the coefficient as printed, "":
+    nothing. why: what its figures come from, where the board's page has to be known to understand them.
     """
 
     printed: str
-    zero_v: float
+    gain_u: float
+    zero_u_v: float
     pulse: str = ""
-    scale: float = 5e-4
     k_source: str = "E0"
     zero_source: str = "E0"
     error: str = ""
@@ -64,36 +69,65 @@ PSD1_FULL_SCALE_V = 10.0
 PSD1_NOISE_V = 4.0 * 13e-6  # rms of a word at 100 Hz and gain 1 (E2); four times that on AIN2 (E0)
 PSD1_CODE_V = PSD1_FULL_SCALE_V / 2**15  # a word of 16 bits is cut off, not rounded: up to a code low (E0)
 PSD1_REFERENCE = 2e-4  # standard deviation of the reference (E0)
-PSD1_SCALE = 3.0 * (PSD1_REFERENCE**2 + 2.0 * (PSD1_NOISE_V / PSD1_FULL_SCALE_V) ** 2) ** 0.5
-PSD1_ZERO_V = 3.0 * PSD1_NOISE_V + PSD1_CODE_V
+PSD1_GAIN_U = (PSD1_REFERENCE**2 + 2.0 * (PSD1_NOISE_V / PSD1_FULL_SCALE_V) ** 2) ** 0.5
+PSD1_ZERO_U_V = (PSD1_NOISE_V**2 + PSD1_CODE_V**2 / 3.0) ** 0.5  # anywhere from 0 to a code low: not corrected
+
+RECTANGULAR = 3.0**0.5  # limits of a printed error to its standard uncertainty, GUM 4.3.7
+PSA = BenchAccuracy()
+ROM_U = 0.3e-6  # correction of PMKA's ROM: as the factory measured it (0.2 ppm), and its resolution (0.24 ppm)
 
 ONE_PULSE = "a level axis gives a pulse or none in the whole rest: its drift is known to a quantum over the rest"
 
-# Zeros are three standard deviations of the profiles and chains (E0); the article gives none.
+# Zeros are those of the profiles and chains (E0); the article gives none. PMKA measures its own.
 ARTICLE: Mapping[str, Article] = {
     "pik": Article(
         printed="174 Hz/V within 0.15 %",
         pulse="60e-3",
-        scale=1.5e-3,
-        zero_v=6e-4,
+        gain_u=1.5e-3 / RECTANGULAR,
+        zero_u_v=2e-4,
         k_source="E1",
         error="0.15 %",
         why=ONE_PULSE,
     ),
-    "pik5": Article(printed="no figures but those of PIK", scale=1.5e-3, zero_v=6e-4, k_source="E1", why=ONE_PULSE),
-    "pik6": Article(printed="2000 Hz/V within 0.05 %", pulse="5e-3", zero_v=1.5e-4, k_source="E1", error="0.05 %"),
-    "pmka": Article(printed="16-bit converter, Ts = 4.8 ms", pulse="2.4e-5", zero_v=3e-4),
+    "pik5": Article(
+        printed="no figures but those of PIK",
+        gain_u=1.5e-3 / RECTANGULAR,
+        zero_u_v=2e-4,
+        k_source="E1",
+        why=ONE_PULSE,
+    ),
+    "pik6": Article(
+        printed="2000 Hz/V within 0.05 %",
+        pulse="5e-3",
+        gain_u=5e-4 / RECTANGULAR,
+        zero_u_v=5e-5,
+        k_source="E1",
+        error="0.05 %",
+    ),
+    "pmka": Article(
+        printed="16-bit converter, Ts = 4.8 ms",
+        pulse="2.4e-5",
+        gain_u=ROM_U,
+        zero_u_v=0.0,
+        zero_source="from the scatter of its calibrations",
+    ),
     "psd1": Article(
         printed="16-bit words of a delta-sigma converter",
-        scale=PSD1_SCALE,
-        zero_v=PSD1_ZERO_V,
+        gain_u=PSD1_GAIN_U,
+        zero_u_v=PSD1_ZERO_U_V,
         k_source="E0 + E3",
         zero_source="E0 + E3",
         why=f"its drift is a zero: words are cut off, not rounded, up to a code ({PSD1_CODE_V * 1e6:.0f} µV) low, and "
         f"self-calibration takes the zero from one word, which has {PSD1_NOISE_V * 1e6:.0f} µV rms of noise",
     ),
-    "psa1": Article(printed="resolution finer by more than an order", zero_v=1e-3),
-    "psa2": Article(printed="resolution finer by more than an order", zero_v=1e-3),
+    **{
+        name: Article(
+            printed="resolution finer by more than an order",
+            gain_u=PSA.chain_gain_ppm * 1e-6,
+            zero_u_v=PSA.chain_zero_uv * 1e-6,
+        )
+        for name in ("psa1", "psa2")
+    },
 }
 
 
@@ -160,13 +194,13 @@ class Graded:
     article: Article
     error_mps: Floats  # (n, 3) velocity minus truth, its lag taken out
     end_mps: Floats  # (3,) over the whole run
-    limit_mps: Floats  # (3,) what end_mps may be
+    u_mps: Floats  # (3,) expanded uncertainty U of end_mps, k = 2
     lag_s: float  # behind the truth: sensor, filter, period
     swing_mps: float  # largest |error| of any axis while the table moved, drift of the rests taken out
 
     @property
     def within(self) -> bool:
-        return bool(np.all(np.abs(self.end_mps) <= self.limit_mps))
+        return bool(np.all(np.abs(self.end_mps) <= LIMIT_CI * self.u_mps))
 
 
 def _error(track: Track, motion: Motion, lag_s: float, g_mps2: float) -> Floats:
@@ -195,7 +229,6 @@ def grade(f: Figures, motion: Motion, p: CompareParams, g_mps2: float) -> Graded
     span_s = float(track.t_s[-1] - track.t_s[0])
     inside = (motion.t_s >= track.t_s[0]) & (motion.t_s <= track.t_s[-1])
     run_mps = np.trapezoid(np.abs(motion.a_mps2[inside]), motion.t_s[inside], axis=0)
-    zero_mps = article.zero_v / track.ma_v_per_g * g_mps2 * span_s
     t = track.t_s - track.t_s[0]
     steady = error - t[:, None] * f.drift_mps2 + _drift_of_truth(motion, track, p) * t[:, None]
     moving = t >= p.rest_s
@@ -204,10 +237,19 @@ def grade(f: Figures, motion: Motion, p: CompareParams, g_mps2: float) -> Graded
         article=article,
         error_mps=error,
         end_mps=error[-1] - error[0],
-        limit_mps=article.scale * run_mps + zero_mps + 2.0 * track.quantum_mps(g_mps2),
+        u_mps=COVERAGE_K * _standard_u_mps(f, article, run_mps, span_s, g_mps2),
         lag_s=lag_s,
         swing_mps=float(np.abs(steady[moving]).max(initial=0.0)),
     )
+
+
+def _standard_u_mps(f: Figures, article: Article, run_mps: Floats, span_s: float, g_mps2: float) -> Floats:
+    """Combined standard uncertainty of the end error, (3,): gain over what the axis felt, zero, two ends."""
+    track, zero_v = f.track, math.hypot(article.zero_u_v, f.track.zero_u_v)
+    gain = np.hypot(article.gain_u, track.gain_u) * run_mps
+    zero_mps = zero_v / track.ma_v_per_g * g_mps2 * span_s
+    ends_mps = np.sqrt(2.0 * (track.quantum_mps(g_mps2) ** 2 / 12.0 + f.noise_mps**2))
+    return np.asarray(np.sqrt(gain**2 + zero_mps**2 + ends_mps**2))
 
 
 def _drift_of_truth(motion: Motion, track: Track, p: CompareParams) -> Floats:
@@ -325,9 +367,9 @@ def result_dict(c: Comparison) -> dict[str, object]:
                 "readings": len(track.t_s),
                 "quantum_mps": track.quantum_mps(c.g_mps2),
                 "printed": g.article.printed,
-                "scale_limit": g.article.scale,
-                "scale_limit_grade": g.article.k_source,
-                "zero_limit_v": g.article.zero_v,
+                "gain_u": math.hypot(g.article.gain_u, track.gain_u),
+                "gain_u_grade": g.article.k_source,
+                "zero_u_v": math.hypot(g.article.zero_u_v, track.zero_u_v),
                 "printed_quantum_mps": g.article.pulse_mps,
                 "printed_error": g.article.error,
                 "step_seen_mps": _numbers(f.step_mps),
@@ -336,7 +378,7 @@ def result_dict(c: Comparison) -> dict[str, object]:
                 "lag_s": g.lag_s,
                 "swing_error_mps": g.swing_mps,
                 "end_error_mps": _numbers(g.end_mps),
-                "limit_mps": _numbers(g.limit_mps),
+                "expanded_u_mps": _numbers(g.u_mps),
                 "within_limits": g.within,
                 "note": track.note,
                 "why": g.article.why,
@@ -383,13 +425,13 @@ def figures_table(c: Comparison) -> Table:
 
 
 def errors_table(c: Comparison) -> Table:
-    """Velocity error of each axis over the run beside its limit, and the error of the coefficient as printed."""
+    """Velocity error of each axis over the run beside its U, and the error of the coefficient as printed."""
     rows: Table = [
-        ("", "printed", *(f"{what} {axis}" for axis in AXES for what in ("end", "limit")), "within"),
+        ("", "printed", *(f"{what} {axis}" for axis in AXES for what in ("end", "U")), f"within {LIMIT_CI:g} U"),
         ("", "", *["m/s"] * 6, ""),
     ]
     for g in c.graded:
-        ends = (x for end, limit in zip(g.end_mps, g.limit_mps, strict=True) for x in (f"{end:+.2g}", f"{limit:.2g}"))
+        ends = (x for end, u in zip(g.end_mps, g.u_mps, strict=True) for x in (f"{end:+.2g}", f"{u:.2g}"))
         rows.append((g.figures.track.title, g.article.error or "–", *ends, "yes" if g.within else "NO"))
     return rows
 
@@ -404,11 +446,14 @@ def console_table(c: Comparison) -> str:
 
 
 def verdict(c: Comparison) -> str:
-    """One sentence."""
+    """What was compared with what, and how it came out."""
+    ends = [abs(end) / u for g in c.graded for end, u in zip(g.end_mps, g.u_mps, strict=True)]
+    beyond = f"{sum(x > 1.0 for x in ends)} of {len(ends)} end errors are beyond U"
     out = [g.figures.track.title for g in c.graded if not g.within]
-    if not out:
-        return f"The velocities of all {len(c.graded)} generations lie within their limits of the exact integral."
-    return f"Out of limits: {', '.join(out)}."
+    if out:
+        return f"Not within {LIMIT_CI:g} U of the exact integral: {', '.join(out)}; {beyond}."
+    text = f"The velocities of all {len(c.graded)} generations are within {LIMIT_CI:g} U of the exact integral"
+    return f"{text}; {beyond} (expected: {(1.0 - COVERAGE) * len(ends):.1f})."
 
 
 def finer(c: Comparison) -> Sequence[tuple[str, float]]:

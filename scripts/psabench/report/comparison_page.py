@@ -51,8 +51,8 @@ _ABOUT_FIGURES = (
 )
 _ABOUT_ERRORS = (
     "printed: error of the coefficient as the article has it. end: from the first reading to the last, at rest in the "
-    "same attitude. limit: error of the coefficient times what the axis felt, a zero of three standard deviations, two "
-    "quanta."
+    "same attitude. U: expanded uncertainty (k = 2) of the coefficient times what the axis felt, of the zero, and of "
+    "rounding and noise at both ends."
 )
 
 
@@ -60,7 +60,8 @@ def _method(c: Comparison) -> str:
     rows = [
         f"<b>{escape(g.figures.track.title)}</b>: {escape(g.article.printed)}; {escape(g.figures.track.note)}; "
         f"{g.figures.track.ma_v_per_g:.4g} V/g; its readings are {g.lag_s * 1e3:.2f} ms behind; "
-        f"limit: {g.article.scale * 1e2:.3g} % ({g.article.k_source}) and {g.article.zero_v * 1e3:.3g} mV of zero "
+        f"standard uncertainties: {np.hypot(g.article.gain_u, g.figures.track.gain_u) * 1e6:.3g} ppm "
+        f"({g.article.k_source}) and {np.hypot(g.article.zero_u_v, g.figures.track.zero_u_v) * 1e6:.3g} µV of zero "
         f"({g.article.zero_source})"
         f"{f'; {escape(g.article.why)}' if g.article.why else ''}"
         for g in c.graded

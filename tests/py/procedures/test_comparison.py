@@ -85,16 +85,26 @@ def test_scale_and_zero_come_out_as_they_went_in() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "scale", "zero_v"), [("pik6", 1.0012, 0.0), ("pik6", 1.0, 4e-4), ("pik", 0.9975, 0.0)]
+    ("name", "scale", "zero_v"),
+    [
+        ("pik6", 1.0013, 0.0),
+        ("pik6", 1.0, 4e-4),
+        ("pik", 0.996, 0.0),
+        ("psa2", 1.00025, 0.0),
+        ("psa2", 1.0, 6e-4),
+        ("pmka", 1.000005, 0.0),
+        ("pmka", 1.0, 1e-6),
+    ],
 )
-def test_beyond_the_printed_error_is_out_of_limits(name: str, scale: float, zero_v: float) -> None:
+def test_beyond_the_budget_of_its_board_is_out_of_limits(name: str, scale: float, zero_v: float) -> None:
     m = motion()
     good, bad = graded(track(name, m), m), graded(track(name, m, scale=scale, zero_v=zero_v), m)
     assert good.within
     assert not bad.within
     c = Comparison(graded=(good, bad), motion=m, params=PARAMS, g_mps2=G_MPS2, facts={})
     assert not c.within
-    assert comparison.verdict(c) == f"Out of limits: {GENERATIONS[name].title}."
+    assert comparison.verdict(c).startswith(f"Not within 2 U of the exact integral: {GENERATIONS[name].title}; ")
+    assert comparison.verdict(c).endswith(" of 6 end errors are beyond U.")
 
 
 def test_resolution_and_noise_of_a_staircase() -> None:
@@ -167,7 +177,7 @@ def test_tables_have_resolution_noise_drift_and_the_errors_beside_their_limits()
     assert all(x for row in (head, psd1, pik6) for x in row[1:])
     for i, axis in enumerate("XYZ"):
         assert float(psd1[head.index(f"end {axis}")]) == pytest.approx(good.end_mps[i], rel=0.1, abs=1e-9)
-        assert float(psd1[head.index(f"limit {axis}")]) == pytest.approx(good.limit_mps[i], rel=0.1)
+        assert float(psd1[head.index(f"U {axis}")]) == pytest.approx(good.u_mps[i], rel=0.1)
     assert (psd1[-1], pik6[-1]) == ("yes", "NO")
     assert pik6[head.index("printed")] == "0.05 %"
     assert "<td class='num bad'>NO</td>" in comparison_page.html_page(c)
