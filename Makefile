@@ -100,6 +100,7 @@ $(BUILD)/obj/%.o: %.cpp Makefile
 	$(call say,CXX)
 	$(Q)$(CXXCOMPILE) -MMD -MP -c -o $@ $<
 $(BUILD)/obj/build/gen/lcm/%.o: WARN := -w#   lcm-gen's code
+$(BUILD)/obj/emu/app/main.o: CPPFLAGS += -DPSABENCH_FLAGS='"$(strip $(filter-out -D%,$(STD)) $(SANFL) $(CFLAGS))"'#   psa-emu --version
 $(BUILD)/obj/%.o: %.c Makefile
 	$(call say,CC)
 	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<

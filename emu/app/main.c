@@ -14,6 +14,20 @@
 
 /* PSABENCH_VERSION comes from pyproject.toml by way of the Makefile. */
 #define VERSION TEXT_OF(PSABENCH_VERSION)
+#ifndef PSABENCH_FLAGS /* the compiler's options, which decide the last bit of a number; from the Makefile as well */
+#define PSABENCH_FLAGS "unknown"
+#endif
+
+static void print_version(void)
+{
+    puts("psa-emu " VERSION);
+#ifdef __clang__
+    puts("compiler: " __VERSION__);
+#else
+    puts("compiler: GCC " __VERSION__);
+#endif
+    puts("flags: " PSABENCH_FLAGS);
+}
 
 static int print_error(int status, const char *why)
 {
@@ -137,7 +151,7 @@ int main(int argc, char *argv[])
     signal(SIGXFSZ, SIG_IGN); /* a limit of the file size is an error of write(), as a full disk is */
     if (!options_parse(argc, argv, &o, why, sizeof why)) return print_error(SERVICE_INPUT, why);
     if (o.action == OPTIONS_HELP) options_print_help(stdout);
-    if (o.action == OPTIONS_VERSION) puts("psa-emu " VERSION);
+    if (o.action == OPTIONS_VERSION) print_version();
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);
     if (o.action == OPTIONS_LIST_SCPI) list_scpi(stdout);
     if (o.action == OPTIONS_LIST_FAULTS) list_faults(stdout);

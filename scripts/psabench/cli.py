@@ -13,6 +13,7 @@ from typing import Any
 
 from psabench.errors import BadInput, BenchError, output_error
 from psabench.options import Parser
+from psabench.report import provenance
 
 # Module and help line of each command. The module and its libraries are loaded when the command is called (`parse`).
 COMMANDS: Mapping[str, tuple[str, str]] = {
@@ -28,6 +29,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "waveform": ("logs.viewers", "write viewer files and pictures of a VCD file, install decoders and dissectors"),
     "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
+    "report": ("report.diff_command", "compare the results of two runs"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
 }
@@ -66,7 +68,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = parse(words)
         kept = getattr(args, "kept", "")
         handler: Callable[[argparse.Namespace], int] = args.handler
-        status = handler(args)
+        with provenance.command_run(["psabench", *words]):
+            status = handler(args)
         sys.stdout.flush()
         return status
     except BenchError as e:

@@ -17,10 +17,12 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from psabench.errors import BadInput, BenchError
 from psabench.link.control import Control
 from psabench.places import executable, find_emulator, own_emulators
+from psabench.report import provenance
 
 READY = re.compile(r'(?P<key>\w+)=(?P<value>"(?:[^"\\]|\\.)*"|\S*)')  # of a ready line
 START_S = 20.0  # timeout for "ready all": a bare emulator needs milliseconds, one under sanitizers in a guest seconds
@@ -56,6 +58,9 @@ class Emulator:
         for option, value in {"--seed": seed, **paths, "--scpi": "all:0" if scpi else None}.items():
             self.argv += [] if value is None else [option, str(value)]
         self.argv += [str(x) for x in extra]
+        self._scenario = str(scenario or "calibrate")
+        if "--resolved" not in self.argv and provenance.noted_run():
+            self.argv += ["--resolved", str(self.directory / "scenario.json")]
         self.endpoints: list[dict[str, str]] = []
         self._stderr = (self.directory / "stderr").open("w+b")
         self._messages = ""
@@ -71,6 +76,7 @@ class Emulator:
         )
         try:
             self._read_ready()
+            self._note_run()
         except BaseException:
             self.stop()
             raise
@@ -129,6 +135,18 @@ class Emulator:
         self._dir.cleanup()
         return status
 
+    def resolved(self) -> dict[str, Any]:
+        """The scenario with every key and the seed; {}: the emulator was not asked for it."""
+        if "--resolved" not in self.argv:
+            return {}
+        return read_resolved(Path(self.argv[self.argv.index("--resolved") + 1]))
+
+    def _note_run(self) -> None:
+        """For the provenance of a report."""
+        if provenance.noted_run():
+            provenance.note_program("psa-emu", Path(self.argv[0]))
+            provenance.note_scenario(self._scenario, self.resolved())
+
     def _read_ready(self) -> None:
         assert self._process is not None
         assert self._process.stdout is not None
@@ -149,6 +167,12 @@ class Emulator:
         for line in text.decode().splitlines():
             if line.startswith("ready ") and line != "ready all":
                 self.endpoints.append(dict(_key_value(m) for m in READY.finditer(line)))
+
+
+def read_resolved(path: Path) -> dict[str, Any]:
+    """What `psa-emu --resolved` wrote: the scenario with every key, and the seed."""
+    scenario: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return scenario
 
 
 def _key_value(m: re.Match[str]) -> tuple[str, str]:

@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING
 from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
 from psabench.campaign.runner import Plan
-from psabench.campaign.setup import Setup
+from psabench.campaign.setup import Setup, as_input
 from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput, expected
 from psabench.options import KEPT, Parser, natural, of_fields
+from psabench.places import find_emulator
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
+from psabench.report import provenance
 
 if TYPE_CHECKING:
     from psabench.campaign.page import Campaign
@@ -161,10 +163,21 @@ def campaign(options: Options, progress: Progress) -> Campaign:
     plans = _plans(options)
     if options.dask is not None:
         reach(options.dask)  # first: the store may have all results, and --fresh forgets what it has
-    with Store(options.store or options.out / "store.sqlite") as store:
+    _note_plans(plans, options)
+    with Store(options.store or options.out / "store.sqlite") as store, provenance.without_notes():
         for plan in plans:
             _fill(plan, store, options, progress)
         return report.gather(plans, store)
+
+
+def _note_plans(plans: Sequence[Plan], options: Options) -> None:
+    """The set-ups of all cases are the campaign's scenario; its emulators draw theirs from them."""
+    cases = {f"{c.study}, {c.name}": as_input(c.setup, c.hold) for p in plans for c in p.cases}
+    provenance.note_digest("cases", options.seed, cases)
+    if options.scenario is not None:
+        provenance.note_file("scenario", options.scenario)
+    if chains.CHAINS[plans[-1].chain].emulates:
+        provenance.note_program("psa-emu", find_emulator())
 
 
 def _plans(options: Options) -> list[Plan]:

@@ -15,6 +15,7 @@ from psabench.conform.verdict import Outcome
 from psabench.errors import BadInput, expected
 from psabench.link.protocol_files import dbc_node
 from psabench.progress import Bar
+from psabench.report import provenance
 
 
 def handle(args: argparse.Namespace) -> int:
@@ -33,6 +34,8 @@ def handle(args: argparse.Namespace) -> int:
         interrupted = True
     outcomes += [] if interrupted else recording.untested(rows, outcomes)
     facts = _facts(bench)
+    for path in args.files:
+        provenance.note_file("recording", path)
     run = report.Run(
         suite="recording",
         subject=v.name,

@@ -21,6 +21,7 @@ from psabench.errors import BadInput, expected
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
 from psabench.logs.formats import READABLE
+from psabench.report import provenance
 
 COLUMNS = ("call", "argument", "answer", "t_s", "frames")
 SETUP, END = "setup", "end"
@@ -89,8 +90,11 @@ class Calls:
         try:
             self.setup: dict[str, Any] = dict(json.loads(row["argument"]))
             _ = dict(self.setup["facts"]), self.setup["procedure"]
+            provenance.note_recorded(self.setup)
         except (ValueError, KeyError, TypeError) as e:
             raise self.no_setup() from e
+        for role, path in (("recording", log), ("calls", self.path)):
+            provenance.note_file(role, path)
 
     def no_setup(self) -> BadInput:
         """Of a first row that does not say how the run was."""

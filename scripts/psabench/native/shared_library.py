@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 
 from psabench.errors import BadInput, expected
 from psabench.places import find_library
+from psabench.report.provenance import note_library
 
 
 class SharedLibrary:
@@ -43,6 +44,7 @@ class SharedLibrary:
         """The library of that file name. Raises BadInput when it is nowhere or of another ABI."""
         path = find_library(name, cls.variable)
         if path is not None:
+            note_library(name, path)
             return cls(str(path))
         try:
             return cls(name)

@@ -21,6 +21,7 @@ import numpy as np
 from psabench.bench import Bench
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.gum import COVERAGE
+from psabench.emulator import read_resolved
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.own import output_text
 from psabench.link.signals import Floats
@@ -293,17 +294,14 @@ def compare(
     """Start an emulator with the scenario, measure, grade. record: a log of the run for `replay`. Raises BenchError."""
     out.mkdir(parents=True, exist_ok=True)
     name = scenario or measured.SCENARIO
-    facts = {
-        "scenario": str(name),
-        "seed": "of the scenario" if seed is None else str(seed),
-        "recorded": f"{p.seconds:g} s",
-        "g": f"{G_MPS2} m/s²",
-    }
+    resolved = out / "scenario-converters.json"
     with tempfile.TemporaryDirectory(prefix="psabench-") as folder, ExitStack() as stack:
         log = Path(folder) / "truth.jsonl"
         extra: list[str | Path] = ["--truth-log", log, "--truth-every", f"{TRUTH_EVERY_S * 1e3:g}ms"]
-        extra += ["--resolved", out / "scenario-converters.json"]
+        extra += ["--resolved", resolved]
         with Bench.start(name, seed=seed, extra=extra) as bench:
+            facts = {"scenario": str(name), "seed": str(read_resolved(resolved)["seed"])}
+            facts |= {"recorded": f"{p.seconds:g} s", "g": f"{G_MPS2} m/s²"}
             heard: Any = bench
             if record:
                 setup = {"procedure": measured.NAME, "facts": facts}

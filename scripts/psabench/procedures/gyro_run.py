@@ -5,7 +5,6 @@ Without --can and --control each reading gets an emulator of its own with the sa
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.gyro.device import Gyro
+from psabench.emulator import read_resolved
 from psabench.errors import BadInput, expected
 from psabench.logs.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures import gyrocompass, heading_hold
@@ -63,14 +63,15 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
 
 
 def facts(options: GyroOptions) -> dict[str, str]:
-    """What the report says of the run."""
+    """What the report says of the run, once its bench has been there."""
     if options.replay:
         return {str(k): str(v) for k, v in Calls(options.replay).setup["facts"].items()}
     there = " ".join(str(x) for x in (options.can, options.control) if x)
+    resolved = _resolved(options)
     return {
         "procedure": options.procedure,
         "bench": there or str(options.scenario or SCENARIO),
-        "seed": "of the scenario" if options.seed is None else str(options.seed),
+        **({"seed": str(read_resolved(resolved)["seed"])} if resolved else {}),
         "pace": "real time" if options.real_time else "simulated time",
     }
 
@@ -139,7 +140,7 @@ def _resolved(options: GyroOptions) -> Path | None:
 def _site(options: GyroOptions) -> dict[str, float]:
     """The latitude that an operator at the scenario's site knows; {}: no one says where the bench is."""
     path = _resolved(options)
-    site = json.loads(path.read_text(encoding="utf-8")).get("site", {}) if path else {}
+    site = read_resolved(path).get("site", {}) if path else {}
     return {"latitude_deg": float(site["latitude_deg"])} if "latitude_deg" in site else {}
 
 

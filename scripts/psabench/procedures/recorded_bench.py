@@ -23,6 +23,7 @@ from psabench.errors import BadInput, BenchError, expected
 from psabench.link.can_host import CanHost, Listener
 from psabench.logs.call_log import END, SETUP, Calls, CallWriter, check_ending
 from psabench.logs.formats import KEEPS, read_frames
+from psabench.report.provenance import noted_scenarios
 
 STAMP_DIGITS = 6  # of a second: what all formats keep that keep instants
 Board = TypeVar("Board", bound=Unit)
@@ -99,7 +100,9 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
             inner.listeners[:] = [_Keeper(self, k, host)]
         buses = list(bench.hosts.values())
         units = [[n, u.board, u.node.node_id, buses.index(u.host)] for n, u in bench.units.items()]
-        self._store_call(SETUP, json.dumps({**setup, "buses": len(buses), "units": units}))
+        self._store_call(
+            SETUP, json.dumps({**setup, "buses": len(buses), "units": units, "scenarios": noted_scenarios()})
+        )
 
     def keep_frame(self, bus: int, host: _Host, message: can.Message) -> None:
         """A frame that has come, into the log and to the unit."""

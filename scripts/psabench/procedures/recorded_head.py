@@ -29,6 +29,7 @@ from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
 from psabench.logs.call_log import SETUP, Calls, CallWriter, check_ending
 from psabench.procedures.head_bench import HeadBench
+from psabench.report.provenance import noted_scenarios
 
 LONGEST_S = 1e9  # of a recording
 SDO_ANSWER = 0x580
@@ -44,7 +45,7 @@ class HeadRecorder(AbstractContextManager["HeadRecorder"]):
         self._bench, self._host = bench, host
         self._calls = CallWriter(path)
         host.listeners.append(self._calls.keep_frame)
-        self._store(SETUP, json.dumps(setup), "")
+        self._store(SETUP, json.dumps({**setup, "scenarios": noted_scenarios()}), "")
 
     def _store(self, call: str, argument: str, answer: str) -> None:
         self._calls.store_call(call, argument, answer, self._bench.t_s)

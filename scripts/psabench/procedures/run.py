@@ -17,6 +17,7 @@ from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.budget.influences import expand_result
+from psabench.emulator import read_resolved
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
@@ -62,10 +63,9 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
     if options.record and len(options.procedures) * len(_conditions(options)) != 1:
         raise BadInput(expected("one procedure on one bench (--condition quiet or realistic)", "several", "--record"))
     options.out.mkdir(parents=True, exist_ok=True)
-    sections = []
-    for condition in _conditions(options):
-        for name in options.procedures:
-            sections.append(measure_section(PROCEDURES[name], condition, options, progress))
+    sections = [
+        measure_section(PROCEDURES[n], c, options, progress) for c in _conditions(options) for n in options.procedures
+    ]
     page = report.write(options.out, sections, facts=_facts(options))
     return page, sections
 
@@ -145,10 +145,13 @@ def _bench(condition: Condition, options: RunOptions) -> Bench:
         return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
-    resolved = options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
-    # Every key with its value, and the seed: the run can be repeated from it.
-    extra: list[str | Path] = ["--resolved", resolved]
+    extra: list[str | Path] = ["--resolved", _resolved(condition, options)]
     return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
+
+
+def _resolved(condition: Condition, options: RunOptions) -> Path:
+    """Every key with its value, and the seed: the run can be repeated from it."""
+    return options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
 
 
 def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
@@ -158,7 +161,9 @@ def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
 
 
 def _facts(options: RunOptions) -> dict[str, str]:
+    """For the head of the page, once the benches have been there."""
     there = " ".join(str(x) for x in (options.can, options.head, options.control) if x)
     where = there or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))
-    seed = "of the scenario" if options.seed is None else str(options.seed)
-    return {"bench": where, "seed": seed, "pace": "real time" if options.real_time else "simulated time"}
+    seeds = {} if there else {read_resolved(_resolved(c, options))["seed"]: None for c in _conditions(options)}
+    seed = {"seed": ", ".join(map(str, seeds))} if seeds else {}
+    return {"bench": where, **seed, "pace": "real time" if options.real_time else "simulated time"}

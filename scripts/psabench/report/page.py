@@ -6,13 +6,17 @@ Texts given as `str` are HTML where the parameter says so, and are escaped every
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from psabench.link.own import replace_file
+from psabench.report.provenance import KEY, provenance_of_run
 
+PAGE_NAME = "report.html"
 PAGE = """<!doctype html>
 <html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width, initial-scale=1">
 <title>@TITLE@</title>
@@ -54,6 +58,7 @@ thead th { color: var(--muted); font-weight: 500; font-size: .85rem; } tbody th 
 figure { margin: 1rem 0 0; } figure svg { width: 100%; height: auto; max-width: 52rem; display: block; }
 details { margin-top: .8rem; } summary { cursor: pointer; color: var(--muted); } .notes { font-size: .9rem; }
 sub { font-size: .72em; line-height: 0; }
+footer { color: var(--muted); font-size: .85rem; margin-top: 1.6rem; } footer td { overflow-wrap: anywhere; }
 @media print { body { max-width: none; } section { break-inside: avoid; } }
 </style></head><body>
 @BODY@
@@ -64,12 +69,14 @@ sub { font-size: .72em; line-height: 0; }
 def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: str = "result.json") -> Path:
     """Writes `data` and report.html into `folder` (made if missing), each whole or not at all; returns the page.
 
-    Raises OSError, OutputError.
+    Both get the provenance of the run: the last key, the foot of the page. Raises OSError, OutputError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    replace_file(folder / json_name, json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    replace_file(folder / "report.html", page)
-    return folder / "report.html"
+    origin = provenance_of_run()
+    whole = {**data, KEY: origin}
+    replace_file(folder / json_name, json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    replace_file(folder / PAGE_NAME, page.replace("</body>", f"{provenance_foot(origin)}\n</body>"))
+    return folder / PAGE_NAME
 
 
 def verdict_line(text: str, good: bool | None) -> str:
@@ -125,3 +132,24 @@ def whole_page(title: str, facts: Mapping[str, str], sections: Iterable[str]) ->
     header = f"<header><h1>{escape(title)}</h1><p class=facts>{told}</p></header>"
     body = "\n".join([header, *(s for s in sections if s)])
     return PAGE.replace("@TITLE@", escape(title)).replace("@BODY@", body)
+
+
+def provenance_foot(origin: Mapping[str, Any]) -> str:
+    """The provenance of a result as the foot of its page; `page_without_foot` takes it away."""
+    rows = [(name, words) for name, value in origin.items() if (words := provenance_words(value))]
+    return f"<footer><h2>Provenance</h2>{table(rows, 0, numeric=False)}</footer>"
+
+
+def provenance_words(value: object) -> str:
+    """A value of the provenance in one line; "": there is none."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} {provenance_words(v)}" for k, v in value.items() if v not in (None, "", [], {}))
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        rows = any(isinstance(v, Mapping) for v in value)
+        return "; ".join(map(provenance_words, value)) if rows else shlex.join(map(str, value))
+    return "" if value is None else str(value)
+
+
+def page_without_foot(page: str) -> str:
+    """A page as it was before `write_report` wrote who made it, and when."""
+    return re.sub(r"<footer>.*?</footer>\n", "", page, flags=re.DOTALL)

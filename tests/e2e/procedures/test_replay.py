@@ -13,15 +13,20 @@ from psabench.emulator import Emulator
 from psabench.link.log_file import FORMATS, LogFile
 from psabench.logs.call_log import calls_path
 from psabench.logs.formats import READABLE, read_frames
+from psabench.report.diff import read_result, report_without_provenance
 from rig import PSABENCH
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]
 
-RESULTS = ("result.json", "report.html")
-
 
 def run(*args: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([PSABENCH, "run", *map(str, args)], capture_output=True, text=True, timeout=120)
+
+
+def check_same(again: Path, live: Path, readings: str) -> None:
+    """The same report but for its provenance, the same bytes of readings."""
+    assert report_without_provenance(again) == report_without_provenance(live)
+    assert (again / readings).read_bytes() == (live / readings).read_bytes()
 
 
 def recorded(folder: Path, ending: str, procedure: str, *params: str) -> Path:
@@ -62,8 +67,7 @@ def test_a_replay_gives_the_live_results(procedure: str, ending: str, tmp_path: 
     log = recorded(tmp_path, ending, procedure, "--average", "4", "--realisations", "2")
     done = run(procedure, "--replay", log, "--realisations", "2", "--out", tmp_path / "again")
     assert done.returncode in (0, 1), done.stderr
-    for name in (*RESULTS, f"{procedure}.csv"):
-        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "live" / name).read_bytes(), name
+    check_same(tmp_path / "again", tmp_path / "live", f"{procedure}.csv")
 
 
 def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
@@ -79,6 +83,9 @@ def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
         tmp_path / "live" / name
     ).read_bytes()  # recording changes nothing
     assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "live" / name).read_bytes()
+    live_from, again_from = (read_result(tmp_path / x)["provenance"] for x in ("live", "again"))
+    assert again_from["scenarios"] == live_from["scenarios"]  # the recording names them
+    assert (again_from["seed"], [f["role"] for f in again_from["files"]]) == (1, ["recording", "calls"])
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +102,7 @@ def test_a_recording_in_every_format_gives_the_live_results(ending: str, turns: 
     assert out.close() == len(turns.read_text().splitlines())
     shutil.copy(calls_path(turns), calls_path(log))
     assert cli.main(["run", "turns", "--replay", str(log), "--realisations", "2", "--out", str(tmp_path)]) in (0, 1)
-    for name in (*RESULTS, "turns.csv"):
-        assert (tmp_path / name).read_bytes() == (turns.parent / "live" / name).read_bytes(), name
+    check_same(tmp_path, turns.parent / "live", "turns.csv")
 
 
 def edited(turns: Path, folder: Path, old: str, new: str) -> Path:

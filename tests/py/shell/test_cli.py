@@ -307,6 +307,7 @@ LIGHT: list[tuple[str, set[str]]] = [  # a command line, and what reading it may
     ("waveform run.vcd --wavedrom run.json", set()),
     ("tap slcan port run.pcap", set()),
     ("campaign gyrocompass --runs 3", {"numpy"}),
+    ("report diff build/a build/b", set()),
     ("conform --help", set()),
     ("conform device --board psa2", set()),
     ("conform recording run.log --board psa2", set()),

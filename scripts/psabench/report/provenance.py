@@ -1,0 +1,205 @@
+"""Where a result comes from: who computed it, when, from what; the key `provenance` of result.json, the foot of a page.
+
+`cli.main` opens a run with `command_run`; whoever starts an emulator, reads a recording or loads a library notes it
+there. Outside of a run notes are dropped. Nothing else of a report depends on what is noted: the same seed gives the
+same bytes but for this block.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from psabench.places import CHECKOUT
+
+FORMAT = 1  # of the block
+KEY = "provenance"  # of result.json and conform.json
+LIBRARIES = ("numpy", "scipy")  # that numbers depend on
+GIT_S = 5.0  # timeout
+
+
+@dataclass(slots=True, kw_only=True)
+class Run:
+    """One command under way, and what it has used."""
+
+    words: tuple[str, ...]
+    begun: datetime
+    start_s: float  # time.monotonic
+    scenarios: list[dict[str, Any]] = field(default_factory=list)
+    files: list[dict[str, Any]] = field(default_factory=list)
+    programs: dict[str, Path] = field(default_factory=dict)
+    closed: bool = False  # to notes
+
+
+_runs: list[Run] = []  # the last is the one under way; a list of the process: emulators are started from any thread
+_loaded: dict[str, Path] = {}  # libraries of this process
+
+
+@contextmanager
+def command_run(words: Sequence[str]) -> Iterator[Run]:
+    """A run of these words of a command line; reports written in it name them and what was noted."""
+    run = Run(words=tuple(words), begun=datetime.now(UTC), start_s=time.monotonic())
+    _runs.append(run)
+    try:
+        yield run
+    finally:
+        _runs.remove(run)
+
+
+def noted_run() -> Run | None:
+    """The run that takes notes; None: there is none."""
+    return _runs[-1] if _runs and not _runs[-1].closed else None
+
+
+@contextmanager
+def without_notes() -> Iterator[None]:
+    """For a command that starts emulators by the hundred and names their common scenario itself."""
+    run = noted_run()
+    if run is not None:
+        run.closed = True
+    try:
+        yield
+    finally:
+        if run is not None:
+            run.closed = False
+
+
+# ---- notes
+
+
+def note_scenario(name: str, resolved: Mapping[str, Any]) -> None:
+    """A scenario with every key, as `psa-emu --resolved` writes it."""
+    if run := noted_run():
+        row = {"name": Path(name).stem, **scenario_digest(resolved)}
+        run.scenarios += [] if row in run.scenarios else [row]
+
+
+def note_recorded(setup: Mapping[str, Any]) -> None:
+    """The scenarios of a run that is replayed, from its set-up."""
+    if run := noted_run():
+        run.scenarios += [row for row in setup.get("scenarios", []) if row not in run.scenarios]
+
+
+def noted_scenarios() -> list[dict[str, Any]]:
+    """Those of the run under way, for the set-up of a recording."""
+    run = noted_run()
+    return list(run.scenarios) if run else []
+
+
+def note_digest(name: str, seed: int, value: object) -> None:
+    """What a command without an emulator computes from, as JSON has it."""
+    if run := noted_run():
+        run.scenarios.append({"name": name, "seed": seed, "sha256": _digest(value)})
+
+
+def note_file(role: str, path: Path) -> None:
+    """A file that the result depends on: recording, passport, scenario."""
+    if (run := noted_run()) and path.is_file():
+        row = {"role": role, "name": path.name, "sha256": _file_digest(path)}
+        run.files += [] if row in run.files else [row]
+
+
+def note_program(name: str, path: Path) -> None:
+    """A program of ours that was started."""
+    if run := noted_run():
+        run.programs[name] = path
+
+
+def note_library(name: str, path: Path) -> None:
+    """A library of ours that this process has loaded, for the rest of its life."""
+    _loaded[name] = path
+
+
+def scenario_digest(resolved: Mapping[str, Any]) -> dict[str, Any]:
+    """Seed, and SHA-256 of a resolved scenario without its seed, of its profiles and of its sensors' passports."""
+    body = {k: v for k, v in resolved.items() if k not in ("seed", "version")}
+    units = body.get("units", [])
+    profiles = {u["profile_set"]["name"]: _digest(u["profile_set"]) for u in units if "profile_set" in u}
+    return {
+        "seed": int(resolved["seed"]),
+        "sha256": _digest(body),
+        "profiles": dict(sorted(profiles.items())),
+        "passports_sha256": _digest([[u.get("name"), u.get("axes"), u.get("spread")] for u in units]),
+    }
+
+
+def _digest(value: object) -> str:
+    """SHA-256 of JSON: keys in order, no blanks."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _file_digest(path: Path) -> str:
+    with path.open("rb") as f:
+        return hashlib.file_digest(f, "sha256").hexdigest()
+
+
+# ---- the block
+
+
+def provenance_of_run() -> dict[str, Any]:
+    """The block of a report that is written now: plain data. Outside of a run: who and when, and no more."""
+    run = _runs[-1] if _runs else None
+    binaries = _loaded | (run.programs if run else {})
+    return {
+        "format": FORMAT,
+        "psabench": _version("psabench"),
+        "revision": _revision(),
+        "python": platform.python_version(),
+        "libraries": {name: _version(name) for name in LIBRARIES if name in sys.modules},
+        "machine": f"{platform.system()} {platform.machine()}",
+        "binaries": [_binary(name, path) for name, path in sorted(binaries.items()) if path.is_file()],
+        "command": list(run.words) if run else None,
+        "begun": (run.begun if run else datetime.now(UTC)).isoformat(timespec="seconds"),
+        "duration_s": round(time.monotonic() - run.start_s, 3) if run else None,
+        "seed": _seed(run) if run else None,
+        "scenarios": list(run.scenarios) if run else [],
+        "files": list(run.files) if run else [],
+    }
+
+
+def _seed(run: Run) -> int | None:
+    """The one that all scenarios have; each names its own as well."""
+    seeds = {s["seed"] for s in run.scenarios}
+    return seeds.pop() if len(seeds) == 1 else None
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _revision() -> str | None:
+    """`git describe` of the checkout that this program runs from; None: it is installed."""
+    if not (CHECKOUT / ".git").exists():
+        return None
+    return _output("git", "-C", str(CHECKOUT), "describe", "--tags", "--always", "--dirty")
+
+
+def _binary(name: str, path: Path) -> dict[str, Any]:
+    """SHA-256; of the emulator its version, compiler and flags, too: they decide the last bit."""
+    told = (_output(str(path), "--version") or "").splitlines() if name == "psa-emu" else []
+    lines = dict(line.split(": ", 1) for line in told[1:] if ": " in line)
+    own = {"version": told[0].removeprefix("psa-emu "), **lines} if told else {}
+    return {"name": name, "sha256": _file_digest(path), **own}
+
+
+def _output(*command: str) -> str | None:
+    """Standard output of a program; None: there is none, or it fails."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
