@@ -55,6 +55,11 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
         "help": "emulated bench (%(default)s)",
     },
     "--scenario": {"type": Path, "metavar": "FILE", "help": "scenario of the emulator (the procedure's default)"},
+    "--passport": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "nominal values of the sensor to compare with: YAML of u0_v, kx_v_per_g ... (the scenario's)",
+    },
     "--can": {
         "metavar": "BUS",
         "help": "CAN bus of an existing bench, as INTERFACE:CHANNEL[,key=value...] of python-can: "
@@ -248,6 +253,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     from psabench.procedures.registry import PROCEDURES
     from psabench.report import calibration as report
     from psabench.report import grading
+    from psabench.report.nominal import console_nominal
 
     options = of_fields(
         run.RunOptions,
@@ -258,13 +264,13 @@ def _calibrate(args: argparse.Namespace) -> int:
         params=_params(args),
     )
     with progress_of(args) as told:
-        page, sections = run.run(options, told.progress)
+        page, sections, nominal = run.run(options, told.progress)
         for s in sections:
             told.result(s.result.procedure, s.label, s.result.estimates, report.within_limits([s]))
     if args.verbose:
         for section in sections:
             print(report.console_table(section))
-        print(grading.console_comparison(sections))
+        print(console_nominal(sections, nominal), end="")
     print(grading.verdict(sections))
     print(f"report: {page}")
     return 0 if report.within_limits(sections) else 1

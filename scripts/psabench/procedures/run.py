@@ -30,6 +30,7 @@ from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration as report
 from psabench.report.grading import Section
+from psabench.report.nominal import Nominal, nominal_dict, nominal_of_dict, nominal_of_scenario, read_passport
 
 CODE_V, WORD_V = 10.0 / 2**23, 10.0 / 2**30  # resolution at the load: of a code of the stream, of a whole word
 
@@ -53,21 +54,26 @@ class RunOptions:
     g_mps2: float | None = None  # local gravity; None: the condition's, standard gravity on another bench
     record: Path | None = None  # CAN log of the run, its calls beside it
     replay: Path | None = None  # such a log instead of a bench
+    passport: Path | None = None  # nominal values of the sensor
     params: Mapping[str, Any] | None = None  # fields of the procedures' parameters, by name
 
 
-def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
-    """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken."""
+def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section], Nominal | None]:
+    """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken.
+
+    Returns the page, what it shows, and what the sensor is said to be.
+    """
+    passport = None if options.passport is None else read_passport(options.passport)
     if options.replay:
-        return _replay_run(options, progress)
+        return _replay_run(options, progress, passport)
     if options.record and len(options.procedures) * len(_conditions(options)) != 1:
         raise BadInput(expected("one procedure on one bench (--condition quiet or realistic)", "several", "--record"))
     options.out.mkdir(parents=True, exist_ok=True)
     sections = [
         measure_section(PROCEDURES[n], c, options, progress) for c in _conditions(options) for n in options.procedures
     ]
-    page = report.write(options.out, sections, facts=_facts(options))
-    return page, sections
+    nominal = passport or _nominal(options, sections[0].result.axis)
+    return report.write(options.out, sections, _facts(options), nominal), sections, nominal
 
 
 def _conditions(options: RunOptions) -> list[Condition]:
@@ -92,6 +98,7 @@ def measure_section(procedure: Procedure, condition: Condition, options: RunOpti
             setup = {"procedure": procedure.name, "condition": condition.label, "average": average, "g_mps2": g_mps2}
             setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "facts": _facts(options)}
             setup |= {"accuracy": asdict(accuracy)}
+            setup |= {"nominal": nominal_dict(_nominal(options, params.axis))}
             on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
         result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
@@ -111,7 +118,9 @@ def _step_v(average: int) -> float:
     return CODE_V if average else WORD_V
 
 
-def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section]]:
+def _replay_run(
+    options: RunOptions, progress: Progress, passport: Nominal | None
+) -> tuple[Path, list[Section], Nominal | None]:
     """The procedure that was recorded, on the recording: the same results and report, but for a truth."""
     assert options.replay is not None
     head = RecordedHead(options.replay)
@@ -129,7 +138,8 @@ def _replay_run(options: RunOptions, progress: Progress) -> tuple[Path, list[Sec
     result = expand_result(result, procedure, params, accuracy, _step_v(int(head.setup["average"])))
     section = Section(label=label, result=result, truth=None)
     facts = {str(k): str(v) for k, v in head.setup["facts"].items()}
-    return report.write(options.out, [section], facts=facts), [section]
+    nominal = passport or nominal_of_dict(head.setup.get("nominal"))
+    return report.write(options.out, [section], facts, nominal), [section], nominal
 
 
 def _there(options: RunOptions) -> bool:
@@ -152,6 +162,15 @@ def _bench(condition: Condition, options: RunOptions) -> Bench:
 def _resolved(condition: Condition, options: RunOptions) -> Path:
     """Every key with its value, and the seed: the run can be repeated from it."""
     return options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
+
+
+def _nominal(options: RunOptions, axis: str) -> Nominal | None:
+    """What the scenario says of the sensor, once its bench has been there; None: the bench is not ours."""
+    if _there(options):
+        return None
+    condition = _conditions(options)[0]
+    resolved = read_resolved(_resolved(condition, options))
+    return nominal_of_scenario(resolved, axis, options.node, Path(condition.scenario).name)
 
 
 def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:

@@ -6,7 +6,6 @@ write(folder, [Section(label="quiet", result=r, truth=truth)], facts={"seed": "7
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -16,10 +15,8 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.result import LIMIT_CI
 from psabench.procedures.run_table import ON_THE_HEAD
 from psabench.report.grading import (
-    ARTICLE,
     Graded,
     Section,
-    as_printed,
     as_ratio,
     console_table,
     grade,
@@ -28,18 +25,23 @@ from psabench.report.grading import (
     with_ci,
     within_limits,
 )
+from psabench.report.nominal import Nominal, nominal_dict, nominal_section
 from psabench.report.page import bullets, figure, folded, html_table, section, verdict_line, whole_page, write_report
+from psabench.report.quantities import DAGGER as _DAGGER
+from psabench.report.quantities import symbol_html as _symbol
 
 __all__ = ["Section", "console_table", "html_page", "within_limits", "write"]
 
 FORMAT = 1  # of result.json
-_DAGGER = "<span class=flag title='not identifiable'>†</span>"
 
 
-def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | None = None) -> Path:
+def write(
+    folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | None = None, nominal: Nominal | None = None
+) -> Path:
     """Write report.html and result.json into `folder` (made when missing), each whole or not at all.
 
-    Returns the page. `facts` (seed, profile, version...) go into both as they are. Raises ValueError for no section,
+    Returns the page. `facts` (seed, profile, version...) go into both as they are; nominal: what the sensor is said to
+    be. Raises ValueError for no section,
     OSError and OutputError from the disk.
     """
     if not sections:
@@ -49,18 +51,18 @@ def write(folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | 
         "format": FORMAT,
         "facts": dict(facts),
         "within_limits": within_limits(sections),
-        "article": {name: printed for name, _, _, printed in ARTICLE},
+        "nominal": nominal_dict(nominal),
         "sections": [result_dict(s) for s in sections],
     }
-    return write_report(folder, data, html_page(sections, facts))
+    return write_report(folder, data, html_page(sections, facts, nominal))
 
 
-def html_page(sections: Sequence[Section], facts: Mapping[str, str]) -> str:
+def html_page(sections: Sequence[Section], facts: Mapping[str, str], nominal: Nominal | None = None) -> str:
     """The whole page. Same input, same bytes."""
     body = [
         _verdict(sections),
-        _comparison(sections),
-        _alpha0(sections),
+        nominal_section(sections, nominal),
+        _alpha0(sections, nominal),
         *(_section(s, f"f{i}") for i, s in enumerate(sections)),
         _method(),
     ]
@@ -72,40 +74,13 @@ def _verdict(sections: Sequence[Section]) -> str:
     return verdict_line(verdict(sections), within_limits(sections) if compared else None)
 
 
-def _comparison(sections: Sequence[Section]) -> str:
-    """The article's printed values beside ours."""
-    head = "".join(f"<th>{escape(s.title)}</th>" for s in sections)
-    rows = []
-    for name, symbol, unit, printed in ARTICLE:
-        cells = "".join(f"<td>{_beside(s, name, printed)}</td>" for s in sections)
-        first = f"<th>{_symbol(symbol)}</th><td class=num>{printed}</td><td class=unit>{unit}</td>"
-        rows.append(f"<tr>{first}{cells}</tr>")
-    return section(
-        "Beside the article",
-        html_table(f"<tr><th></th><th>printed</th><th></th>{head}</tr>", "".join(rows), "cmp"),
-        "<p class=small>Large: our value with the digits that the article prints (green: the same). "
-        f"Below it: the value with its 95 % interval. {_DAGGER} not identifiable from these data.</p>",
-    )
-
-
-def _beside(s: Section, name: str, printed: str) -> str:
-    found = next((e for e in s.result.estimates if e.name == name), None)
-    if found is None:
-        return "<span class=none>–</span>"
-    ours = as_printed(found.value, printed)
-    kind = "same" if ours == printed else "other"
-    flag = "" if found.identifiable else _DAGGER
-    value, ci = with_ci(found.value, found.ci_half, most=6)
-    return f"<span class={kind}>{ours}</span>{flag}<br><span class=ci>{value} ± {ci}</span>"
-
-
-def _alpha0(sections: Sequence[Section]) -> str:
+def _alpha0(sections: Sequence[Section], nominal: Nominal | None) -> str:
     from psabench.report import plots as report_plots  # matplotlib takes a second: the shell and --help do without
 
-    picture = report_plots.alpha0_figure(sections)
+    picture = report_plots.alpha0_figure(sections, nominal)
     if picture is None:
         return ""
-    caption = "Green: identifiable. Orange: flagged. Dashed: the truth, or the printed value where there is none."
+    caption = "Green: identifiable. Orange: flagged. Dashed: the truth, or the nominal value where there is none."
     return section("The mounting error α₀, 95 % intervals", figure(report_plots.svg(picture, "alpha0"), caption))
 
 
@@ -215,12 +190,6 @@ def _correlation_cell(v: float) -> str:
     ground = "var(--s1)" if v < 0 else "var(--s2)"
     style = f"background:color-mix(in srgb, {ground} {shade}%, transparent)"
     return f'<td class=num style="{style}">{v:+.3f}</td>'
-
-
-def _symbol(text: str) -> str:
-    """k_xy -> k<sub>xy</sub>, alpha0 -> α<sub>0</sub>, as the article writes them."""
-    text = re.sub(r"\balpha0\b", "α_0", text)
-    return re.sub(r"\b([A-Za-zα])_([a-z0-9]{1,2})(?![a-z0-9])", r"\1<sub>\2</sub>", text)
 
 
 def _method() -> str:

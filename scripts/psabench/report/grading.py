@@ -1,4 +1,4 @@
-"""Estimates beside the truth and beside the article: tables as data, for the console, the report and result.json.
+"""Estimates beside the truth: tables as data, for the console, the report and result.json.
 
 Truth comes from the truth port after the run, as a mapping with the names of the emulator's scenario (u0_v, alpha0_deg,
 kx_v_per_g, ... kyy_v_per_g2, drift_v_per_s); no procedure ever sees it.
@@ -17,15 +17,6 @@ from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import LIMIT_CI, ProcedureResult
-
-# Printed by the article for its sensor, to these digits.
-ARTICLE = (
-    ("u0_v", "u_0", "V", "2.50"),
-    ("alpha0_deg", "α_0", "deg", "0.1121"),
-    ("kx_v_per_g", "k_x", "V/g", "1.0"),
-    ("ky_v_per_g", "k_y", "V/g", "0.0098"),
-    ("kxy_v_per_g2", "k_xy", "V/g²", "0.0010"),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,11 +103,6 @@ def _graded(e: Estimate, truth: float | None) -> Graded:
 def within_limits(sections: Sequence[Section]) -> bool:
     """Nothing that counts as measured misses the truth by more than its limits (exit status 0 or 1)."""
     return not any(g.within is False for s in sections for g in grade(s))
-
-
-def as_printed(value: float, printed: str) -> str:
-    """A value with as many decimals as the article prints."""
-    return f"{value:.{len(printed.partition('.')[2])}f}"
 
 
 def with_ci(value: float, ci_half: float, most: int = 9) -> tuple[str, str]:
@@ -228,23 +214,6 @@ def verdict(sections: Sequence[Section]) -> str:
     return text + (
         f" {flagged} numbers are flagged and not compared: the data do not determine them." if flagged else ""
     )
-
-
-def console_comparison(sections: Sequence[Section]) -> str:
-    """The article's printed values beside ours, with its digits; `?` marks what is not identifiable."""
-    rows = [
-        ("", "", *(s.result.procedure for s in sections)),
-        ("", "printed", *(s.label for s in sections)),
-    ]
-    for name, _, _, printed in ARTICLE:
-        found = [next((e for e in s.result.estimates if e.name == name), None) for s in sections]
-        rows.append((name, printed, *("-" if e is None else _beside(e, printed) for e in found)))
-    head = "beside the article, with its digits (?: not identifiable from these data)"
-    return "\n".join([head, *(f"  {line}" for line in aligned(rows))])
-
-
-def _beside(e: Estimate, printed: str) -> str:
-    return as_printed(e.value, printed) + ("" if e.identifiable else "?")
 
 
 def _mark(g: Graded) -> str:

@@ -17,8 +17,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from psabench.estimate import harmonics
+from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.result import FaceSeries
-from psabench.report.grading import ARTICLE, Section, sensor_of
+from psabench.report.grading import Section, sensor_of
+from psabench.report.nominal import Nominal
 
 # Stand-ins that matplotlib can draw with -> what the page defines. Series colours keep their contrast on both grounds.
 INK, MUTED, _GRID = "#010203", "#010204", "#010205"
@@ -145,20 +147,32 @@ def second_harmonic_figure(section: Section) -> Figure:
         return figure
 
 
-def alpha0_figure(sections: Sequence[Section]) -> Figure | None:
-    """95 % intervals of alpha0, all of them and near the truth; None when no section has an alpha0."""
+def _alpha0_centre(rows: Sequence[tuple[Section, Estimate]], nominal: Nominal | None) -> tuple[float, str]:
+    """Where the near picture is, deg, and what is there; "": an estimate, and nothing to compare it with."""
+    truth = next((s.truth for s, _ in rows if s.truth is not None), None)
+    if truth is not None:
+        return math.degrees(sensor_of(truth).alpha0_rad), "the truth"
+    said_deg = nominal.number("alpha0_deg") if nominal else None
+    if said_deg is not None:
+        return said_deg, "the nominal value"
+    return min((e for _, e in rows), key=lambda e: e.ci_half).value, ""
+
+
+def alpha0_figure(sections: Sequence[Section], nominal: Nominal | None) -> Figure | None:
+    """95 % intervals of alpha0, all of them and near the truth, the nominal value, or the narrowest of them; None when
+    no section has an alpha0.
+    """
     rows = [(s, e) for s in sections for e in s.result.estimates if e.name == "alpha0_deg"]
     if not rows:
         return None
-    printed_deg = next(float(text) for name, _, _, text in ARTICLE if name == "alpha0_deg")
-    truth = next((s.truth for s, _ in rows if s.truth is not None), None)
-    centre_deg = math.degrees(sensor_of(truth).alpha0_rad) if truth is not None else printed_deg
+    centre_deg, words = _alpha0_centre(rows, nominal)
     with drawing(0.95 + 0.42 * len(rows), 1, 2, sharey=True) as (figure, axes):
         for ax in axes:
             for i, (_, e) in enumerate(rows):
                 colour = SERIES[2] if e.identifiable else SERIES[1]
                 ax.errorbar(e.value, -i, xerr=e.ci_half, fmt="o", ms=4, color=colour, capsize=3, lw=1.4)
-            ax.axvline(centre_deg, color=MUTED, lw=1.0, ls="--")
+            if words:
+                ax.axvline(centre_deg, color=MUTED, lw=1.0, ls="--")
             ax.set_ylim(-len(rows) + 0.4, 0.6)
             ax.set_xlabel("α₀, deg")
             ax.grid(axis="y", visible=False)
@@ -166,6 +180,6 @@ def alpha0_figure(sections: Sequence[Section]) -> Figure | None:
         axes[0].tick_params(axis="y", length=0, labelcolor=INK)
         axes[0].set_title("whole interval")
         axes[1].tick_params(axis="y", length=0)
-        axes[1].set_title("near " + ("the truth" if truth is not None else "the printed value"))
+        axes[1].set_title(f"near {words or 'the narrowest'}")
         axes[1].set_xlim(centre_deg - 0.02, centre_deg + 0.02)
         return figure

@@ -18,7 +18,7 @@ from psabench.procedures.fourier import FourierParams, estimate_fourier, fourier
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, reversal
 from psabench.procedures.wire_bench import WireBench
-from psabench.report.grading import ARTICLE, as_printed
+from psabench.report.nominal import ARTICLE, as_printed
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(600)]
 
@@ -74,7 +74,7 @@ def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 def test_quiet_fourier_prints_the_articles_five_values_to_their_digits(report: Found) -> None:
     found = report["fourier", "quiet"]
-    for name, _, _, printed in ARTICLE:
+    for name, printed in ARTICLE.values.items():
         assert as_printed(float(found[name]["value"]), printed) == printed, name
 
 

@@ -307,9 +307,10 @@ def test_each_claim_has_its_row(whole: page.Campaign) -> None:
 
 
 def test_the_report_is_whole_and_the_same_each_time(whole: page.Campaign, tmp_path: Path) -> None:
-    first = page.write(tmp_path / "a", whole).read_text(encoding="utf-8")
-    second = page.write(tmp_path / "b", whole).read_text(encoding="utf-8")
-    assert first == second
+    for name in ("a", "b"):
+        page.write(tmp_path / name, whole)
+    _, first = report_without_provenance(tmp_path / "a")
+    assert report_without_provenance(tmp_path / "a") == report_without_provenance(tmp_path / "b")
     assert "<script" not in first
     assert "src=" not in first
     for study in {c.study for c in whole.cases}:

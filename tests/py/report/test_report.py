@@ -22,8 +22,6 @@ from psabench.report import calibration as report
 from psabench.report.grading import (
     Graded,
     Section,
-    as_printed,
-    console_comparison,
     console_table,
     grade,
     sensor_of,
@@ -31,6 +29,7 @@ from psabench.report.grading import (
     with_ci,
     within_limits,
 )
+from psabench.report.nominal import ARTICLE, as_printed, console_nominal
 
 TRUTH = {
     "u0_v": 2.5,
@@ -108,19 +107,19 @@ def test_same_results_give_the_same_bytes() -> None:
 
 
 def test_quiet_column_shows_the_five_printed_values() -> None:
-    page = report.html_page(sections()[:1], {})
+    page = report.html_page(sections()[:1], {}, ARTICLE)
     shown = re.findall(r"<span class=(same|other)>([^<]*)</span>", page)
     assert shown == [("same", v) for v in ("2.50", "0.1121", "1.0", "0.0098", "0.0010")]
 
 
 def test_result_json_holds_every_number_with_its_interval_and_grade(tmp_path: Path) -> None:
     given = sections(TRUTH)
-    page = report.write(tmp_path / "new" / "run", given, {"seed": "7"})
+    page = report.write(tmp_path / "new" / "run", given, {"seed": "7"}, ARTICLE)
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     assert sorted(p.name for p in page.parent.iterdir()) == ["report.html", "result.json"]  # no draft left
     data = json.loads((page.parent / "result.json").read_text(encoding="utf-8"))
     assert data["facts"] == {"seed": "7"}
-    assert data["article"]["alpha0_deg"] == "0.1121"
+    assert (data["nominal"]["source"], data["nominal"]["values"]["alpha0_deg"]) == ("the article", "0.1121")
     assert data["within_limits"] is True
     for s, section in zip(data["sections"], given, strict=True):
         assert [e["name"] for e in s["estimates"]] == [e.name for e in section.result.estimates]
@@ -149,7 +148,7 @@ def test_a_measured_number_off_its_interval_is_out_of_limits_and_a_flagged_one_i
 
 def test_the_terminal_shows_the_articles_digits_beside_ours() -> None:
     given = sections(TRUTH)
-    title, procedures, labels, *rows = console_comparison([given[0], given[-1]]).splitlines()
+    title, procedures, labels, *rows = console_nominal([given[0], given[-1]], ARTICLE).splitlines()
     assert "?: not identifiable" in title
     assert procedures.split() == ["fourier", "reversal"]
     assert labels.split()[:2] == ["printed", "quiet"]
