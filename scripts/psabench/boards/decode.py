@@ -19,6 +19,7 @@ from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
 from psabench.logs.formats import check_readable, read_frames
 
+TEMP_DECIMALS = 3  # a code is 15 mK
 CHUNK = 4096  # samples decoded at once
 
 SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
@@ -87,6 +88,7 @@ def _of_frames(f: Frames) -> Table:
         "temp_channel": f.temp_channel,
         "settled": f.settled.astype(int),
         "clipped": f.clipped.astype(int),
+        "temp_degc": np.round(f.temp_degc, TEMP_DECIMALS),
     }
 
 

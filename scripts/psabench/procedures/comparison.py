@@ -30,6 +30,7 @@ from psabench.procedures import compare_converters as measured
 from psabench.procedures.compare_converters import CompareParams, Figures, Track
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
+from psabench.procedures.recording import SeriesFile
 from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import aligned
 
@@ -308,6 +309,7 @@ def compare(
                 heard = stack.enter_context(BenchRecorder(bench, record, setup))
             tracks = measured.record(heard, p, progress)
             stack.close()
+        _store_tracks(out, tracks)
         motion = read_truth(log, tracks[0].name)
         if record:
             _keep_truth(log, tracks[0].name, record)
@@ -324,8 +326,16 @@ def replay_comparison(out: Path, p: CompareParams, progress: Progress, log: Path
     out.mkdir(parents=True, exist_ok=True)
     tracks = measured.record(bench, p, progress)
     bench.end_run()
+    _store_tracks(out, tracks)
     facts = {str(k): str(v) for k, v in bench.setup["facts"].items()}
     return _grade_tracks(tracks, read_truth(truth, tracks[0].name), p, facts)
+
+
+def _store_tracks(out: Path, tracks: Sequence[Track]) -> None:
+    """A series of each unit: instants of its readings, integrals of its inputs."""
+    for track in tracks:
+        with SeriesFile(out / f"{measured.NAME}-{track.name}.csv", ("t_s", "x_vs", "y_vs", "z_vs")) as series:
+            series.store_rows(np.column_stack([track.t_s, track.s_vs]).tolist())
 
 
 def truth_path(log: Path) -> Path:

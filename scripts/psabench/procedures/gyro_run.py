@@ -22,6 +22,7 @@ from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.platform_series import PlatformRecorder
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.wire_platform import WirePlatform
@@ -104,15 +105,16 @@ def _measure_reading(
 ) -> GyroSection:
     """bench: a Bench, or its recorder or recording."""
     p = params_of(label, {**site, **fields_of(GyrocompassParams, options.params)})
-    platform = WirePlatform(bench, signals=p.signals)
-    windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
-    result = gyrocompass.estimate(windows, p)
-    section = GyroSection(label=label, result=result, truth=truth.of(result))
-    if hold_params is None or result.doubts:
-        return section  # navigation does not begin with a heading that is in doubt
-    hold = heading_hold.hold(
-        platform, result, hold_params, progress, watch=truth.look, depart=lambda: depart(hold_params)
-    )
+    wired = WirePlatform(bench, signals=p.signals)
+    with PlatformRecorder(wired, options.out, label, holds=hold_params is not None) as platform:
+        windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
+        result = gyrocompass.estimate(windows, p)
+        section = GyroSection(label=label, result=result, truth=truth.of(result))
+        if hold_params is None or result.doubts:
+            return section  # navigation does not begin with a heading that is in doubt
+        hold = heading_hold.hold(
+            platform, result, hold_params, progress, watch=truth.look, depart=lambda: depart(hold_params)
+        )
     return GyroSection(label=label, result=result, truth=section.truth, hold=hold, hold_truth=truth.held())
 
 

@@ -43,7 +43,7 @@ def measure(
     table = p.table
     with progress.step("gyrocompassing", len(table.sequence_deg)) as done:
 
-        def over() -> None:
+        def over(_: Window) -> None:
             seen()
             done()
 

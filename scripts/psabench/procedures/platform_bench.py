@@ -135,8 +135,11 @@ class PlatformBench(Protocol):
         """Level the platform. Raises LinkError when it has not settled within timeout_s."""
         ...
 
-    def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
-        """Go through the positions; `done` after each. Raises LinkError when the run ends before its last window."""
+    def measure(self, table: Table, done: Callable[[Window], None]) -> Sequence[Window]:
+        """Go through the positions; `done` gets each window when it is over.
+
+        Raises LinkError when the run ends before its last window.
+        """
         ...
 
     def calibrate(self, length_s: float, settle_s: float) -> Window:

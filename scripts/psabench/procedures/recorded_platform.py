@@ -75,7 +75,7 @@ class RecordedPlatform(WirePlatform):
         self._levelled = (begun_s, self._script.bench.now_s)
         self.gyro.stop()
 
-    def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
+    def measure(self, table: Table, done: Callable[[Window], None]) -> Sequence[Window]:
         """See `PlatformBench`."""
         longest_s = _longest_s(table, self._first_turn_deg, self.gyro.get("slew_dps2"))
         self._script.expect(longest_s, len(table.sequence_deg) * table.settle_limit_s)

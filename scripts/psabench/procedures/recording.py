@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Self
 
 from psabench.errors import expected
 from psabench.estimate.face import Face
@@ -16,28 +16,42 @@ from psabench.procedures.head_bench import Reading
 COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
 
 
-class CsvRecorder(AbstractContextManager["CsvRecorder"]):
-    """`Watch(record=recorder)`. Rows survive Ctrl-C, an exception and the death of the process."""
+class SeriesFile:
+    """A time series of a run: named columns with their units, a row at a time; the format of all of them."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, columns: Sequence[str], what: str = "rows") -> None:
         """Raises BadInput or OutputError when the file cannot be made; an earlier file of that name is replaced."""
         self.path = path
         self.rows = 0
         self._stack = ExitStack()
-        self._file: IO[str] = self._stack.enter_context(output_text(path, lambda: f"stored {self.rows} readings"))
+        self._file: IO[str] = self._stack.enter_context(output_text(path, lambda: f"stored {self.rows} {what}"))
         self._csv = csv.writer(self._file, lineterminator="\n")
-        self._csv.writerow(COLUMNS)
+        self._csv.writerow(columns)
 
-    def __call__(self, r: Reading) -> None:
-        """Store a reading. Raises Unstored; at the end of the context that becomes OutputError."""
-        # repr of a float is the shortest text that reads back to the same bits
-        row = (r.face.value if name == "face" else getattr(r, name) for name in COLUMNS)
-        self._csv.writerow([repr(x) if isinstance(x, float) else x for x in row])
+    def store_rows(self, rows: Iterable[Sequence[object]]) -> None:
+        """Store rows. Raises Unstored; at the end of the context that becomes OutputError."""
+        for row in rows:
+            # repr of a float is the shortest text that reads back to the same bits
+            self._csv.writerow([repr(float(x)) if isinstance(x, float) else x for x in row])
+            self.rows += 1
         self._file.flush()
-        self.rows += 1
+
+    def __enter__(self) -> Self:
+        return self
 
     def __exit__(self, *exc: Any) -> None:
         self._stack.__exit__(*exc)
+
+
+class CsvRecorder(SeriesFile):
+    """`Watch(record=recorder)`. Rows survive Ctrl-C, an exception and the death of the process."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, COLUMNS, "readings")
+
+    def __call__(self, r: Reading) -> None:
+        """Store a reading."""
+        self.store_rows([[r.face.value if name == "face" else getattr(r, name) for name in COLUMNS]])
 
 
 def load_csv(path: Path) -> tuple[Reading, ...]:

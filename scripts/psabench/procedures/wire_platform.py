@@ -116,7 +116,7 @@ class WirePlatform:
             self._raise_for(self.gyro.flags & ~Flag.SATURATED, "levelling")
             looks = looks + 1 if abs(self.gyro.beta_deg) < tolerance_deg else 0
 
-    def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
+    def measure(self, table: Table, done: Callable[[Window], None]) -> Sequence[Window]:
         """See `PlatformBench`."""
         self.gyro.positions_deg = table.angles_deg
         self.gyro.set(repeat=table.repeat, window_s=table.window_s, slew_dps=table.slew_dps, freeze=table.freeze)
@@ -127,7 +127,7 @@ class WirePlatform:
         timeout_s = turn_s + table.settle_s + table.settle_limit_s + table.window_s
         for w in self._windows(table.sequence_deg, timeout_s):
             windows.append(w)
-            done()
+            done(w)
         self._set_rad = windows[-1].set_rad
         return windows
 

@@ -136,7 +136,7 @@ class FakePlatform:
             raise LinkError(f"the platform was not level after {timeout_s:g} s: it never settles")
         self.t_s += 10.0
 
-    def measure(self, table: Table, done: Callable[[], None]) -> Sequence[Window]:
+    def measure(self, table: Table, done: Callable[[Window], None]) -> Sequence[Window]:
         windows = []
         self._settle_s = table.settle_s
         for k, angle_deg in enumerate(table.sequence_deg):
@@ -147,7 +147,7 @@ class FakePlatform:
             self._q = self._set - self.set_sd_arcmin * ARCMIN * self.rng.standard_normal()
             self.t_s += abs(math.degrees(self._set - before)) / table.slew_dps + table.settle_s
             windows.append(self._window(k, table.window_s))
-            done()
+            done(windows[-1])
         return windows
 
     def calibrate(self, length_s: float, settle_s: float) -> Window:

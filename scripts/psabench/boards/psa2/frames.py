@@ -30,6 +30,10 @@ class Form(IntEnum):
     BLOCK = 3  # five samples in an FD frame
 
 
+TEMP_CODES_PER_K = 65.536  # 1 uA/K on 10 kohm, 16 bits of +-5 V (PSA2-TEMP-04)
+KELVIN_DEGC = -273.15  # of 0 K
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frames:
     """n samples. Times are NaN, `seq` -1, temperatures and flags absent (0) where the form does not carry them."""
@@ -60,6 +64,12 @@ class Frames:
             settled=columns.get("SETTLED", absent).astype(np.bool_),
             clipped=columns.get("CLIP", absent).astype(np.bool_),
         )
+
+    @property
+    def temp_degc(self) -> Floats:
+        """Temperature of temp_channel, nominal scale, degC, (n,); NaN where the code is 0, as in a form without it."""
+        kelvin = np.where(self.temp_code == 0, np.nan, self.temp_code / TEMP_CODES_PER_K)
+        return np.asarray(kelvin + KELVIN_DEGC)
 
     def head(self, count: int) -> Frames:
         """The first `count` of them."""
