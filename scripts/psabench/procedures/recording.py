@@ -23,10 +23,12 @@ class SeriesFile:
         """Raises BadInput or OutputError when the file cannot be made; an earlier file of that name is replaced."""
         self.path = path
         self.rows = 0
-        self._stack = ExitStack()
-        self._file: IO[str] = self._stack.enter_context(output_text(path, lambda: f"stored {self.rows} {what}"))
-        self._csv = csv.writer(self._file, lineterminator="\n")
-        self._csv.writerow(columns)
+        with ExitStack() as stack:
+            self._file: IO[str] = stack.enter_context(output_text(path, lambda: f"stored {self.rows} {what}"))
+            self._csv = csv.writer(self._file, lineterminator="\n")
+            self._csv.writerow(columns)
+            self._file.flush()  # a run that is interrupted at once leaves a series without rows
+            self._stack = stack.pop_all()
 
     def store_rows(self, rows: Iterable[Sequence[object]]) -> None:
         """Store rows. Raises Unstored; at the end of the context that becomes OutputError."""

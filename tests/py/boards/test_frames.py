@@ -89,6 +89,16 @@ def test_a_block_is_five_samples_in_order() -> None:
     assert not frames.clipped.any()
 
 
+def test_a_temperature_is_a_code_at_the_nominal_scale_and_absent_where_the_form_has_none() -> None:
+    """AD590 on 10 kohm at +-5 V: 0 degC is 273.15 K * 65.536 codes."""
+    reader = FrameReader()
+    for number, code in enumerate((round(273.15 * 65.536), round(373.15 * 65.536), 19539)):
+        feed(reader, [frame("PSA2_XY", {"SEQ": number}), frame("PSA2_ZT", {"T": code, "CHANNEL": 1})])
+    assert reader.take().temp_degc == pytest.approx([0.0, 100.0, 24.991], abs=0.008)
+    feed(reader, [frame("PSA2_FAST", {"X": 1})])
+    assert np.isnan(reader.take().temp_degc).all()
+
+
 @pytest.mark.parametrize(
     ("seqs", "lost"),
     [
