@@ -5,11 +5,13 @@ Without --can and --control each reading gets an emulator of its own with the sa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from psabench.bench import Bench
 from psabench.boards.gyro.device import Gyro
@@ -19,9 +21,11 @@ from psabench.logs.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_drifts import WindowMean
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
+from psabench.procedures.platform_bench import Floats
 from psabench.procedures.platform_series import PlatformRecorder
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
 from psabench.procedures.result import fields_of, made_params
@@ -29,6 +33,7 @@ from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth
 
 SCENARIO = "gyrocompass"
+WINDOW_POINTS = 200  # of a truth over a window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +110,7 @@ def _measure_reading(
 ) -> GyroSection:
     """bench: a Bench, or its recorder or recording."""
     p = params_of(label, {**site, **fields_of(GyrocompassParams, options.params)})
-    wired = WirePlatform(bench, signals=p.signals)
+    wired = WirePlatform(bench, signals=p.signals, watch=truth.watch_drift)
     with PlatformRecorder(wired, options.out, label, holds=hold_params is not None) as platform:
         windows = gyrocompass.measure(platform, p, progress, seen=truth.window)
         result = gyrocompass.estimate(windows, p)
@@ -162,17 +167,22 @@ def _depart(bench: Bench, p: HoldParams) -> None:
 
 
 class _Truth:
-    """What the truth port says after each window and at each look, where there is one."""
+    """What the truth port says in the run, after each window and at each look, where there is one."""
 
     def __init__(self, bench: Bench | RecordedBench) -> None:
         self._bench: Any = bench
         self._there = bench.truth_path is not None
-        self._windows: list[Mapping[str, Any]] = []
+        self._vehicle: Mapping[str, Any] = {}  # after the last window
+        self._drifts: list[tuple[float, float, float]] = []  # time of the readings, both drifts, deg/h
         self._headings: list[float] = []
+
+    def watch_drift(self, t_s: float) -> None:
+        if self._there:
+            self._drifts.append((t_s, *map(float, self._bench.truth_state()["platform"]["drift_degph"])))
 
     def window(self) -> None:
         if self._there:
-            self._windows.append(self._bench.truth_state())
+            self._vehicle = self._bench.truth_state()["vehicle"]
 
     def look(self, _: Held) -> None:
         if self._there:
@@ -182,19 +192,21 @@ class _Truth:
         return HeldTruth(heading_deg=tuple(self._headings)) if self._there else None
 
     def of(self, result: GyrocompassResult) -> dict[str, float] | None:
-        """By name of the estimate: attitude at the end, drifts as means over the windows."""
-        if not self._windows:
+        """By name of the estimate: attitude at the end, drifts as means over the windows of each estimate."""
+        if not self._vehicle or not self._drifts:
             return None
-        drifts = [state["platform"]["drift_degph"] for state in self._windows]
-        vehicle = self._windows[-1]["vehicle"]
+        t_s, drift1_degph, drift2_degph = np.array(self._drifts).T
         return {
-            "heading_deg": float(vehicle["heading_deg"]) % 360.0,
-            "drift1_degph": _mean([float(d[0]) for d in drifts]),
-            "drift2_degph": _mean([float(d[1]) for d in drifts]),
-            "pitch_deg": float(vehicle["pitch_deg"]),
-            "roll_deg": float(vehicle["roll_deg"]),
+            "heading_deg": float(self._vehicle["heading_deg"]) % 360.0,
+            "drift1_degph": mean_over_windows(result.drift1, t_s, drift1_degph),
+            "drift2_degph": mean_over_windows(result.drift2, t_s, drift2_degph),
+            "pitch_deg": float(self._vehicle["pitch_deg"]),
+            "roll_deg": float(self._vehicle["roll_deg"]),
         }
 
 
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
+def mean_over_windows(over: WindowMean, t_s: Floats, x: Floats) -> float:
+    """Mean of x over the windows of a drift, in their shares; x at the instants t_s, linear between them."""
+    part = (np.arange(WINDOW_POINTS) + 0.5) / WINDOW_POINTS - 0.5
+    at_s = over.t_mid_s[:, np.newaxis] + np.outer(over.length_s, part)
+    return float(over.share @ np.interp(at_s, t_s, x).mean(axis=1))

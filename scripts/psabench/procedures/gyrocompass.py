@@ -15,7 +15,8 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
-from psabench.procedures.gyrocompass_fit import Fit, Row, attitude_sd_rad, drift2_of, fit, sensitivity
+from psabench.procedures.gyrocompass_drifts import WindowMean, drift1_of, drift2_of
+from psabench.procedures.gyrocompass_fit import Fit, Row, attitude_sd_rad, fit, sensitivity
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
 from psabench.procedures.gyrocompass_params import NAME, GyrocompassParams
 from psabench.procedures.gyrocompass_windows import good_calibration, sorted_out
@@ -68,7 +69,8 @@ class GyrocompassResult:
     compass: nav.Compass
     attitude: nav.Attitude
     heading_rad: float
-    drift2_radps: float
+    drift1: WindowMean  # of the levelling axis
+    drift2: WindowMean  # of the azimuth axis
     latitude: LatitudeEffect
     estimates: tuple[Estimate, ...]
     doubts: tuple[str, ...]  # reasons not to trust the heading
@@ -103,15 +105,16 @@ def estimate(windows: Sequence[Window], p: GyrocompassParams) -> GyrocompassResu
         compass=f.compass,
         attitude=f.attitude,
         heading_rad=f.heading_rad,
-        drift2_radps=found.drift2_radps,
+        drift1=found.drift1,
+        drift2=found.drift2,
         latitude=found.latitude,
-        estimates=_estimates(f, found.drift2_radps, found.drift2_sd_radps),
+        estimates=_estimates(found),
         doubts=doubts_of(found),
         notes=(*left_out, *notes_of(found, windows)),
     )
 
 
-def _evidence(f: Fit, planned: int, drift2: tuple[float, float]) -> Evidence:
+def _evidence(f: Fit, planned: int, drift2: WindowMean) -> Evidence:
     s = sensitivity(f)
     limit = quality_limit(f, s)
     return Evidence(
@@ -119,23 +122,24 @@ def _evidence(f: Fit, planned: int, drift2: tuple[float, float]) -> Evidence:
         planned=planned,
         sensitivity=s,
         quality_limit=limit,
-        drift2_radps=drift2[0],
-        drift2_sd_radps=drift2[1],
-        latitude=latitude_effect(f, limit, *drift2),
+        drift1=drift1_of(f, s),
+        drift2=drift2,
+        latitude=latitude_effect(f, limit, drift2),
     )
 
 
 # ---- what is reported
 
 
-def _estimates(f: Fit, drift2_radps: float, drift2_sd_radps: float) -> tuple[Estimate, ...]:
-    c, attitude = f.compass, f.attitude
+def _estimates(e: Evidence) -> tuple[Estimate, ...]:
+    """Angles as they are in the run, drifts as means over its windows."""
+    f, c, attitude = e.fit, e.fit.compass, e.fit.attitude
     pitch_sd_rad, roll_sd_rad, _ = attitude_sd_rad(f)
     return (
         _estimate("heading_deg", "ψ", "deg", f.heading_rad * DEG, c.alpha1_sd_rad * DEG),
         _estimate("alpha1_deg", "α_1", "deg", c.alpha1_rad * DEG, c.platform_sd_rad * DEG),
-        _estimate("drift1_degph", "ω_d1", "deg/h", c.drift1_radps / DEGPH, c.drift1_sd_radps / DEGPH),
-        _estimate("drift2_degph", "ω_d2", "deg/h", drift2_radps / DEGPH, drift2_sd_radps / DEGPH),
+        _estimate("drift1_degph", "ω_d1", "deg/h", e.drift1.radps / DEGPH, e.drift1.sd_radps / DEGPH),
+        _estimate("drift2_degph", "ω_d2", "deg/h", e.drift2.radps / DEGPH, e.drift2.sd_radps / DEGPH),
         _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, pitch_sd_rad * DEG),
         _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, roll_sd_rad * DEG),
     )
@@ -157,7 +161,7 @@ def allowance(result: GyrocompassResult) -> dict[str, float]:
     tilt_rad = level_rad**2 + p.angle_zero_arcmin * ARCMIN * math.hypot(
         result.attitude.pitch_rad, result.attitude.roll_rad
     )
-    drift2_radps = p.we_radps * (math.sqrt(2.0) * level_rad + latitude_rad) + p.torquer_scale * abs(result.drift2_radps)
+    drift2_radps = p.we_radps * (math.sqrt(2.0) * level_rad + latitude_rad) + p.torquer_scale * abs(result.drift2.radps)
     return {
         "heading_deg": heading_rad * DEG,
         "alpha1_deg": (heading_rad - p.angle_zero_arcmin * ARCMIN) * DEG,

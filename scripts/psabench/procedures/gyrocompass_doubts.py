@@ -16,6 +16,7 @@ import numpy as np
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
+from psabench.procedures.gyrocompass_drifts import WindowMean, drift1_gains
 from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, attitude_sd_rad, rate_covariance
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
 from psabench.procedures.gyrocompass_params import GyrocompassParams
@@ -40,8 +41,8 @@ class Evidence:
     planned: int  # windows of the run
     sensitivity: Sensitivity
     quality_limit: float
-    drift2_radps: float
-    drift2_sd_radps: float
+    drift1: WindowMean
+    drift2: WindowMean
     latitude: LatitudeEffect
 
 
@@ -133,13 +134,13 @@ def _latitude(e: Evidence) -> str:
 def _passport(e: Evidence) -> str:
     """The drift of the azimuth axis, which sees U sin(latitude)."""
     p = e.fit.params
-    off = e.drift2_radps - p.drift2_degph * DEGPH
-    if not p.drift2_limit_degph or abs(off) <= passport_limit_radps(e.fit, e.drift2_sd_radps):
+    off = e.drift2.radps - p.drift2_degph * DEGPH
+    if not p.drift2_limit_degph or abs(off) <= passport_limit_radps(e.fit, e.drift2):
         return ""
     sine = math.sin(p.latitude_rad) + off / EARTH_RADPS
     would = f"it would be right at latitude {math.asin(sine) * DEG:.1f} deg" if abs(sine) <= 1.0 else "no latitude fits"
     return (
-        f"the azimuth axis drifts by {e.drift2_radps / DEGPH:.2f} deg/h where its passport says {p.drift2_degph:g} +- "
+        f"the azimuth axis drifts by {e.drift2.radps / DEGPH:.2f} deg/h where its passport says {p.drift2_degph:g} +- "
         f"{p.drift2_limit_degph:g} deg/h: {would}, or the vehicle turns all the time"
     )
 
@@ -164,7 +165,7 @@ def _running(e: Evidence) -> str:
     error, sd = np.array([x for x, _ in found]), np.array([x for _, x in found])
     results = (
         (e.sensitivity.alpha_s, c.alpha1_half95_rad, DEG, "the heading by {:.2f} deg"),
-        (e.sensitivity.drift, Z95 * c.drift1_sd_radps, 1.0 / DEGPH, "the drift by {:.2f} deg/h"),
+        (drift1_gains(f, e.sensitivity), Z95 * e.drift1.sd_radps, 1.0 / DEGPH, "the drift by {:.2f} deg/h"),
     )
     moves = []
     for by, half, unit, words in results:
@@ -205,7 +206,7 @@ def _spans(e: Evidence) -> list[_Span]:
     f = e.fit
     gamma = np.array([w.mean_gamma_rad for w in f.windows])
     alpha = alpha_turns(np.array([w.mean_encoder_rad for w in f.windows]), f.windows, f.attitude)
-    idle = e.drift2_radps * np.cos(gamma) - f.compass.drift1_radps * np.sin(gamma) + f.params.wz_radps
+    idle = e.drift2.radps * np.cos(gamma) - f.compass.drift1_radps * np.sin(gamma) + f.params.wz_radps
     between = [
         _Span(
             where=f"between positions {a.number + 1} and {b.number + 1}",

@@ -1,4 +1,4 @@
-"""Heading and drifts from the windows that count: the attitude, the turns of alpha, the equations, the azimuth axis."""
+"""Heading and levelling drift from the windows that count: the attitude, the turns of alpha, the equations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
-from psabench.native.nav import ARCMIN, DEGPH
+from psabench.native.nav import ARCMIN
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
 from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
 from psabench.procedures.platform_bench import Floats, Window
@@ -115,12 +115,18 @@ def rate_covariance(f: Fit) -> Floats:
 
 def drift_covariance(f: Fit) -> Floats:
     """Of the means of the random drift over the windows, (n, n), (rad/s)^2."""
-    n, rows = f.noise, [r.position for r in f.rows]
+    rows = [r.position for r in f.rows]
+    return covariance_of_means(f.noise, [r.t_mid_s for r in rows], [r.window_s for r in rows])
 
-    def of(a: nav.Position, b: nav.Position) -> float:
-        return nav.gm_window_cov(n.gm_sigma_radps, n.gm_tau_s, a.window_s, b.window_s, abs(a.t_mid_s - b.t_mid_s))
 
-    return np.array([[of(a, b) for b in rows] for a in rows])
+def covariance_of_means(n: nav.Noise, t_mid_s: Sequence[float], length_s: Sequence[float]) -> Floats:
+    """Of the means of the random drift over spans that do not overlap, (n, n), (rad/s)^2."""
+    spans = list(zip(map(float, t_mid_s), map(float, length_s), strict=True))
+
+    def of(a_s: float, a_length_s: float, b_s: float, b_length_s: float) -> float:
+        return nav.gm_window_cov(n.gm_sigma_radps, n.gm_tau_s, a_length_s, b_length_s, abs(a_s - b_s))
+
+    return np.array([[of(*a, *b) for b in spans] for a in spans])
 
 
 def error_covariance(f: Fit) -> Floats:
@@ -154,11 +160,16 @@ def attitude_sd_rad(f: Fit) -> tuple[float, float, float]:
     angle are new in each position.
     """
     q = np.array([r.q_rad for r in f.rows])
-    design = np.column_stack([np.sin(q), np.cos(q), np.ones(len(q))])
     swing = f.attitude.pitch_rad * np.cos(q) + f.attitude.roll_rad * np.sin(q)
     sd_rad = np.hypot(f.params.level_sd_arcmin * ARCMIN, f.noise.angle_sd_rad * swing)
-    pitch, roll, constant = np.linalg.norm(np.linalg.pinv(design) * sd_rad, axis=1)
+    pitch, roll, constant = np.linalg.norm(attitude_gains(f) * sd_rad, axis=1)
     return float(pitch), float(roll), float(constant)
+
+
+def attitude_gains(f: Fit) -> Floats:
+    """What gamma of each window does to -pitch, roll and gamma's constant error, (3, n), to the first order."""
+    q = np.array([r.q_rad for r in f.rows])
+    return np.linalg.pinv(np.column_stack([np.sin(q), np.cos(q), np.ones(len(q))]))
 
 
 def alpha_turns(q_rad: Floats, windows: Sequence[Window], attitude: nav.Attitude) -> Floats:
@@ -200,45 +211,16 @@ def _earth_part(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
     return math.sin(a) * math.cos(r.gamma_rad) + math.cos(a) * tilt
 
 
-# ---- the azimuth axis
+def earth_slopes(f: Fit) -> Floats:
+    """What a turn of alpha changes in the rate of each window, (n,), rad/s per rad."""
+    rows = [r.position for r in f.rows]
+    a = np.array([f.compass.alpha1_rad + r.delta_rad for r in rows])
+    gamma, beta = np.array([r.gamma_rad for r in rows]), np.array([r.beta_rad for r in rows])
+    tilt = 0.0 if f.params.simplified else np.sin(gamma) * np.sin(beta)
+    return np.asarray(f.params.we_radps * (np.cos(a) * np.cos(gamma) - np.sin(a) * tilt))
 
 
-def drift2_of(f: Fit, calibration: Sequence[Window]) -> tuple[float, float]:
-    """Drift of the azimuth axis from its torquer, rad/s, and its standard deviation against the mean drift.
-
-    Mean over all windows, those of the calibration as well, weighed by their lengths.
-    """
-    p = f.params
-    found, weight = [], []
-    deltas = [*(r.position.delta_rad for r in f.rows), *(_delta_at(w, f) for w in calibration)]
-    windows = [*f.windows, *calibration]
-    for w, delta in zip(windows, deltas, strict=True):
-        found.append(
-            nav.azimuth_drift(
-                float(w.u2_radps.mean()),
-                latitude_rad=p.latitude_rad,
-                alpha_rad=f.compass.alpha1_rad + delta,
-                beta_rad=w.mean_beta_rad,
-                gamma_rad=w.mean_gamma_rad - f.attitude.gamma_bias_rad,
-            )
-        )
-        weight.append(w.length_s)
-    value = float(np.average(found, weights=weight))
-    level_sd = p.level_sd_arcmin * ARCMIN
-    level = [
-        nav.azimuth_drift_sd(
-            latitude_rad=p.latitude_rad,
-            alpha_rad=f.compass.alpha1_rad + delta,
-            beta_sd_rad=level_sd,
-            gamma_sd_rad=level_sd,
-        )
-        for delta in deltas
-    ]
-    shares = np.array(weight) / sum(weight)
-    return value, math.hypot(p.gm_sigma_degph * DEGPH, float(np.linalg.norm(shares * level)))
-
-
-def _delta_at(w: Window, f: Fit) -> float:
-    """Increment of alpha of a window outside the run."""
+def increment_of(w: Window, f: Fit) -> float:
+    """Increment of alpha of a window outside the run, rad."""
     q = np.array([f.rows[0].q_rad, trusted(w, f.params)])
     return float(_increments(q, [w, w], f.attitude, f.params)[1])

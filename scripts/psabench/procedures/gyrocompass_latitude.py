@@ -16,6 +16,7 @@ import numpy.typing as npt
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
+from psabench.procedures.gyrocompass_drifts import WindowMean, passport_sd_radps
 from psabench.procedures.gyrocompass_fit import Fit, again
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.result import DEG
@@ -53,17 +54,17 @@ class LatitudeEffect:
         )
 
 
-def latitude_effect(f: Fit, quality_limit: float, drift2_radps: float, drift2_sd_radps: float) -> LatitudeEffect:
+def latitude_effect(f: Fit, quality_limit: float, drift2: WindowMean) -> LatitudeEffect:
     """quality_limit: of |hypot(s, c) - 1|, beyond which a run is in doubt."""
     phi = f.params.latitude_rad
     grid = np.linspace(-LATITUDE_LIMIT_RAD, LATITUDE_LIMIT_RAD, round(2.0 * LATITUDE_LIMIT_RAD / GRID_RAD) + 1)
-    hidden = _hidden(grid, f, quality_limit) & _passport_allows(grid, f, drift2_radps, drift2_sd_radps)
+    hidden = _hidden(grid, f, quality_limit) & _passport_allows(grid, f, drift2)
     above, below = hidden[grid > phi], hidden[grid < phi][::-1]
     high = min(phi + GRID_RAD * _run_length(above), LATITUDE_LIMIT_RAD)
     low = max(phi - GRID_RAD * _run_length(below), -LATITUDE_LIMIT_RAD)
     unseen = max(abs(_turn(f, float(x))) for x in np.linspace(low, high, LOOKS))
     opposite = np.array([-phi])
-    told = low <= -phi <= high or not _passport_allows(opposite, f, drift2_radps, drift2_sd_radps)[0]
+    told = low <= -phi <= high or not _passport_allows(opposite, f, drift2)[0]
     toward = -STEP_RAD if phi > 0.0 else STEP_RAD
     return LatitudeEffect(
         heading_per_latitude=_turn(f, phi + toward) / toward,
@@ -79,18 +80,18 @@ def _hidden(phi_rad: Floats, f: Fit, quality_limit: float) -> Bools:
     return np.asarray(np.abs(np.cos(phi_rad) / math.cos(f.params.latitude_rad) - 1.0) <= quality_limit)
 
 
-def _passport_allows(phi_rad: Floats, f: Fit, drift2_radps: float, sd_radps: float) -> Bools:
+def _passport_allows(phi_rad: Floats, f: Fit, drift2: WindowMean) -> Bools:
     """Where the drift of the azimuth axis would be what the passport says; everywhere, without one."""
     p = f.params
     if not p.drift2_limit_degph:
         return np.full(phi_rad.shape, True)
-    drift = drift2_radps - EARTH_RADPS * np.sin(phi_rad) + p.wz_radps
-    return np.asarray(np.abs(drift - p.drift2_degph * DEGPH) <= passport_limit_radps(f, sd_radps))
+    drift_radps = drift2.radps - EARTH_RADPS * np.sin(phi_rad) + p.wz_radps
+    return np.asarray(np.abs(drift_radps - p.drift2_degph * DEGPH) <= passport_limit_radps(f, drift2))
 
 
-def passport_limit_radps(f: Fit, drift2_sd_radps: float) -> float:
+def passport_limit_radps(f: Fit, drift2: WindowMean) -> float:
     """How far the drift that was found may be from the passport's."""
-    return f.params.drift2_limit_degph * DEGPH + PASSPORT_SDS * drift2_sd_radps
+    return f.params.drift2_limit_degph * DEGPH + PASSPORT_SDS * passport_sd_radps(drift2, f.noise)
 
 
 def _run_length(flags: Bools) -> int:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from psabench.errors import LinkError, expected
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
-from psabench.native.nav import DEGPH, EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
+from psabench.native.nav import EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass import GyrocompassResult
-from psabench.procedures.gyrocompass_params import TAU_LEAST_S
+from psabench.procedures.gyrocompass_drifts import drift_variance
+from psabench.procedures.gyrocompass_params import noise_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
 from psabench.procedures.result import Z95, option
@@ -101,10 +102,9 @@ class HoldResult:
         """A parked vehicle does not turn: its heading may move by what the drift leaves, no more."""
         if self.params.speed_mps or self.params.compensate != "torquer":
             return ()
-        growth = replace(_growth(self.start), heading_sd_rad=0.0)
         for h in self.held[1:]:
             moved_rad = wrapped(h.heading_rad - self.held[0].heading_rad)
-            if abs(moved_rad) > SDS * nav.hold_sd_rad(growth, h.t_s) + PARKED_RAD:
+            if abs(moved_rad) > SDS * _turn_sd_rad(self.start, h.t_s) + PARKED_RAD:
                 return (
                     f"the heading moved by {math.degrees(moved_rad):.2f} deg in {h.t_s:.0f} s of standing, more "
                     "than the drift that was left: the vehicle turned, or azimuth torquer or angle sensor failed",
@@ -142,8 +142,8 @@ def hold(
     if first.faults:
         raise LinkError(f"{NAME}: navigation did not begin: {'; '.join(first.faults)}")
     azimuth_rad = _alpha(start, first)
-    drift1_radps, latitude_rad = start.compass.drift1_radps, start.params.latitude_rad
-    drift2_radps = {"torquer": start.drift2_radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]
+    drift1_radps, latitude_rad = start.drift1.radps, start.params.latitude_rad
+    drift2_radps = {"torquer": start.drift2.radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]
     _tell(bench, p, latitude_rad)
     bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=drift1_radps, drift2_radps=drift2_radps))
     begun_s = bench.t_s
@@ -181,20 +181,22 @@ def _held(look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResu
     return Held(
         t_s=t_s,
         heading_rad=nav.heading(azimuth_rad, look.encoder_rad, pitch_rad=pitch, roll_rad=roll),
-        sd_rad=nav.hold_sd_rad(_growth(start), t_s),
+        sd_rad=hold_sd_rad(start, t_s),
         faults=look.faults,
     )
 
 
-def _growth(start: GyrocompassResult) -> nav.Hold:
-    """What the error grows by: the heading and the drift as they were found, and the random drift from then on."""
-    p = start.params
-    return nav.Hold(
-        heading_sd_rad=math.radians(start.get("heading_deg").sd),
-        drift_sd_radps=start.get("drift2_degph").sd * DEGPH,
-        gm_sigma_radps=p.gm_sigma_degph * DEGPH,
-        gm_tau_s=max(p.gm_tau_s, TAU_LEAST_S),
-    )
+def hold_sd_rad(start: GyrocompassResult, t_s: float) -> float:
+    """What is to be expected of a heading t_s after navigation began, rad: heading and drift as they were found."""
+    return math.hypot(math.radians(start.get("heading_deg").sd), _turn_sd_rad(start, t_s))
+
+
+def _turn_sd_rad(start: GyrocompassResult, t_s: float) -> float:
+    """What the drift that is left turns the platform by: the error of its mean over the windows, and what the random
+    drift does after them. A hold begins as the last window ends.
+    """
+    wandered = drift_variance(start.drift2, noise_of(start.params, 0.0), t_s)
+    return t_s * math.hypot(start.drift2.sd_radps, math.sqrt(wandered))
 
 
 def _tell(bench: PlatformBench, p: HoldParams, latitude_rad: float) -> None:

@@ -56,9 +56,14 @@ class _LevelScale:
 class WirePlatform:
     """A `procedures.platform_bench.PlatformBench` of a bench with a gyro unit."""
 
-    def __init__(self, bench: Bench, *, signals: str = "frames") -> None:
-        """signals: where the level angles of a window come from, "frames" or "readings"."""
-        self._bench = bench
+    def __init__(
+        self, bench: Bench, *, signals: str = "frames", watch: Callable[[float], None] = lambda _: None
+    ) -> None:
+        """signals: where the level angles of a window come from, "frames" or "readings".
+
+        watch: called every SLICE_S of a run, with the time of the newest reading.
+        """
+        self._bench, self._watch_run = bench, watch
         self.gyro = bench.board(Gyro)
         self.level_unit = self._find_level_unit()
         self._from_frames = signals == "frames"
@@ -210,7 +215,8 @@ class WirePlatform:
                     if self.t_s > deadline_s:
                         raise LinkError(f"position {number + 1} was not measured in {timeout_s:.0f} s: {tape.state}")
                     self.wait(SLICE_S)
-                    tape.add(self.gyro, self.level_unit)
+                    if tape.add(self.gyro, self.level_unit):
+                        self._watch_run(tape.newest_s)
                 yield self._of(tape, span, number, math.radians(angle_deg))
                 tape.drop(span.stop)
         finally:
@@ -260,9 +266,10 @@ class _Tape:
         self._before = (-1, 0.0, 0.0, 0)  # STEP of the last reading, its rate, turned_rad and missed
         self._seq: bits.Ints = np.zeros(0, dtype=np.int64)
         self._u_v: Floats = np.zeros((0, 3))
+        self.newest_s = 0.0  # when the newest reading came
 
-    def add(self, gyro: Gyro, level_unit: Psa2) -> None:
-        """What has come since."""
+    def add(self, gyro: Gyro, level_unit: Psa2) -> bool:
+        """What has come since. False: no reading."""
         r, f = gyro.frames.take(), level_unit.frames.take()
         assert isinstance(r, Readings)
         new = {**r.columns, "t_rx_s": r.t_rx_s, **self._turned(r.columns)}
@@ -270,6 +277,9 @@ class _Tape:
         self._seq, self._u_v = np.concatenate([self._seq, f.seq]), np.concatenate([self._u_v, f.u_v])
         if len(self.readings["PHASE"]) and not np.any(self.readings["PHASE"] == Phase.WINDOW):
             self.drop(len(self.readings["PHASE"]))  # turns may take longer than the counter of the frames takes to wrap
+        if len(r):
+            self.newest_s = float(r.t_rx_s[-1])
+        return bool(len(r))
 
     def _turned(self, r: Mapping[str, Floats]) -> dict[str, Floats]:
         """What the torquers turned the platform by about the vertical since the first reading, and readings missed.

@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fake_platform import FakePlatform
 from psabench.errors import LinkError
@@ -17,7 +18,7 @@ from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import Held, HoldParams, HoldResult, hold
-from psabench.procedures.platform_bench import Look
+from psabench.procedures.platform_bench import Floats, Look
 from psabench.report import gyro_grading, gyro_page
 from psabench.report.gyro_grading import GyroSection, HeldTruth
 
@@ -58,20 +59,31 @@ def test_the_article_s_sum() -> None:
     """0.1 deg and 0.05 deg/h for 4 h are 0.3 deg, all of the article's claim."""
     bench = FakePlatform()
     r = start(bench)
-    off = replace(
-        r, heading_rad=r.heading_rad + math.radians(0.1), drift2_radps=r.drift2_radps + math.radians(0.05) / 3600
-    )
+    drift2 = replace(r.drift2, radps=r.drift2.radps + math.radians(0.05) / 3600)
+    off = replace(r, heading_rad=r.heading_rad + math.radians(0.1), drift2=drift2)
     end = hold(bench, off, HoldParams(), Silent())
     assert end_error_deg(bench, end) == pytest.approx(0.300, abs=0.001)
 
 
 def test_what_is_expected_grows_as_the_random_drift_does() -> None:
-    """0.288 deg in 4 h for 0.2 deg/h and 1000 s, with the error of the drift that was found beside it."""
-    bench = FakePlatform()
-    r = held(bench, HoldParams())
+    """0.288 deg in 4 h for 0.2 deg/h and 1000 s, and the drift over the windows, less what both have in common."""
+    r = held(FakePlatform(), HoldParams())
+    d = r.start.drift2
+    within = np.linspace(-0.45, 0.45, 10)
+    window_s = np.add.outer(d.t_mid_s, 0.0 * within) + np.outer(d.length_s, within)
+    weight = np.repeat(d.share, within.size) / within.size
+    hold_s = window_s.max() + d.length_s[-1] / 20.0 + 14.4 * (np.arange(1000) + 0.5)
+    common = _covariance(window_s.ravel(), hold_s).mean(axis=1) @ weight
+    own = weight @ _covariance(window_s.ravel(), window_s.ravel()) @ weight
+    wandered = math.sqrt(0.288**2 + 4.0**2 * (own - 2.0 * common))
     found = r.start.get("drift2_degph").sd * 4.0
     heading = r.start.get("heading_deg").sd
-    assert math.degrees(r.held[-1].sd_rad) == pytest.approx(math.hypot(0.288, found, heading), rel=0.01)
+    assert math.degrees(r.held[-1].sd_rad) == pytest.approx(math.hypot(wandered, found, heading), rel=0.005)
+
+
+def _covariance(a_s: Floats, b_s: Floats) -> Floats:
+    """Of the random drift at instants, (deg/h)^2."""
+    return np.asarray(0.2**2 * np.exp(-np.abs(np.subtract.outer(a_s, b_s)) / 1000.0))
 
 
 def test_a_flight_tells_the_controller_where_it_is() -> None:

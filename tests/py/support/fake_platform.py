@@ -105,21 +105,25 @@ class FakePlatform:
         phi = math.radians(self.latitude_deg)
         return np.asarray(r.T @ np.array([0.0, math.cos(phi), math.sin(phi)]) * U_DEGPH * DEGPH)
 
-    def settled(self, q_rad: float, length_s: float = 0.0) -> tuple[float, float, float, float, float]:
+    def settled(
+        self, q_rad: float, length_s: float = 0.0, shift_arcmin: Sequence[float] | Array = (0.0, 0.0)
+    ) -> tuple[float, float, float, float, float]:
         """(S, u1, u2, beta true, gamma true) of a platform that holds the gimbal still; rates in rad/s.
 
-        length_s: of the window about this instant that they are means over.
+        length_s: of the window about this instant that they are means over. shift_arcmin: of gamma and beta, in this
+        setting, beyond the constant errors of the level sensors.
         """
         beta = 0.0
+        bias_gamma, bias_beta = self.bias_gamma_arcmin + shift_arcmin[0], self.bias_beta_arcmin + shift_arcmin[1]
         drift1, drift2 = (self._mean(d, length_s) * DEGPH for d in (self.drift1_degph, self.drift2_degph))
         wz = U_DEGPH * DEGPH * math.sin(self._told_rad)
         for _ in range(5):  # beta is some 1e-4: each round is that much nearer
             alpha, gamma = self.attitude(q_rad, beta)
             w = self.earth_p(turn(2, alpha) @ turn(0, beta) @ turn(1, gamma))
             u1 = (w[0] + drift1) / (1.0 + self.scale1)
-            beta_n, gamma_n = beta + self.bias_beta_arcmin * ARCMIN, gamma + self.bias_gamma_arcmin * ARCMIN
+            beta_n, gamma_n = beta + bias_beta * ARCMIN, gamma + bias_gamma * ARCMIN
             s = u1 + wz * math.cos(beta_n) * math.sin(gamma_n)
-            beta = -s / self._m1 - self.bias_beta_arcmin * ARCMIN
+            beta = -s / self._m1 - bias_beta * ARCMIN
         return s, u1, float(w[2]) + drift2, beta, gamma
 
     def _mean(self, drift_degph: Callable[[float], float], length_s: float) -> float:
@@ -159,8 +163,8 @@ class FakePlatform:
         n = round(length_s / STEP_S)
         t_mid_s = self.t_s + length_s / 2.0
         self.t_s = t_mid_s
-        s, u1, u2, _, gamma = self.settled(self._q, length_s)
-        shift = self.level_sd_arcmin * ARCMIN * self.rng.standard_normal(2)  # of the setting: seen, not felt by S
+        shift_arcmin = self.level_sd_arcmin * self.rng.standard_normal(2)  # of the level sensors, in this setting
+        s, u1, u2, _, gamma = self.settled(self._q, length_s, shift_arcmin)
         read = self.read_sd_arcmin * ARCMIN * self.rng.standard_normal()
         encoder = self._q + read if self.stuck_deg is None else math.radians(self.stuck_deg)
         at_s = STEP_S * np.arange(n, dtype=np.float64)
@@ -172,7 +176,7 @@ class FakePlatform:
             set_rad=self._set,
             t_mid_s=t_mid_s,
             beta_rad=self._levelled(np.asarray(rate)),
-            gamma_rad=np.full(n, gamma + self.bias_gamma_arcmin * ARCMIN + shift[0]),
+            gamma_rad=np.full(n, gamma + (self.bias_gamma_arcmin + shift_arcmin[0]) * ARCMIN),
             u1_radps=np.full(n, u1),
             u2_radps=np.full(n, u2),
             encoder_rad=encoder + swing,
