@@ -143,6 +143,12 @@ static void before_input(struct psabench_part *p, int64_t t_ns)
     ads1282_sample_until(&((struct part_ads1282 *)p)->chip, t_ns);
 }
 
+static void play_bits(struct psabench_part *p, const uint8_t *bits, size_t n, bool one_bit, int64_t t_ns)
+{
+    const struct ads1282_recording r = {.bits = bits, .count = (int64_t)n, .one_bit = one_bit};
+    ads1282_play(&((struct part_ads1282 *)p)->chip, &r, t_ns);
+}
+
 #define N(field) API_COUNTER(#field, part_ads1282, chip.count.field)
 #define V(field) API_VIOLATION(#field, part_ads1282, chip.count.field)
 #define L(field) API_VIOLATION("limit_" #field, part_ads1282, chip.limit.field)
@@ -160,6 +166,7 @@ static const struct api_counter counters[] = {
     L(sync_width),     API_COUNTER("limit_sync_keepout", part_ads1282, chip.limit.sync_keepout),
     L(reset_width),    API_VIOLATION("bad_access", part_ads1282, chip.regs.bad_access),
     R(ro_write),       R(unimp_access),
+    N(bits_missing),
 };
 #undef N
 #undef V
@@ -168,7 +175,7 @@ static const struct api_counter counters[] = {
 
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1282), .pins = pins, .counters = API_ROWS(counters), .spi = API_SPI_MODE0,           \
-    .open = open_ads1282, .before_input = before_input, .regs = offsetof(struct part_ads1282, chip.regs)
+    .open = open_ads1282, .before_input = before_input, .play_bits = play_bits, .regs = offsetof(struct part_ads1282, chip.regs)
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",

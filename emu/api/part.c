@@ -216,6 +216,37 @@ int psabench_set_volts(psabench_part *p, int input, double volts)
     return PSABENCH_OK;
 }
 
+static int check_bits(const psabench_part *p, const uint8_t *bits, size_t n, int kind)
+{
+    psabench *b = p->bench;
+    if (!p->kind->play_bits)
+        return api_fail(b, PSABENCH_NOT_HERE, "%s: psabench_play_bits(): expected an ads1281 or ads1282, got %s", p->name,
+                        p->kind->name);
+    if (!bits) return PSABENCH_OK;
+    if (kind != PSABENCH_ONE_BIT && kind != PSABENCH_M0_M1)
+        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: kind of bits: expected PSABENCH_ONE_BIT or PSABENCH_M0_M1, got %d",
+                        p->name, kind);
+    const unsigned most = kind == PSABENCH_ONE_BIT ? 1 : 3;
+    for (size_t i = 0; i < n; i++)
+        if (bits[i] > most)
+            return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: bits of clock %zu: expected 0 to %u, got %u", p->name, i, most,
+                            bits[i]);
+    return PSABENCH_OK;
+}
+
+int psabench_play_bits(psabench_part *p, const uint8_t *bits, size_t n, int kind)
+{
+    if (!p) return PSABENCH_BAD_ARGUMENT;
+    int bad = check_bits(p, bits, n, kind);
+    if (!bad) bad = before_input(p, "psabench_play_bits()");
+    if (bad) return bad;
+    p->bench->inside++;
+    p->kind->play_bits(p, bits, n, kind == PSABENCH_ONE_BIT, p->bench->sched.now_ns);
+    api_notify(p->bench);
+    p->bench->inside--;
+    return PSABENCH_OK;
+}
+
 /* ---- inside ---- */
 
 void api_ignore_edge(void *ctx, bool level, int64_t t_ns)

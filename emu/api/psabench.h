@@ -165,6 +165,14 @@ PSABENCH_API int psabench_set_input(psabench_part *p, psabench_input_fn *fn,
                                     void *ctx);                                 /* all inputs; NULL: constants */
 PSABENCH_API int psabench_set_volts(psabench_part *p, int input, double volts); /* this one constant from now on */
 
+/* Bits of a modulator, those of a real ADS1281 or ADS1282 for instance, in place of the model's own and of the input: what
+ * the converter's filters make of them. A byte a clock of the modulator (CLK/4): PSABENCH_M0_M1: level of M0 + 2 * level of M1,
+ * as on the pins; PSABENCH_ONE_BIT: 0 or 1, the bit of any other modulator. Full scale is 90 % of ones. The array is the
+ * caller's and stays as it is while it plays. The converter restarts now; the first byte is the first clock that is sampled, and
+ * the others go by with MCLK. After the last, zero is converted and counter bits_missing counts. bits NULL: the model again. */
+enum psabench_bits { PSABENCH_ONE_BIT = 1, PSABENCH_M0_M1 = 2 };
+PSABENCH_API int psabench_play_bits(psabench_part *p, const uint8_t *bits, size_t n, int kind);
+
 /* ---- SPI bytes ---- */
 
 /* Exchanges n bytes on SCLK, DIN and DOUT in the part's own mode (ads128x 0, ads125x 1), MSB first, at its SCLK frequency

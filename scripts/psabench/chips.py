@@ -24,7 +24,7 @@ same calls give the same answers on every machine.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -37,6 +37,7 @@ NEVER_NS = 2**63 - 1
 SLICE_NS = 100_000_000  # time runs in slices of this length, so that Ctrl-C and what callbacks raise come out soon
 BAD_ARGUMENT, NOT_HERE, REFUSED, TIMEOUT, SYSTEM, LATE, VIOLATED = -1, -2, -3, -4, -5, -6, -7  # enum psabench_error
 ERRORS = {BAD_ARGUMENT: BadInput, NOT_HERE: BadInput, TIMEOUT: TimeOut, LATE: TimeOut}  # BenchError: the others
+ONE_BIT, M0_M1 = 1, 2  # enum psabench_bits
 EDGES = ("falling", "rising", "either")  # enum psabench_edge
 
 
@@ -258,6 +259,7 @@ class Part:
         self.bench, self._lib, self._handle = bench, library(), handle
         self._callbacks: dict[tuple[str, tuple[int, ...]], object] = {}  # C knows only their addresses: kept alive here
         self._replaced: list[object] = []
+        self._bits: bytes | None = None
         self.name = str(self._lib.part_name(handle).decode())
         self.pins: Mapping[str, Pin] = _Pins(self)
 
@@ -277,6 +279,15 @@ class Part:
         """Inputs come from fn(input, t_ns) -> volts, asked at the instants of sampling: for one input never earlier
         than before, perhaps up to a data period ago. None: constants again."""
         self.install("set_input", INPUT, fn and (lambda _ctx, _part, *args: float(fn(*args))))
+
+    def play_bits(self, m0: Iterable[int] | None, m1: Iterable[int] | None = None) -> None:
+        """Bits of a modulator in place of the model's own and of the input, a level a clock of CLK/4: M0 and M1 of a real
+        ADS1281 or ADS1282, or one bit of another modulator. The converter restarts; the first bits are of the first clock
+        that it samples. After the last, zero is converted and the counter bits_missing counts. None: the model again.
+        BadInput for parts without modulator output, levels beside 0 and 1, and streams of different length."""
+        kind, bits = _bits(m0, m1)
+        self.bench.done(self._lib.play_bits(self.live(), bits, len(bits or b""), kind))
+        self._bits = bits  # C knows only its address
 
     # SPI
 
@@ -391,6 +402,29 @@ def _frame(f: FrameStruct) -> Frame:
         f.temp_channel,
         f.status,
     )
+
+
+def _bits(m0: Iterable[int] | None, m1: Iterable[int] | None) -> tuple[int, bytes | None]:
+    """enum psabench_bits, and a byte a clock; M1 weighs 2."""
+    if m0 is None:
+        return M0_M1, None
+    first = _levels("M0", m0)
+    if m1 is None:
+        return ONE_BIT, first
+    second = _levels("M1", m1)
+    if len(first) != len(second):
+        raise BadInput(expected(f"{len(first)} levels, as of M0", len(second), "M1"))
+    return M0_M1, bytes(a + 2 * b for a, b in zip(first, second, strict=True))
+
+
+def _levels(what: str, levels: Iterable[int]) -> bytes:
+    try:
+        found = bytes(int(level) for level in levels)
+    except ValueError:
+        found = b"\2"
+    if found.strip(b"\0\1"):
+        raise BadInput(expected("levels 0 and 1", "others", what))
+    return found
 
 
 def _word(what: str, value: int, bits: int = 32) -> int:

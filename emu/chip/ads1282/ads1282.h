@@ -61,6 +61,10 @@ void ads1282_shift(struct ads1282 *a, uint8_t *out, unsigned n, int64_t t_ns);
  * each sample at its own instant, when a data period ends. */
 void ads1282_sample_until(struct ads1282 *a, int64_t t_ns);
 
+/* From a restart at t_ns on the words come from these bits, at the modulator's rate whatever cfg.chain is; volts and noise do
+ * not matter, MFLAG stays low. Its clocks go by with MCLK, resets and later restarts or not; those past its end are counted. */
+void ads1282_play(struct ads1282 *a, const struct ads1282_recording *r, int64_t t_ns);
+
 /* ---- Words that no one looks at ---- */
 
 /* Why each word has to be computed, for volts at the input within a range; NULL: it need not. A sentence's end. */

@@ -86,6 +86,7 @@ struct ads1282_counters {
     uint32_t clipped;        /* words at the limit of the format */
     uint32_t realigned;      /* SCLK rested for 64 data periods inside a byte or command: interface time-out */
     uint32_t calibrations;   /* OFSCAL and GANCAL carried to their end */
+    uint32_t bits_missing;   /* clocks of the modulator past the end of a recording */
 };
 
 /* Limits of sources 1.4 that the pins broke: counted, without effect. Only the pin-level functions can see them. */
@@ -98,6 +99,14 @@ struct ads1282_limits {
     uint32_t sync_width;   /* SYNC high or low for less than 2 tCLK */
     uint32_t sync_keepout; /* SYNC rise closer than 30 ns to a CLK edge */
     uint32_t reset_width;  /* RESET low for less than 2 tCLK */
+};
+
+/* Bits of another modulator, that of a real chip for instance, in place of ours. They are the caller's, and stay. */
+struct ads1282_recording {
+    const uint8_t *bits; /* a byte a clock of the modulator: bit 0 M0, bit 1 M1, as the pins show them; NULL: our modulator */
+    int64_t count;
+    bool one_bit; /* bit 0 alone, the input itself: +-1 stands for +-5/4 of full scale, as the bits of M0 do */
+    int64_t edge; /* CLK edge of its first clock; -1: the next that is sampled */
 };
 
 /* ADS1281 with PINMODE high. */

@@ -12,6 +12,7 @@
 #define FIR_LATENCY_TCLK  468
 #define SINC_LATENCY_TCLK 264
 #define SINC_LAG          4 /* a word of the sinc needs five blocks */
+#define MCLK_TCLK         4 /* a clock of the modulator */
 
 #define FS_LSB  (INT64_C(1) << ADS1282_BLOCK_LOG2)
 #define DRAW_SD 37837.227475000000 /* of the sum of four uniform 16-bit numbers: sqrt((2^32 - 1) / 3) */
@@ -31,15 +32,20 @@ bool ads1282_bits_only(const struct ads1282 *a)
     return (a->config0 & ADS1282_CONFIG0_FILTR) == 0;
 }
 
+static enum ads1282_chain chain_in_force(const struct ads1282 *a)
+{
+    return a->recording.bits ? ADS1282_CHAIN_MODULATOR : a->cfg.chain;
+}
+
 static bool bit_true(const struct ads1282 *a)
 {
-    return a->cfg.chain == ADS1282_CHAIN_MODULATOR || ads1282_bits_only(a);
+    return chain_in_force(a) == ADS1282_CHAIN_MODULATOR || ads1282_bits_only(a);
 }
 
 /* Samples are those of the modulator's clock, not of sinc blocks or data periods. */
 static bool at_modulator_rate(const struct ads1282 *a)
 {
-    return bit_true(a) || (ads1282_sinc_only(a) && a->cfg.chain == ADS1282_CHAIN_EXACT);
+    return bit_true(a) || (ads1282_sinc_only(a) && chain_in_force(a) == ADS1282_CHAIN_EXACT);
 }
 
 /* ---- Input ---- */
@@ -204,11 +210,11 @@ static void sample_sinc(struct ads1282 *a, int64_t until_ns)
 
 /* ---- Bit-true modulator ---- */
 
-/* Sinc output of gain N^5, in bits of which 2/3 are full scale, to full scale 2^34. */
+/* Sinc output of gain N^5, in bits of which 4/5 are full scale, to full scale 2^34. */
 static int64_t sinc_lsb(int64_t y, unsigned ratio)
 {
     const unsigned gain_log2 = 5 * bits_log2(ratio);
-    return gain_log2 > 33 ? bits_round_shift(3 * y, gain_log2 - 33) : 3 * y * (INT64_C(1) << (33 - gain_log2));
+    return gain_log2 > 32 ? bits_round_shift(5 * y, gain_log2 - 32) : 5 * y * (INT64_C(1) << (32 - gain_log2));
 }
 
 static void take_sinc(struct ads1282 *a, int64_t lsb)
@@ -223,29 +229,68 @@ static void take_sinc(struct ads1282 *a, int64_t lsb)
         a->result[k / ADS1282_BLOCKS % ADS1282_RESULTS] = ads1282_filter_fir(&a->filter, a->sinc);
 }
 
+/* Of n clocks from CLK edge `edge` on. Past the recording's end M0 and M1 alternate, which stands for zero. */
+static void read_recording(struct ads1282 *a, int64_t edge, unsigned n, uint8_t *bits)
+{
+    struct ads1282_recording *r = &a->recording;
+    if (r->edge < 0) r->edge = edge;
+    int64_t clock = (edge - r->edge) / MCLK_TCLK;
+    for (unsigned i = 0; i < n; i++, clock++) {
+        const bool known = clock < r->count;
+        bits[i] = known ? r->bits[clock] : clock & 1 ? 3 : 0;
+        a->count.bits_missing += !known;
+    }
+}
+
+static void clock_modulator(struct ads1282 *a)
+{
+    uint8_t bits;
+    if (a->recording.bits) {
+        read_recording(a, a->next.k, 1, &bits);
+        ads1282_mod_take(&a->mod, bits);
+    } else {
+        ads1282_mod_step(&a->mod, noisy_input(a));
+    }
+    next_sample(a);
+}
+
 /* Before the first decoded clock, and it is not yet one. */
 static bool fill_delay(struct ads1282 *a)
 {
     if (a->index >= ADS1282_MOD_DELAY) return false;
-    ads1282_mod_step(&a->mod, noisy_input(a));
-    next_sample(a);
-    if (a->index == ADS1282_MOD_DELAY) ads1282_mod_start(&a->mod, &a->cic);
+    clock_modulator(a);
+    if (a->index == ADS1282_MOD_DELAY && !a->recording.one_bit) ads1282_mod_start(&a->mod, &a->cic);
     return true;
+}
+
+/* n clocks from CLK edge `edge` on, at t_ns. */
+static void run_modulator(struct ads1282 *a, int64_t edge, const int64_t *t_ns, unsigned n)
+{
+    int64_t lsb[ADS1282_MOD_RUN];
+    double vin_v[ADS1282_MOD_RUN];
+    input_row_v(a, t_ns, n, vin_v);
+    modulate_block(a, edge, vin_v, n, lsb);
+    ads1282_mod_run(&a->mod, &a->cic, lsb, n);
+}
+
+static void play_recording(struct ads1282 *a, int64_t edge, unsigned n)
+{
+    uint8_t bits[ADS1282_MOD_RUN];
+    read_recording(a, edge, n, bits);
+    ads1282_mod_play(&a->mod, &a->cic, bits, n, a->recording.one_bit);
 }
 
 /* Samples up to the end of their sinc block, or as many as a run takes. */
 static void sample_bit_true(struct ads1282 *a, int64_t until_ns)
 {
     while (a->next.t_ns <= until_ns) {
-        int64_t t_ns[ADS1282_MOD_RUN], lsb[ADS1282_MOD_RUN], y;
-        double vin_v[ADS1282_MOD_RUN];
+        int64_t t_ns[ADS1282_MOD_RUN], y;
         if (fill_delay(a)) continue;
         const int64_t edge = a->next.k;
         const unsigned left = a->cic.ratio - a->cic.n;
         const unsigned n = sample_times(a, until_ns, left < ADS1282_MOD_RUN ? left : ADS1282_MOD_RUN, t_ns);
-        input_row_v(a, t_ns, n, vin_v);
-        modulate_block(a, edge, vin_v, n, lsb);
-        ads1282_mod_run(&a->mod, &a->cic, lsb, n);
+        if (a->recording.bits) play_recording(a, edge, n);
+        else run_modulator(a, edge, t_ns, n);
         if (ads1282_cic_output(&a->cic, &y)) take_sinc(a, sinc_lsb(y, a->cic.ratio));
     }
 }
@@ -254,8 +299,7 @@ static void sample_bits(struct ads1282 *a, int64_t until_ns)
 {
     while (a->next.t_ns <= until_ns) {
         const int64_t t_ns = a->next.t_ns;
-        ads1282_mod_step(&a->mod, noisy_input(a));
-        next_sample(a);
+        clock_modulator(a);
         if (a->io.modulator) a->io.modulator(a->io.ctx, a->mod.m0 & 1, a->mod.m1 & 1, t_ns);
     }
 }
@@ -330,10 +374,10 @@ static void time_samples(struct ads1282 *a)
     t->step_tclk = 4 * n;
     t->origin_tclk = block_origin_tclk(a);
     if (at_modulator_rate(a)) {
-        t->step_tclk = 4;
+        t->step_tclk = MCLK_TCLK;
         t->origin_tclk += ads1282_sinc_only(a) ? 2 - 2 * n : 2 + 2 * n; /* the first clock of block 0, or of block 1 */
         if (ads1282_bits_only(a)) t->origin_tclk = 4;
-    } else if (a->cfg.chain == ADS1282_CHAIN_DIRECT) {
+    } else if (chain_in_force(a) == ADS1282_CHAIN_DIRECT) {
         t->step_tclk = t->period_tclk;
         t->origin_tclk = t->first_tclk - direct_delay_tclk(a);
     }
@@ -346,7 +390,7 @@ static sample_fn *chain_of(const struct ads1282 *a)
     if (!a->running) return sample_nothing;
     if (ads1282_bits_only(a)) return a->io.modulator || a->io.mflag ? sample_bits : sample_nothing;
     if (bit_true(a)) return sample_bit_true;
-    if (a->cfg.chain == ADS1282_CHAIN_DIRECT) return sample_direct;
+    if (chain_in_force(a) == ADS1282_CHAIN_DIRECT) return sample_direct;
     return ads1282_sinc_only(a) ? sample_sinc : sample_fir;
 }
 
@@ -378,7 +422,7 @@ void ads1282_chain_configure(struct ads1282 *a)
     const bool minimum = a->config0 & ADS1282_CONFIG0_PHASE;
     ads1282_filter_init(&a->filter, ads1282_sinc_ratio(a), minimum ? ADS1282_MINIMUM : ADS1282_LINEAR);
     time_samples(a);
-    a->lag = ads1282_sinc_only(a) && a->cfg.chain != ADS1282_CHAIN_DIRECT ? SINC_LAG : 0;
+    a->lag = ads1282_sinc_only(a) && chain_in_force(a) != ADS1282_CHAIN_DIRECT ? SINC_LAG : 0;
     a->direct_gain = (ads1282_sinc_only(a) ? 1.0 : fir_dc(a->filter.phase).gain) / 16.0;
 }
 
@@ -408,7 +452,7 @@ double ads1282_chain_noise_lsb(const struct ads1282 *a, double output_lsb)
     const double block_lsb = output_lsb / ads1282_filter_noise_gain(&a->filter);
     const double n = a->filter.sinc_ratio;
     if (at_modulator_rate(a)) return block_lsb / DRAW_SD * sqrt(n);
-    if (a->cfg.chain != ADS1282_CHAIN_DIRECT) return block_lsb / DRAW_SD;
+    if (chain_in_force(a) != ADS1282_CHAIN_DIRECT) return block_lsb / DRAW_SD;
     return (ads1282_sinc_only(a) ? block_lsb * sinc_noise_gain(n) : output_lsb) / 16.0;
 }
 

@@ -264,6 +264,15 @@ void ads1282_restart(struct ads1282 *a, int64_t t_ns)
     restart_at(a, clk_count_at(&a->clk, t_ns), t_ns);
 }
 
+void ads1282_play(struct ads1282 *a, const struct ads1282_recording *r, int64_t t_ns)
+{
+    a->recording = *r;
+    a->recording.edge = -1;
+    a->last_lsb = 0;
+    ads1282_configure(a);
+    ads1282_restart(a, t_ns);
+}
+
 /* Within one CLK of a whole number of data periods since the SYNC that restarted. */
 static bool in_phase(const struct ads1282 *a, int64_t edge)
 {

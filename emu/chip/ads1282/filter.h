@@ -6,8 +6,9 @@
  * five integer weights: exactly what the sinc at the modulator rate gives for the held input (proved by test).
  *
  * Word widths between the stages are not published; ours (E0) lose less than a quarter of the output's last bit and stay
- * inside int64 for any input up to ADS1282_SATURATION. Full scale in LSB: input block 2^34, after sinc, stages 1 and 2
- * 2^34, after stage 3 2^33, output 2^30; each rounded to nearest. Sources 1.7, 1.8. */
+ * inside int64 for any input up to ADS1282_SATURATION and, by the sums of the absolute weights, for any bits of a modulator.
+ * Full scale in LSB: input block 2^34, after sinc, stages 1 and 2 2^34, after stage 3 2^33, output 2^30; each rounded to
+ * nearest. Sources 1.7, 1.8. */
 #ifndef PSABENCH_CHIP_ADS1282_FILTER_H
 #define PSABENCH_CHIP_ADS1282_FILTER_H
 

@@ -2,13 +2,19 @@
 
 #include <string.h>
 
-/* Weight of the first loop's inner integrator at its quantiser: keeps w2 within 10 ONE for any input up to 106 %, slams
+/* Weight of the first loop's inner integrator at its quantiser: keeps w2 within 13 ONE for any input up to 106 %, slams
  * between the ends included; below 3 the second loop overloads there. E0: not published. */
 #define DAMPING 4
 
 void ads1282_mod_clear(struct ads1282_mod *m)
 {
     *m = (struct ads1282_mod){{0, 0}, {0, 0}, 0, 0};
+}
+
+static void push_bits(struct ads1282_mod *m, bool m0, bool m1)
+{
+    m->m0 = (m->m0 << 1 | m0) & 0x1F;
+    m->m1 = (m->m1 << 1 | m1) & 0x1F;
 }
 
 /* First loop: (1 - z^-1)^2 w2 = z^-2 (x - M0). The second takes w2 - 3 M0, nine times too large: its feedback is nine
@@ -21,8 +27,7 @@ void ads1282_mod_step(struct ads1282_mod *m, int64_t x)
     m->second[0] += m->first[1] - 3 * m0 - m1;
     m->first[1] += m->first[0];
     m->first[0] += x - m0;
-    m->m0 = (m->m0 << 1 | (m0 > 0)) & 0x1F;
-    m->m1 = (m->m1 << 1 | (m1 > 0)) & 0x1F;
+    push_bits(m, m0 > 0, m1 > 0);
 }
 
 static int32_t bit_sign(unsigned bits, unsigned ago)
@@ -51,12 +56,13 @@ void ads1282_mod_start(const struct ads1282_mod *m, struct ads1282_cic *c)
     c->integrator[1] = (uint64_t)-last;
 }
 
-/* What a clock adds by its bits: 1 for M0 = -1 and 2 for M1 = -1. No branch could be foretold. */
+/* What a clock adds by its bits: 1 for M0 = -1 and 2 for M1 = -1; from ONE_BIT on M0 alone. No branch could be foretold. */
 #define ONE ADS1282_MOD_ONE
+enum { ONE_BIT = 4 };
 static const struct {
     int64_t second0[4];                   /* to an integrator of the loops: -3 m0 - m1 */
-    int64_t early[4], late0[4], late1[4]; /* to those of the sinc: M0, 3 M0, 9 M1 */
-} add = {{-12 * ONE, -6 * ONE, 6 * ONE, 12 * ONE}, {1, -1, 1, -1}, {3, -3, 3, -3}, {9, 9, -9, -9}};
+    int64_t early[6], late0[6], late1[6]; /* to those of the sinc: M0, 3 M0, 9 M1 */
+} add = {{-12 * ONE, -6 * ONE, 6 * ONE, 12 * ONE}, {1, -1, 1, -1, 1, -1}, {3, -3, 3, -3, 0, 0}, {9, 9, -9, -9, 0, 0}};
 
 /* -feedback of a positive bit, or of a negative one. By mask, and added last: the next clock waits for
  * it, and for a table it would wait longer. */
@@ -101,15 +107,34 @@ static void integrate_bits(struct ads1282_cic *c, unsigned n, const uint8_t *bit
     c->n += n;
 }
 
+/* Those of the last clocks, in the place before the next. */
+static uint8_t *recall_bits(const struct ads1282_mod *m, unsigned kind, uint8_t bits[ADS1282_MOD_DELAY])
+{
+    for (unsigned i = 0; i < ADS1282_MOD_DELAY; i++)
+        bits[ADS1282_MOD_DELAY - 1 - i] = (uint8_t)(kind | !(m->m0 >> i & 1));
+    return bits + ADS1282_MOD_DELAY;
+}
+
 void ads1282_mod_run(struct ads1282_mod *m, struct ads1282_cic *c, const int64_t *x, unsigned n)
 {
-    uint8_t bits[ADS1282_MOD_DELAY + ADS1282_MOD_RUN];
-    for (unsigned i = 0; i < ADS1282_MOD_DELAY; i++) bits[ADS1282_MOD_DELAY - 1 - i] = !(m->m0 >> i & 1);
-    run_loops(m, x, n, bits + ADS1282_MOD_DELAY);
-    integrate_bits(c, n, bits + ADS1282_MOD_DELAY);
-    for (unsigned i = n < 5 ? 0 : n - 5; i < n; i++) {
-        const unsigned b = bits[ADS1282_MOD_DELAY + i];
-        m->m0 = (m->m0 << 1 | (~b & 1)) & 0x1F;
-        m->m1 = (m->m1 << 1 | (~b >> 1 & 1)) & 0x1F;
-    }
+    uint8_t room[ADS1282_MOD_DELAY + ADS1282_MOD_RUN];
+    uint8_t *bits = recall_bits(m, 0, room);
+    run_loops(m, x, n, bits);
+    integrate_bits(c, n, bits);
+    for (unsigned i = n < 5 ? 0 : n - 5; i < n; i++) push_bits(m, !(bits[i] & 1), !(bits[i] & 2));
+}
+
+void ads1282_mod_take(struct ads1282_mod *m, uint8_t bits)
+{
+    push_bits(m, bits & 1, bits & 2);
+}
+
+void ads1282_mod_play(struct ads1282_mod *m, struct ads1282_cic *c, const uint8_t *bits, unsigned n, bool one_bit)
+{
+    uint8_t room[ADS1282_MOD_DELAY + ADS1282_MOD_RUN];
+    const unsigned kind = one_bit ? ONE_BIT : 0, used = one_bit ? 1 : 3;
+    uint8_t *negative = recall_bits(m, kind, room);
+    for (unsigned i = 0; i < n; i++) negative[i] = (uint8_t)(kind | (~bits[i] & used));
+    integrate_bits(c, n, negative);
+    for (unsigned i = n < 5 ? 0 : n - 5; i < n; i++) ads1282_mod_take(m, bits[i]);
 }

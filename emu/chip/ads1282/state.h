@@ -83,6 +83,7 @@ struct ads1282 {
     struct ads1282_timing timing;
     struct ads1282_filter filter;
     struct ads1282_mod mod;
+    struct ads1282_recording recording;
     struct ads1282_cic cic, cic_low;
     struct ads1282_hpf hpf;
     struct ads1282_cal cal;

@@ -70,6 +70,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "run_until_interrupt": (_INT, _PTR, _TIME),
     "set_input": (_INT, _PTR, INPUT, _PTR),
     "set_volts": (_INT, _PTR, _INT, c.c_double),
+    "play_bits": (_INT, _PTR, _TEXT, c.c_size_t, _INT),
     "spi": (_INT, _PTR, _TEXT, _PTR, c.c_size_t),
     "spi_clock": (_INT, _PTR, c.c_uint32, _TIME),
     "peek": (_INT, _PTR, c.c_uint),

@@ -199,8 +199,8 @@ static void modulator_pins_carry_the_input(void **state)
         sum += 3 * last[2] - 6 * last[3] + 4 * last[4] + 9 * (x1[0] - 2 * x1[1] + x1[2]);
     }
     assert_true(rises > 4000);
-    is_near(2.5 * 1.5 * sum / (rises - 9), 0.8,
-            0.05); /* full scale is 2/3 of the bits' range; ends of the window: 0.03 */
+    is_near(2.5 * 1.25 * sum / (rises - 9), 0.8,
+            0.05); /* full scale is 4/5 of the bits' range; ends of the window: 0.03 */
 }
 
 static void is_a_clk_edge(void *ctx, psabench_part *p, int pin, int level, int64_t t_ns)
