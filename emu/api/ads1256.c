@@ -39,6 +39,8 @@ static const struct ads1256 *const_chip_of(const struct psabench_part *p)
       "a data read inside t6 of its command gives FFh")                                                                \
     X("strict_bus", API_BOOL, part_ads1256, cfg.strict_bus, "0", 0, 1, NULL,                                           \
       "other breaches of timing do what silicon may do, not only count")                                               \
+    X("sync_halts", API_BOOL, part_ads1256, cfg.sync_halts, "0", 0, 1, NULL,                                           \
+      "the SYNC command halts the conversion, DRDY is high until WAKEUP")                                              \
     X("strict_cs", API_BOOL, part_ads1256, cfg.strict_cs, "0", 0, 1, NULL, "CS high ends RDATAC")
 
 static const struct api_option options[] = {OPTIONS(API_OPTION_ROW)};

@@ -25,7 +25,7 @@ enum ads1256_mode {
     ADS1256_IN_RESET,    /* RESET low */
     ADS1256_CALIBRATING, /* measuring; its settling is already a normal run */
     ADS1256_RUNNING,
-    ADS1256_SYNC_WAIT, /* SYNC command given, WAKEUP awaited */
+    ADS1256_SYNC_WAIT, /* SYNC command given, WAKEUP awaited: only with sync_halts */
     ADS1256_SYNC_LOW,  /* SYNC/PDWN pin low */
     ADS1256_STANDBY    /* STANDBY command given, WAKEUP awaited */
 };
@@ -82,6 +82,7 @@ struct ads1256 {
     int64_t start_tau;   /* CLKIN count where the present run began */
     int64_t cell, ready; /* next cell and conversion of the run */
     enum ads1256_cal cal;
+    bool sync_due; /* SYNC has been commanded, conversions go on until WAKEUP */
     bool cal_due;  /* a calibration waits for the converter to start */
     bool updating; /* in the 16 tau before a new word */
     int32_t word;  /* 24-bit code */

@@ -62,6 +62,7 @@ struct ads1256_cfg {
     uint16_t cells_max;
     bool strict_timing; /* a data read inside t6 of its command gives FFh, as silicon would garble it */
     bool strict_bus;    /* other breaches do what silicon may do, not only count: docs/chips/ads1256.md */
+    bool sync_halts;    /* SYNC halts the conversion and DRDY is high until WAKEUP; otherwise WAKEUP alone restarts (page) */
     bool strict_cs;     /* CS high ends RDATAC; otherwise the mode outlives it (no source says which) */
 };
 

@@ -83,7 +83,7 @@ void ads1256_freeze(struct ads1256 *a, enum ads1256_mode mode)
     sched_cancel(a->sched, &a->ready_ev);
     sched_cancel(a->sched, &a->pulse_ev);
     sched_cancel(a->sched, &a->cal_ev);
-    a->updating = false;
+    a->updating = a->sync_due = false;
     a->mode = mode;
 }
 

@@ -46,7 +46,9 @@ static int64_t wakeup_ns(const struct ads1256 *a, int64_t t_ns)
 
 static void op_wakeup(struct ads1256 *a, int64_t t_ns)
 {
-    if (a->mode == ADS1256_SYNC_WAIT) ads1256_restart(a, 0, wakeup_ns(a, t_ns));
+    const bool synchronises = a->mode == ADS1256_SYNC_WAIT || a->sync_due;
+    if (synchronises) ads1256_set_drdy(a, true, t_ns);
+    if (synchronises) ads1256_restart(a, 0, wakeup_ns(a, t_ns));
     else if (a->mode == ADS1256_STANDBY) leave_standby(a, wakeup_ns(a, t_ns));
 }
 
@@ -88,7 +90,8 @@ static void op_calibrate(struct ads1256 *a, int64_t t_ns)
 static void op_sync(struct ads1256 *a, int64_t t_ns)
 {
     if (a->fault.lost_sync) return;
-    if (a->mode == ADS1256_RUNNING) ads1256_halt(a, ADS1256_SYNC_WAIT, t_ns);
+    if (a->mode == ADS1256_RUNNING && a->cfg.sync_halts) ads1256_halt(a, ADS1256_SYNC_WAIT, t_ns);
+    else if (a->mode == ADS1256_RUNNING) a->sync_due = true;
     else if (a->mode == ADS1256_CALIBRATING || a->mode == ADS1256_STANDBY) ads1256_refuse(a, a->opcode);
 }
 

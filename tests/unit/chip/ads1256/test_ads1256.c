@@ -80,7 +80,7 @@ static const struct {
     {0x10, 0x1F, MORE},                                 /* RREG */
     {0x20, 0x4F, BAD},        {0x50, 0x5F, MORE},       /* WREG */
     {0x60, 0xEF, BAD},        {0xF0, 0xF4, CALIBRATES}, /* SELFCAL, SELFOCAL, SELFGCAL, SYSOCAL, SYSGCAL */
-    {0xF5, 0xFB, BAD},        {0xFC, 0xFC, STOPS},      /* SYNC */
+    {0xF5, 0xFB, BAD},        {0xFC, 0xFC, NOTHING},    /* SYNC: WAKEUP does */
     {0xFD, 0xFD, STOPS},                                /* STANDBY */
     {0xFE, 0xFE, CALIBRATES},                           /* RESET */
     {0xFF, 0xFF, NOTHING},                              /* WAKEUP */

@@ -45,22 +45,52 @@ static void unread_words_give_a_pulse_of_16_tau(void **state)
     assert_int_equal(r.a.n.overruns, overruns + 2);
 }
 
+/* Whether SYNC halts the conversion or WAKEUP alone does. */
 static void sync_command_restarts_at_the_first_edge_of_wakeup(void **state)
 {
     (void)state;
-    struct rig r;
-    rig_up(&r, &quiet);
-    set_rate(&r, 0x82);
-    command(&r, 0xFC);
-    assert_true(ads1256_drdy(&r.a));
-    wait_ns(&r, 50000000); /* held as long as one likes */
-    assert_true(ads1256_drdy(&r.a));
-    const int64_t first_edge_ns = r.s.now_ns + FIRST_NS;
-    xfer(&r, 0x00);
-    const int64_t k = clk_count_at(&r.a.clkin, first_edge_ns);
-    assert_int_equal(await_fall(&r), clk_edge_ns(&r.a.clkin, k + 1382 + 256 * 300));
-    assert_int_equal(r.a.n.restarts, 1);
-    assert_int_equal(r.a.n.gap_violations, 0);
+    for (int halts = 0; halts < 2; halts++) {
+        struct ads1256_cfg cfg = quiet;
+        cfg.sync_halts = halts;
+        struct rig r;
+        rig_up(&r, &cfg);
+        set_rate(&r, 0x82);
+        const unsigned edges = r.edges;
+        command(&r, 0xFC);
+        assert_int_equal(ads1256_drdy(&r.a), halts);
+        wait_ns(&r, 50000000); /* held as long as one likes */
+        assert_int_equal(r.edges > edges + 4, !halts);
+        const int64_t first_edge_ns = r.s.now_ns + FIRST_NS;
+        xfer(&r, 0x00);
+        assert_true(ads1256_drdy(&r.a));
+        const int64_t k = clk_count_at(&r.a.clkin, first_edge_ns);
+        assert_int_equal(await_fall(&r), clk_edge_ns(&r.a.clkin, k + 1382 + 256 * 300));
+        assert_int_equal(r.a.n.restarts, 1);
+        assert_int_equal(r.a.n.gap_violations, 0);
+    }
+}
+
+/* What libraries do that wait for DRDY before each command: they go on, or hang. */
+static void drdy_between_sync_and_wakeup_goes_on_unless_sync_halts(void **state)
+{
+    (void)state;
+    for (int halts = 0; halts < 2; halts++) {
+        struct ads1256_cfg cfg = quiet;
+        cfg.sync_halts = halts;
+        struct rig r;
+        rig_up(&r, &cfg);
+        set_rate(&r, 0x82);
+        (void)rdata(&r); /* DRDY is high again */
+        command(&r, 0xFC);
+        for (int ms = 0; ms < 15 && ads1256_drdy(&r.a); ms++) wait_ns(&r, 1000000);
+        assert_int_equal(ads1256_drdy(&r.a), halts);
+        command(&r, 0xF0); /* what comes in between takes its place */
+        await_fall(&r);
+        const uint32_t restarts = r.a.n.restarts;
+        command(&r, 0x00);
+        assert_int_equal(r.a.n.restarts, restarts);
+        assert_false(ads1256_drdy(&r.a));
+    }
 }
 
 static void a_wakeup_slower_than_the_settling_time_restarts_at_its_end(void **state)
@@ -397,6 +427,7 @@ int main(void)
         cmocka_unit_test(first_word_after_t18_then_periodic_at_every_rate),
         cmocka_unit_test(unread_words_give_a_pulse_of_16_tau),
         cmocka_unit_test(sync_command_restarts_at_the_first_edge_of_wakeup),
+        cmocka_unit_test(drdy_between_sync_and_wakeup_goes_on_unless_sync_halts),
         cmocka_unit_test(a_wakeup_slower_than_the_settling_time_restarts_at_its_end),
         cmocka_unit_test(word_after_a_synchronised_channel_change_is_settled),
         cmocka_unit_test(unsynchronised_channel_change_mixes_the_running_word),

@@ -408,7 +408,7 @@ static void early_commands_are_lost_when_strict(void **state)
 {
     (void)state;
     struct ads1256_cfg cfg = quiet;
-    cfg.strict_bus = true;
+    cfg.strict_bus = cfg.sync_halts = true;
     struct rig r;
     power_up(&r, &cfg, 1);
     xfer(&r, 0x51); /* while the calibration runs: an opcode and two bytes that are none */
