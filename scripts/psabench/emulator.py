@@ -90,6 +90,12 @@ class Emulator:
         assert self._process is not None
         return self._process.pid
 
+    @property
+    def status(self) -> int | None:
+        """Exit status of an emulator that has ended by itself; None: it runs."""
+        assert self._process is not None
+        return self._process.poll()
+
     def signal(self, number: int) -> None:
         """Send it a signal, if it still runs."""
         assert self._process is not None

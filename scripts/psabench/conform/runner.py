@@ -110,7 +110,7 @@ def run(
     """Check everything; told: of each outcome as it comes. clock_ppm: allowed to all clocks."""
     dut.allowed_ppm = clock_ppm
     captures, tests = Captures(dut, keep), wanted(dut.variant, only)
-    each = (_outcome_of(captures, proof, rows) for proof, rows in tests)
+    each = (judge_test(captures, proof, rows) for proof, rows in tests)
     return tell_each(each, len(tests), dut.variant.name, progress, told)
 
 
@@ -127,7 +127,8 @@ def tell_each(
     return outcomes
 
 
-def _outcome_of(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, ...]) -> Outcome:
+def judge_test(captures: Captures, proof: SuiteTest, rows: tuple[Requirement, ...]) -> Outcome:
+    """Run one test of the suite on this device, its stimulus first where it has not been applied."""
     plan = plan_of(proof.test)
     begun_s = time.monotonic()
     found = not_decided(proof.test, [r.id for r in rows], plan.stimulus)

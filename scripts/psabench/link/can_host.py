@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from psabench.errors import BadInput, LinkError, expected
+from psabench.errors import BadInput, LinkError, TimeOut, expected
 from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
 from psabench.link.socketcand_bus import SocketcandBus
@@ -86,6 +86,7 @@ class StepClock:
         self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
         self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
+        self.deadline_s = math.inf  # no time passes after it
 
     def now_s(self) -> float:
         return self._t_ns * 1e-9
@@ -110,7 +111,12 @@ class StepClock:
         self.command(host, "run", **args)
 
     def command(self, host: CanHost | None, name: str, **args: object) -> Reply:
-        """A command that moves time, `run` or `run.until`; returns when every frame of that time has come."""
+        """A command that moves time, `run` or `run.until`; returns when every frame of that time has come.
+
+        Raises TimeOut where it would move it past the deadline, or has brought it there.
+        """
+        if "for_s" in args:
+            args["for_s"] = max(0.0, min(float(str(args["for_s"])), round(self.deadline_s - self.now_s(), 9)))
         hosts = self._hosts or ([] if host is None else [host])
         # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
         after_tx = self._base_tx + sum(h.sent for h in hosts)
@@ -118,6 +124,8 @@ class StepClock:
         self._t_ns = reply.t_ns
         for h, delivered, base in zip(hosts, self._delivered(reply), self._base_rx, strict=False):
             _receive_all(h, delivered - base)
+        if self.now_s() >= self.deadline_s:
+            raise TimeOut(f"simulated time ends at {self.deadline_s:.6g} s")
         return reply
 
     def _delivered(self, reply: Reply) -> list[int]:

@@ -1,0 +1,117 @@
+"""`psabench explore`: options, progress, and what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from psabench.boards.registry import NAMES
+from psabench.options import Parser, natural, positive
+
+if TYPE_CHECKING:
+    from psabench.explore.finding import Finding
+    from psabench.explore.search import Tally
+
+ABOUT = """\
+Play random schedules of faults and host behaviours on an emulated board, and check the requirements in each.
+"""
+EPILOG = """\
+examples:
+  psabench explore --board psa2                          1000 schedules; findings in build/explore/psa2-article
+  psabench explore --board psa2 --hours 8 --seed 7       as many as eight hours allow
+  psabench explore --replay build/explore/psa2-article/KEY/schedule.json
+
+A schedule takes at most --length of simulated time. A violation is shrunk to the shortest schedule that shows it; its
+folder has the schedule, a snapshot, and a scenario for psa-emu alone (docs/explore.md). The same command goes on where
+it was ended.
+
+Exit status: 0 no violation, 1 a violation, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
+"""
+OUT = Path("build/explore")
+SCHEDULES = 1000
+# Simulated time of a schedule, s: boards with fewer readings need more for the same, and cost less for each.
+LENGTH_S = {"psa2": 1.0, "psd1": 1.5, "pik": 1.5, "pmka": 8.0, "gyro": 100.0}
+ALONE = 100  # schedules: starting processes takes as long
+KEPT = "schedules that are done are kept; the same command goes on"
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench explore`. Raises BadInput."""
+    p = Parser(prog="psabench explore", description=ABOUT, epilog=EPILOG)
+    p.set_defaults(handler=_main, kept=KEPT)
+    p.add_argument("--board", default="psa2", help=f"board: {', '.join(NAMES)} (%(default)s)")
+    p.add_argument("--profile", help="profile of the board (psa-emu --list-profiles)")
+    p.add_argument("--seed", type=natural, default=1, help="random seed of the schedules (%(default)s)")
+    p.add_argument("--schedules", type=natural, metavar="N", help=f"schedules to play ({SCHEDULES})")
+    p.add_argument("--hours", type=positive, metavar="H", help="play for so long instead; 0.1: six minutes")
+    lengths = ", ".join(f"{board} {length_s:g}" for board, length_s in LENGTH_S.items())
+    p.add_argument("--length", type=positive, metavar="S", help=f"simulated time of a schedule at most ({lengths})")
+    p.add_argument("--findings", type=natural, metavar="N", help="end after N different violations")
+    p.add_argument("--jobs", type=natural, metavar="N", help="processes (one per core for many schedules)")
+    p.add_argument("--out", type=Path, metavar="FOLDER", help=f"folder of the findings ({OUT}/BOARD-PROFILE)")
+    p.add_argument("--replay", type=Path, metavar="FILE", help="play one schedule from its file")
+    return p.parse_args(words)
+
+
+def _main(args: argparse.Namespace) -> int:
+    return _replay(args.replay) if args.replay else _explore(args)
+
+
+def _replay(path: Path) -> int:
+    from psabench.explore.finding import replay
+
+    played = replay(path)
+    for v in played.violations:
+        print(v.words())
+    print(f"{path}: {played.actions} actions, {played.time_s:.6f} s simulated, {len(played.violations)} violations")
+    return 1 if played.violations else 0
+
+
+def _explore(args: argparse.Namespace) -> int:
+    from psabench.campaign.workers import workers
+    from psabench.conform.profile import variant
+    from psabench.explore.search import Search, run
+
+    v = variant(args.board, args.profile)
+    length_s = args.length or LENGTH_S[v.family]
+    search = Search(board=v.board, profile=v.profile, seed=args.seed, length_s=length_s)
+    count = args.schedules if args.schedules is not None else None if args.hours else SCHEDULES
+    jobs = args.jobs if args.jobs is not None or count is None or count > ALONE else 1
+    out = args.out or OUT / f"{v.board}-{v.profile}"
+    shown = Shown(v.name, count)
+    for_s = None if args.hours is None else 3600.0 * args.hours
+    with workers(jobs) as at_work:
+        tally = run(search, out, at_work, count=count, for_s=for_s, most=args.findings, told=shown.tell)
+    shown.close()
+    print(shown.summary(tally))
+    return 1 if tally.times else 0
+
+
+class Shown:
+    """Progress on stderr, findings on stdout."""
+
+    def __init__(self, name: str, count: int | None) -> None:
+        self._name, self._count = name, count
+        self._live = sys.stderr.isatty()
+
+    def tell(self, tally: Tally, finding: Finding | None) -> None:
+        """As `search.run` tells."""
+        if finding is not None:
+            self.close()
+            print(f"found: {finding.words()}", flush=True)
+        elif self._live:
+            of = "" if self._count is None else f" of {self._count}"
+            print(f"\r{self._name}: {tally.schedules}{of}, {len(tally.times)} found \x1b[K", end="", file=sys.stderr)
+
+    def close(self) -> None:
+        """The line of progress goes."""
+        if self._live:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+    def summary(self, tally: Tally) -> str:
+        """What came of the search, with what it had done before."""
+        found = ", ".join(f"{key} ({times})" for key, times in sorted(tally.times.items())) or "no violation"
+        return f"{self._name}: {tally.schedules} schedules, {tally.simulated_s:.1f} s simulated: {found}"

@@ -1,0 +1,83 @@
+"""Each kind of fault: with which values it is tried, and which requirements must hold while it is on.
+
+A fault that was announced excuses what it breaks by its nature (docs/faults.md), and nothing else:
+
+    VALUES    what is measured is wrong; all that is not about values at the inputs holds
+    LINES     the fault lies between the board and who looks at its lines; the bus sees nothing of it
+    READINGS  a converter or its controller is ill; the services of the bus hold
+    NOTHING   the link or the supply fails; looks wait until it is over
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+VALUES, LINES, READINGS, NOTHING = "values", "lines", "readings", "nothing"
+LEVELS = ("low", "high")
+LEAK = {"probability": (0.05, 0.3, 1.0)}
+HOLD = {**LEAK, "hold_s": (0.0003, 0.002, 0.01)}
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """holds: what must hold while it is on. values: choices for each argument. not_at: endings of points left out."""
+
+    holds: str
+    values: Mapping[str, tuple[Any, ...]]
+    not_at: tuple[str, ...] = ()
+
+
+RULES: Mapping[str, Rule] = {
+    "sensor.stuck": Rule(VALUES, {"out_v": (0.0, 0.5, -3.0)}),
+    "sensor.bias": Rule(VALUES, {"bias_v": (0.1, -2.0)}),
+    "sensor.drift": Rule(VALUES, {"drift_v_per_s": (1.0, -5.0)}),
+    "sensor.noise": Rule(VALUES, {"rms_v": (0.01, 1.0)}),
+    "sensor.saturation": Rule(VALUES, {"low_v": (-0.5,), "high_v": (0.5,)}),
+    "analog.reference": Rule(VALUES, {"reference_ppm": (10_000, -100_000)}),
+    "analog.ripple": Rule(VALUES, {"amplitude_v": (0.1, 1.0), "frequency_hz": (20.0, 400.0)}),
+    "chip.drdy_stuck": Rule(READINGS, {"level": LEVELS}),
+    "chip.dout_dead": Rule(READINGS, {"level": LEVELS}),
+    "chip.lost_sync": Rule(READINGS, {}),
+    "chip.clock": Rule(READINGS, {"clock_ppm": (20_000, -20_000)}),
+    # no reset mends a bit of a read-only memory
+    "chip.flip": Rule(READINGS, {"register": tuple(range(11)), "mask": (1, 2, 0x10, 0x80)}, not_at=(".rom",)),
+    "controller.skip_sync_t": Rule(READINGS, {}),
+    "controller.setup_order": Rule(READINGS, {}),
+    "controller.frozen_words": Rule(READINGS, {}),
+    "controller.capacitor": Rule(READINGS, {}),
+    "controller.stuck_reset": Rule(READINGS, {}),
+    "controller.stuck_key": Rule(READINGS, {}),
+    "line.stuck": Rule(LINES, {"level": LEVELS}),
+    "line.swapped": Rule(LINES, {}),
+    "line.glitch": Rule(LINES, {"width_ns": (100, 10_000)}),
+    "line.missing_pulse": Rule(LINES, {"pulse": (1, 40)}),
+    "line.extra_pulse": Rule(LINES, {"pulse": (1, 40), "width_ns": (100,)}),
+    "line.noise": Rule(LINES, {"rate_hz": (2000.0,), "width_ns": (100,)}),
+    "link.drop": Rule(NOTHING, LEAK),
+    "link.duplicate": Rule(NOTHING, LEAK),
+    "link.reorder": Rule(NOTHING, LEAK),
+    "link.delay": Rule(NOTHING, HOLD),
+    "link.corrupt": Rule(NOTHING, LEAK),
+    "link.error_frame": Rule(NOTHING, LEAK),
+    "link.bus_off": Rule(NOTHING, {}),
+    "supply.brownout": Rule(NOTHING, {"drop_v": (6.0, 12.0)}),
+    "platform.torquer": Rule(READINGS, {}),
+    "platform.drift_step": Rule(READINGS, {"drift_degph": (0.1, 100.0)}),
+    "platform.encoder_stuck": Rule(READINGS, {}),
+}
+
+# Kinds that are not tried, and why.
+LEFT_OUT: Mapping[str, str] = {
+    "sensor.scale": "the bench's sensors feel no acceleration",
+    "analog.load_open": "the bench's sensors give voltages",
+    "analog.load_short": "the bench's sensors give voltages",
+    "link.stall": "the host in process could not go on",
+}
+
+
+def drawn_values(rng: Random, kind: str) -> dict[str, Any]:
+    """Arguments of a fault of this kind."""
+    return {name: rng.choice(choices) for name, choices in RULES[kind].values.items()}

@@ -1,0 +1,173 @@
+"""Schedules one after the other, in parts that workers take. What is done is in a file; the same search goes on there.
+
+The schedules depend on board, profile, seed and number; not on who plays them, how many at once, or how often the
+search was interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.campaign.builds import digest
+from psabench.campaign.workers import Workers
+from psabench.errors import BadInput, expected
+from psabench.explore.finding import Finding, keep_finding
+from psabench.explore.oracle import Violation
+from psabench.explore.play import catalogue, play
+from psabench.explore.schedule import Schedule, draw_schedule
+from psabench.places import find_emulator
+
+PART = 5  # schedules of a task: long beside what a task costs, short for a person who waits
+DONE = "explore.jsonl"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Which schedules."""
+
+    board: str
+    profile: str
+    seed: int
+    length_s: float
+
+    def schedule(self, number: int) -> Schedule:
+        """That of a number."""
+        found = catalogue(self.board, self.profile, self.length_s)
+        return draw_schedule(found, self.seed, number, self.length_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """Some schedules of a search."""
+
+    search: Search
+    first: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """What came of them. found: number of the schedule, and what it violates."""
+
+    first: int
+    count: int
+    simulated_s: float
+    found: tuple[tuple[int, Violation], ...]
+
+
+def compute_part(task: Task) -> Part:
+    """Play them."""
+    simulated_s, found = 0.0, []
+    for number in range(task.first, task.first + task.count):
+        played = play(task.search.schedule(number))
+        simulated_s += played.time_s
+        found += [(number, v) for v in played.violations]
+    return Part(first=task.first, count=task.count, simulated_s=simulated_s, found=tuple(found))
+
+
+@dataclass(slots=True, kw_only=True)
+class Tally:
+    """What a search came to so far, with what it had done before. times: how often each key was found."""
+
+    schedules: int = 0
+    simulated_s: float = 0.0
+    times: dict[str, int] = field(default_factory=dict)
+    findings: dict[str, Finding] = field(default_factory=dict)  # of this run
+
+    def add(self, part: Mapping[str, Any]) -> None:
+        """A row of the file."""
+        self.schedules += int(part["count"])
+        self.simulated_s += float(part["simulated_s"])
+        for key in part["keys"]:
+            self.times[key] = self.times.get(key, 0) + 1
+
+
+class Log:
+    """The file of a search, a line a part: what is written is done."""
+
+    def __init__(self, out: Path, search: Search) -> None:
+        """Raises BadInput where the file is of another search or another build."""
+        self.path = out / DONE
+        self.tally = Tally()
+        self.done: set[int] = set()
+        mine = {"explore": asdict(search), "build": digest([find_emulator()])[:16]}
+        out.mkdir(parents=True, exist_ok=True)
+        rows = self._rows()
+        if rows and rows[0] != mine:
+            raise BadInput(expected("results of the same search and build (or another --out)", rows[0], self.path))
+        for row in rows[1:]:
+            self.done.add(row["first"])
+            self.tally.add(row)
+        if not rows:
+            self._write(mine)
+
+    def _rows(self) -> list[dict[str, Any]]:
+        """Whole lines; one that an end of the machine has cut is played again."""
+        if not self.path.exists():
+            return []
+        found = []
+        for line in self.path.read_text(encoding="utf-8").splitlines():
+            try:
+                found.append(json.loads(line))
+            except ValueError:
+                break
+        return found
+
+    def add(self, part: Part) -> None:
+        """A part that is done."""
+        row = {"first": part.first, "count": part.count, "simulated_s": round(part.simulated_s, 9)}
+        row |= {"keys": sorted({v.key for _, v in part.found})}
+        self._write(row)
+        self.tally.add(row)
+
+    def _write(self, row: Mapping[str, Any]) -> None:
+        with self.path.open("a", encoding="utf-8") as to:
+            to.write(json.dumps(row) + "\n")
+
+
+def tasks(search: Search, count: int | None, done: Iterable[int], go_on: Callable[[], bool]) -> Iterator[Task]:
+    """Parts that are not done, up to a number of schedules (None: without end), while `go_on`."""
+    known, first = set(done), 0
+    while (count is None or first < count) and go_on():
+        size = PART if count is None else min(PART, count - first)
+        if first not in known:
+            yield Task(search=search, first=first, count=size)
+        first += PART
+
+
+def run(
+    search: Search,
+    out: Path,
+    workers: Workers,
+    *,
+    count: int | None,
+    for_s: float | None = None,
+    most: int | None = None,
+    told: Callable[[Tally, Finding | None], None] = lambda *_: None,
+) -> Tally:
+    """Play `count` schedules, or as many as `for_s` allows; ends after `most` findings.
+
+    Each key is shrunk and kept when it comes for the first time. told: after each part and each finding. Raises
+    BadInput.
+    """
+    log = Log(out, search)
+    ends_s = None if for_s is None else time.monotonic() + for_s
+
+    def go_on() -> bool:
+        in_time = ends_s is None or time.monotonic() < ends_s
+        return in_time and (most is None or len(log.tally.findings) < most)
+
+    for part in workers.map(compute_part, tasks(search, count, log.done, go_on)):
+        for number, violation in part.found:
+            if violation.key not in log.tally.findings and go_on():
+                finding = keep_finding(out, search.schedule(number), violation)
+                log.tally.findings[violation.key] = finding
+                told(log.tally, finding)
+        log.add(part)
+        told(log.tally, None)
+    return log.tally
