@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def explored(suite: Suite, emulator: Path, target: Target, args: argparse.Namespace) -> dict[str, Any]:
-    """What a search says of an emulator: found (None: nobody can tell), schedules that it took, its words."""
+    """What a search says of an emulator: found (None: the search did not end), schedules that it took, its words."""
     with tempfile.TemporaryDirectory(prefix="rediscover-") as folder:
         words = ["explore", "--board", target.board, "--seed", str(args.seed), "--schedules", str(args.schedules)]
         words += ["--profile", target.profile] if target.profile else []

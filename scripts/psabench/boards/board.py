@@ -93,6 +93,7 @@ class Board:
     has_thermometer: bool = False  # its temperatures are compared with a chamber's
     on_table: bool = False  # it has gyros
     session: Session | None = None  # what PulseView and GTKWave show of its lines at first; None: no such files
+    schedule_s: float = 1.0  # simulated time of a schedule of psabench explore
     overdrive_v_per_g: float = 0.0  # of the accelerometer X, which a dividing head turns beyond full scale
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psabench.boards.registry import NAMES
+from psabench.boards.registry import BOARDS, NAMES
 from psabench.options import Parser, natural, positive
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ Exit status: 0 no violation, 1 a violation, 2 bad input, 3 the bench failed, 130
 """
 OUT = Path("build/explore")
 SCHEDULES = 1000
-# Simulated time of a schedule, s: boards with fewer readings need more for the same, and cost less for each.
-LENGTH_S = {"psa2": 1.0, "psd1": 1.5, "pik": 1.5, "pmka": 8.0, "gyro": 100.0}
 ALONE = 100  # schedules: starting processes takes as long
 KEPT = "schedules that are done are kept; the same command goes on"
 
@@ -41,13 +39,13 @@ KEPT = "schedules that are done are kept; the same command goes on"
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench explore`. Raises BadInput."""
     p = Parser(prog="psabench explore", description=ABOUT, epilog=EPILOG)
-    p.set_defaults(handler=_main, kept=KEPT)
+    p.set_defaults(handler=_handle_command, kept=KEPT)
     p.add_argument("--board", default="psa2", help=f"board: {', '.join(NAMES)} (%(default)s)")
     p.add_argument("--profile", help="profile of the board (psa-emu --list-profiles)")
     p.add_argument("--seed", type=natural, default=1, help="random seed of the schedules (%(default)s)")
     p.add_argument("--schedules", type=natural, metavar="N", help=f"schedules to play ({SCHEDULES})")
     p.add_argument("--hours", type=positive, metavar="H", help="play for so long instead; 0.1: six minutes")
-    lengths = ", ".join(f"{board} {length_s:g}" for board, length_s in LENGTH_S.items())
+    lengths = ", ".join(f"{name} {board.schedule_s:g}" for name, board in BOARDS.items())
     p.add_argument("--length", type=positive, metavar="S", help=f"simulated time of a schedule at most ({lengths})")
     p.add_argument("--findings", type=natural, metavar="N", help="end after N different violations")
     p.add_argument("--jobs", type=natural, metavar="N", help="processes (one per core for many schedules)")
@@ -56,27 +54,27 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _main(args: argparse.Namespace) -> int:
-    return _replay(args.replay) if args.replay else _explore(args)
+def _handle_command(args: argparse.Namespace) -> int:
+    return _replay_schedule(args.replay) if args.replay else _explore_board(args)
 
 
-def _replay(path: Path) -> int:
-    from psabench.explore.finding import replay
+def _replay_schedule(path: Path) -> int:
+    from psabench.explore.finding import replay_file
 
-    played = replay(path)
+    played = replay_file(path)
     for v in played.violations:
         print(v.words())
     print(f"{path}: {played.actions} actions, {played.time_s:.6f} s simulated, {len(played.violations)} violations")
     return 1 if played.violations else 0
 
 
-def _explore(args: argparse.Namespace) -> int:
+def _explore_board(args: argparse.Namespace) -> int:
     from psabench.campaign.workers import workers
     from psabench.conform.profile import variant
-    from psabench.explore.search import Search, run
+    from psabench.explore.search import Search, run_search
 
     v = variant(args.board, args.profile)
-    length_s = args.length or LENGTH_S[v.family]
+    length_s = args.length or BOARDS[v.family].schedule_s
     search = Search(board=v.board, profile=v.profile, seed=args.seed, length_s=length_s)
     count = args.schedules if args.schedules is not None else None if args.hours else SCHEDULES
     jobs = args.jobs if args.jobs is not None or count is None or count > ALONE else 1
@@ -84,7 +82,7 @@ def _explore(args: argparse.Namespace) -> int:
     shown = Shown(v.name, count)
     for_s = None if args.hours is None else 3600.0 * args.hours
     with workers(jobs) as at_work:
-        tally = run(search, out, at_work, count=count, for_s=for_s, most=args.findings, told=shown.tell)
+        tally = run_search(search, out, at_work, count=count, for_s=for_s, most=args.findings, told=shown.tell)
     shown.close()
     print(shown.summary(tally))
     return 1 if tally.times else 0
@@ -98,7 +96,7 @@ class Shown:
         self._live = sys.stderr.isatty()
 
     def tell(self, tally: Tally, finding: Finding | None) -> None:
-        """As `search.run` tells."""
+        """As `search.run_search` tells."""
         if finding is not None:
             self.close()
             print(f"found: {finding.words()}", flush=True)

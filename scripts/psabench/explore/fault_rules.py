@@ -18,16 +18,21 @@ from typing import Any
 VALUES, LINES, READINGS, NOTHING = "values", "lines", "readings", "nothing"
 LEVELS = ("low", "high")
 LEAK = {"probability": (0.05, 0.3, 1.0)}
+FLIPS = {"register": tuple(range(11)), "mask": (1, 2, 0x10, 0x80)}
 HOLD = {**LEAK, "hold_s": (0.0003, 0.002, 0.01)}
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """holds: what must hold while it is on. values: choices for each argument. not_at: endings of points left out."""
+    """holds: what must hold while it is on. values: choices for each argument. not_at: endings of points left out.
+
+    is_once: it is over at once, and has no duration.
+    """
 
     holds: str
     values: Mapping[str, tuple[Any, ...]]
     not_at: tuple[str, ...] = ()
+    is_once: bool = False
 
 
 RULES: Mapping[str, Rule] = {
@@ -42,8 +47,7 @@ RULES: Mapping[str, Rule] = {
     "chip.dout_dead": Rule(READINGS, {"level": LEVELS}),
     "chip.lost_sync": Rule(READINGS, {}),
     "chip.clock": Rule(READINGS, {"clock_ppm": (20_000, -20_000)}),
-    # no reset mends a bit of a read-only memory
-    "chip.flip": Rule(READINGS, {"register": tuple(range(11)), "mask": (1, 2, 0x10, 0x80)}, not_at=(".rom",)),
+    "chip.flip": Rule(READINGS, FLIPS, not_at=(".rom",), is_once=True),  # no reset mends a read-only memory
     "controller.skip_sync_t": Rule(READINGS, {}),
     "controller.setup_order": Rule(READINGS, {}),
     "controller.frozen_words": Rule(READINGS, {}),
@@ -52,7 +56,7 @@ RULES: Mapping[str, Rule] = {
     "controller.stuck_key": Rule(READINGS, {}),
     "line.stuck": Rule(LINES, {"level": LEVELS}),
     "line.swapped": Rule(LINES, {}),
-    "line.glitch": Rule(LINES, {"width_ns": (100, 10_000)}),
+    "line.glitch": Rule(LINES, {"width_ns": (100, 10_000)}, is_once=True),
     "line.missing_pulse": Rule(LINES, {"pulse": (1, 40)}),
     "line.extra_pulse": Rule(LINES, {"pulse": (1, 40), "width_ns": (100,)}),
     "line.noise": Rule(LINES, {"rate_hz": (2000.0,), "width_ns": (100,)}),
@@ -62,7 +66,7 @@ RULES: Mapping[str, Rule] = {
     "link.delay": Rule(NOTHING, HOLD),
     "link.corrupt": Rule(NOTHING, LEAK),
     "link.error_frame": Rule(NOTHING, LEAK),
-    "link.bus_off": Rule(NOTHING, {}),
+    "link.bus_off": Rule(NOTHING, {}, is_once=True),
     "supply.brownout": Rule(NOTHING, {"drop_v": (6.0, 12.0)}),
     "platform.torquer": Rule(READINGS, {}),
     "platform.drift_step": Rule(READINGS, {"drift_degph": (0.1, 100.0)}),

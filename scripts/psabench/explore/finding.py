@@ -1,9 +1,9 @@
 """What a search has found: the schedule shrunk, and a folder from which anyone sees it again.
 
-    schedule.json     the shortest schedule; psabench explore --replay FOLDER/schedule.json
-    before.snapshot   the bench before the last action; psa-emu --restore FILE
-    script.yaml       the same inputs as a scenario for psa-emu alone, in free pace
-    finding.txt       what was violated, and the lines that show it again
+schedule.json     the shortest schedule; psabench explore --replay FOLDER/schedule.json
+before.snapshot   the bench before the last action; psa-emu --restore FILE
+script.yaml       the same inputs as a scenario for psa-emu alone, in free pace
+finding.txt       what was violated, and the lines that show it again
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from psabench.errors import BadInput, BenchError, expected
+from psabench.errors import BadInput, expected
 from psabench.explore.oracle import Violation
-from psabench.explore.play import Played, play
+from psabench.explore.play import Played, play_schedule
 from psabench.explore.schedule import Action, Schedule, of_data
 from psabench.explore.script import length_s, script_of
 from psabench.explore.shrink import shrink_list
@@ -39,7 +39,7 @@ class Finding:
         return f"{self.violation.words()}\n  {many}; psabench explore --replay {self.folder / 'schedule.json'}"
 
 
-def shrink_schedule(schedule: Schedule, key: str, player: Player = play) -> Schedule:
+def shrink_schedule(schedule: Schedule, key: str, player: Player = play_schedule) -> Schedule:
     """The shortest schedule that violates the same; itself where it does not violate it again."""
 
     def fails(actions: Sequence[Action]) -> bool:
@@ -52,35 +52,37 @@ def shrink_schedule(schedule: Schedule, key: str, player: Player = play) -> Sche
     return replace(schedule, actions=shrink_list(begun, fails))
 
 
-def keep_finding(out: Path, schedule: Schedule, violation: Violation, player: Player = play) -> Finding:
+def keep_finding(out: Path, schedule: Schedule, violation: Violation, player: Player = play_schedule) -> Finding:
     """Shrink it and write its folder, OUT/KEY. Raises OSError."""
     shrunk = shrink_schedule(schedule, violation.key, player)
     folder = out / re.sub(r"\W+", "-", violation.key).strip("-")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "schedule.json").write_text(json.dumps(shrunk.data(), indent=1) + "\n", encoding="utf-8")
-    again = play(shrunk, folder)
+    again = play_schedule(shrunk, folder)
     seen = next((v for v in again.violations if v.key == violation.key), violation)
     finding = Finding(violation=seen, schedule=shrunk, of=len(schedule.actions), folder=folder)
-    (folder / "finding.txt").write_text(_text(finding, _write_script(folder)), encoding="utf-8")
+    (folder / "finding.txt").write_text(_finding_text(finding, _write_script(folder)), encoding="utf-8")
     return finding
 
 
 def _write_script(folder: Path) -> str:
-    """The line that runs it; empty where the emulator had gone before it could be saved."""
+    """The line that runs it; empty where there is none: see `script_of`."""
     saved = [folder / f"{name}.snapshot" for name in ("after", "before")]
     path = next((p for p in saved if p.is_file()), None)
-    if path is None:
+    text = "" if path is None else path.read_text(encoding="utf-8")
+    script = script_of(text) if text else None
+    if script is None:
         return ""
-    text = path.read_text(encoding="utf-8")
-    (folder / "script.yaml").write_text(json.dumps(script_of(text), indent=1) + "\n", encoding="utf-8")
+    (folder / "script.yaml").write_text(json.dumps(script, indent=1) + "\n", encoding="utf-8")
     wires = "--can log:bus.log --vcd lines.vcd"
     return f"psa-emu {folder / 'script.yaml'} --pace free --for {length_s(text):.9f}s {wires}"
 
 
-def _text(f: Finding, script: str) -> str:
+def _finding_text(f: Finding, script: str) -> str:
     lines = [f.violation.words(), "", *(f"{k}. {a.words()}" for k, a in enumerate(f.schedule.actions, 1)), ""]
     lines += [f"psabench explore --replay {f.folder / 'schedule.json'}"]
-    lines += [f"psa-emu --restore {f.folder / 'before.snapshot'}", script] if script else []
+    lines += [f"psa-emu --restore {f.folder / 'before.snapshot'}"]
+    lines += [script] if script else []
     return "\n".join(lines) + "\n"
 
 
@@ -92,6 +94,6 @@ def read_schedule(path: Path) -> Schedule:
         raise BadInput(expected("a schedule of psabench explore", e, path)) from e
 
 
-def replay(path: Path) -> Played:
+def replay_file(path: Path) -> Played:
     """Play a schedule from a file. Raises BadInput, BenchError."""
-    return play(read_schedule(path))
+    return play_schedule(read_schedule(path))

@@ -25,9 +25,7 @@ from psabench.explore.fault_rules import LINES, NOTHING, READINGS, VALUES
 Judged = tuple[SuiteTest, tuple[Requirement, ...]]
 
 # Whatever a host sends and whatever a converter does: what the node itself sends has its form.
-ALWAYS = (
-    "BUS-ID-05 BUS-ID-06 BUS-EMCY-01 BUS-EMCY-02 BUS-EMCY-03 BUS-EMCY-05 BUS-BOOT-01".split()
-)
+ALWAYS = "BUS-ID-05 BUS-ID-06 BUS-EMCY-01 BUS-EMCY-02 BUS-EMCY-03 BUS-EMCY-05 BUS-BOOT-01".split()
 # Recordings of readings are judged by these stimuli's checks, too.
 ALSO: Mapping[str, Sequence[str]] = {"stream": ("quiet", "services", "overload")}
 # Looks that take more than a second of simulated time, s; of several boards the least. A schedule that is too short for
@@ -53,8 +51,9 @@ LONG_S: Mapping[str, float] = {
     "minute": 61.0,
     "the_temperature_is_that_of_the_chamber": 61.0,
 }
-# Of a board whose readings are wrong or have stopped: services that want none. Of one whose values are wrong: all but these.
+# Services that want no readings: they hold on a board whose readings are wrong or have stopped.
 SERVICES = ("BUS-BOOT", "BUS-HB", "BUS-ID-02", "BUS-ID-03", "BUS-SDO-0", "BUS-OD-02", "BUS-OD-03")
+# What is said of values beside the tests that want known inputs.
 OF_VALUES = ("PSA2-ADC", "PSA2-CHIP-05", "PSA2-CHIP-06", "PSA2-CHIP-07")
 SEEN_ON_LINES = frozenset({"line", "pins", "port", "bus"})
 
@@ -82,7 +81,7 @@ def of_outcome(o: Outcome) -> Violation | None:
 
 
 @cache
-def looks(board: str, profile: str) -> Mapping[str, Sequence[Judged]]:
+def looks_of(board: str, profile: str) -> Mapping[str, Sequence[Judged]]:
     """Tests by the name of their stimulus, an active one by its own."""
     suite.load()
     found: dict[str, list[Judged]] = {}
@@ -94,7 +93,7 @@ def looks(board: str, profile: str) -> Mapping[str, Sequence[Judged]]:
 
 def short_looks(v: Variant, length_s: float) -> list[str]:
     """Those that a schedule of this length can have."""
-    found = looks(v.board, v.profile)
+    found = looks_of(v.board, v.profile)
     known = stimuli(v.family)
     there = (n for n, tests in found.items() if n in known or plan_of(tests[0][0].test).is_active)
     return sorted(n for n in there if LONG_S.get(n, 0.0) <= length_s)
@@ -123,9 +122,9 @@ def must_hold(test: SuiteTest, ids: Sequence[str], on: Sequence[str]) -> bool:
 # ---- looking
 
 
-def look(s: Dut, name: str, on: Sequence[str]) -> list[Violation]:
+def look_at_board(s: Dut, name: str, on: Sequence[str]) -> list[Violation]:
     """Apply a stimulus and judge its checks, or carry out a dialogue. on: rules of the faults that are on."""
-    all_looks = looks(s.variant.board, s.variant.profile)
+    all_looks = looks_of(s.variant.board, s.variant.profile)
     captures = Captures(s, lambda *_: ())
     tests = [t for t in all_looks.get(name, ()) if must_hold(t[0], [r.id for r in t[1]], on)]
     found = [of_outcome(judge_test(captures, *t)) for t in tests]
@@ -145,7 +144,7 @@ def judge_also(e: Capture, test: SuiteTest, rows: Sequence[Requirement]) -> Viol
 
 def judge_always(e: Capture) -> list[Violation]:
     """Of a log in which anything may have been sent."""
-    tests = [t for ts in looks(e.variant.board, e.variant.profile).values() for t in ts]
+    tests = [t for ts in looks_of(e.variant.board, e.variant.profile).values() for t in ts]
     always = [(t, rows) for t, rows in tests if {r.id for r in rows} & set(ALWAYS) and not plan_of(t.test).is_active]
     found = [judge_also(e, t, rows) for t, rows in always]
     return [v for v in found if v is not None]

@@ -95,9 +95,9 @@ def draw_schedule(c: Catalogue, seed: int, number: int, length_s: float) -> Sche
     if rng.random() < FAULT_SHARE:
         at = rng.randint(0, len(actions))
         actions[at:at] = [_drawn_fault(c, rng, rng.choice(LASTS_S)) for _ in range(rng.randint(1, 2))]
-    looks = [_look(rng.choice(c.looks), under=False) for _ in range(rng.randint(1, LOOKS))]
+    looks = [_look_at(rng.choice(c.looks), under=False) for _ in range(rng.randint(1, LOOKS))]
     if rng.random() < UNDER_SHARE:
-        looks[:1] = [_drawn_fault(c, rng, UNDER_S), _look(str(looks[0].args["name"]), under=True)]
+        looks[:1] = [_drawn_fault(c, rng, UNDER_S), _look_at(str(looks[0].args["name"]), under=True)]
     return Schedule(
         board=c.board,
         profile=c.profile,
@@ -108,7 +108,7 @@ def draw_schedule(c: Catalogue, seed: int, number: int, length_s: float) -> Sche
     )
 
 
-def _look(name: str, *, under: bool) -> Action:
+def _look_at(name: str, *, under: bool) -> Action:
     return Action("look", {"name": name, "under": under})
 
 

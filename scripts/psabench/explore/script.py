@@ -14,21 +14,25 @@ from typing import Any
 from psabench.errors import BadInput, expected
 
 NS = 1e9
+MOST = 128  # entries of a timeline
 
 
-def script_of(snapshot: str) -> dict[str, Any]:
-    """The scenario of a snapshot with its inputs as a timeline, and `for_s`, how long it ran, as a comment's worth.
+def script_of(snapshot: str) -> dict[str, Any] | None:
+    """The scenario of a snapshot with its inputs as a timeline; None where a timeline cannot have them: they are too
+    many, or cycles of a bus port.
 
     Raises BadInput for a text that is no snapshot.
     """
     try:
         head, scenario, *entries = [json.loads(line) for line in snapshot.splitlines()]
         if head["psabench"] != "snapshot":
-            raise KeyError(head["psabench"])
+            raise ValueError(expected("snapshot", head["psabench"]))
         buses = [b["name"] for b in scenario["buses"]]
-        timeline = [*(scenario.get("timeline") or []), *(t for e in entries for t in _timed(e, buses))]
+        timeline = [*(scenario.get("timeline") or []), *(t for e in entries for t in _timed_entries(e, buses))]
     except (ValueError, KeyError, TypeError) as e:
         raise BadInput(expected("a snapshot", f"{type(e).__name__}: {e}", "explore")) from e
+    if len(timeline) > MOST or any("cycle" in e for e in entries):
+        return None
     return {**scenario, "timeline": timeline}
 
 
@@ -38,7 +42,7 @@ def length_s(snapshot: str) -> float:
     return float(ends[-1]) / NS
 
 
-def _timed(entry: dict[str, Any], buses: list[str]) -> Iterator[dict[str, Any]]:
+def _timed_entries(entry: dict[str, Any], buses: list[str]) -> Iterator[dict[str, Any]]:
     """An entry of the input log as entries of a timeline; none for what changes nothing on the wires."""
     if entry.get("refused"):
         return

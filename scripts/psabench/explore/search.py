@@ -18,7 +18,7 @@ from psabench.campaign.workers import Workers
 from psabench.errors import BadInput, expected
 from psabench.explore.finding import Finding, keep_finding
 from psabench.explore.oracle import Violation
-from psabench.explore.play import catalogue, play
+from psabench.explore.play import catalogue_of, play_schedule
 from psabench.explore.schedule import Schedule, draw_schedule
 from psabench.places import find_emulator
 
@@ -37,7 +37,7 @@ class Search:
 
     def schedule(self, number: int) -> Schedule:
         """That of a number."""
-        found = catalogue(self.board, self.profile, self.length_s)
+        found = catalogue_of(self.board, self.profile, self.length_s)
         return draw_schedule(found, self.seed, number, self.length_s)
 
 
@@ -64,7 +64,7 @@ def compute_part(task: Task) -> Part:
     """Play them."""
     simulated_s, found = 0.0, []
     for number in range(task.first, task.first + task.count):
-        played = play(task.search.schedule(number))
+        played = play_schedule(task.search.schedule(number))
         simulated_s += played.time_s
         found += [(number, v) for v in played.violations]
     return Part(first=task.first, count=task.count, simulated_s=simulated_s, found=tuple(found))
@@ -97,16 +97,16 @@ class Log:
         self.done: set[int] = set()
         mine = {"explore": asdict(search), "build": digest([find_emulator()])[:16]}
         out.mkdir(parents=True, exist_ok=True)
-        rows = self._rows()
+        rows = self._read_rows()
         if rows and rows[0] != mine:
             raise BadInput(expected("results of the same search and build (or another --out)", rows[0], self.path))
         for row in rows[1:]:
             self.done.add(row["first"])
             self.tally.add(row)
         if not rows:
-            self._write(mine)
+            self._write_row(mine)
 
-    def _rows(self) -> list[dict[str, Any]]:
+    def _read_rows(self) -> list[dict[str, Any]]:
         """Whole lines; one that an end of the machine has cut is played again."""
         if not self.path.exists():
             return []
@@ -120,17 +120,17 @@ class Log:
 
     def add(self, part: Part) -> None:
         """A part that is done."""
-        row = {"first": part.first, "count": part.count, "simulated_s": round(part.simulated_s, 9)}
-        row |= {"keys": sorted({v.key for _, v in part.found})}
-        self._write(row)
+        keys = sorted({v.key for _, v in part.found})
+        row = {"first": part.first, "count": part.count, "simulated_s": round(part.simulated_s, 9), "keys": keys}
+        self._write_row(row)
         self.tally.add(row)
 
-    def _write(self, row: Mapping[str, Any]) -> None:
+    def _write_row(self, row: Mapping[str, Any]) -> None:
         with self.path.open("a", encoding="utf-8") as to:
             to.write(json.dumps(row) + "\n")
 
 
-def tasks(search: Search, count: int | None, done: Iterable[int], go_on: Callable[[], bool]) -> Iterator[Task]:
+def missing_tasks(search: Search, count: int | None, done: Iterable[int], go_on: Callable[[], bool]) -> Iterator[Task]:
     """Parts that are not done, up to a number of schedules (None: without end), while `go_on`."""
     known, first = set(done), 0
     while (count is None or first < count) and go_on():
@@ -140,7 +140,7 @@ def tasks(search: Search, count: int | None, done: Iterable[int], go_on: Callabl
         first += PART
 
 
-def run(
+def run_search(
     search: Search,
     out: Path,
     workers: Workers,
@@ -156,18 +156,20 @@ def run(
     BadInput.
     """
     log = Log(out, search)
+    tally = log.tally
     ends_s = None if for_s is None else time.monotonic() + for_s
 
-    def go_on() -> bool:
-        in_time = ends_s is None or time.monotonic() < ends_s
-        return in_time and (most is None or len(log.tally.findings) < most)
+    def is_enough() -> bool:
+        return most is not None and len(tally.findings) >= most
 
-    for part in workers.map(compute_part, tasks(search, count, log.done, go_on)):
+    def go_on() -> bool:
+        return not is_enough() and (ends_s is None or time.monotonic() < ends_s)
+
+    for part in workers.map(compute_part, missing_tasks(search, count, log.done, go_on)):
         for number, violation in part.found:
-            if violation.key not in log.tally.findings and go_on():
-                finding = keep_finding(out, search.schedule(number), violation)
-                log.tally.findings[violation.key] = finding
-                told(log.tally, finding)
+            if violation.key not in tally.times | tally.findings and not is_enough():
+                tally.findings[violation.key] = keep_finding(out, search.schedule(number), violation)
+                told(tally, tally.findings[violation.key])
         log.add(part)
-        told(log.tally, None)
-    return log.tally
+        told(tally, None)
+    return tally

@@ -18,7 +18,7 @@ def shrink_list(items: Sequence[Item], fails: Callable[[Sequence[Item]], bool]) 
     kept, parts = tuple(items), 2
     while len(kept) > 1:
         size = max(1, len(kept) // parts)
-        shorter = next((less for less in _without(kept, size) if fails(less)), None)
+        shorter = next((less for less in _leave_out_each(kept, size) if fails(less)), None)
         if shorter is not None:
             kept, parts = shorter, max(2, parts - 1)
         elif size == 1:
@@ -28,6 +28,6 @@ def shrink_list(items: Sequence[Item], fails: Callable[[Sequence[Item]], bool]) 
     return kept
 
 
-def _without(items: tuple[Item, ...], size: int) -> list[tuple[Item, ...]]:
+def _leave_out_each(items: tuple[Item, ...], size: int) -> list[tuple[Item, ...]]:
     """The items without each of their stretches of this size, the first left out first."""
     return [items[:k] + items[k + size :] for k in range(0, len(items), size)]

@@ -44,6 +44,7 @@ SESSION = Session(
 BOARD = Board(
     name="pik",
     device="Pik",
+    schedule_s=1.5,
     aliases=("pik5", "pik6"),
     lines=(*"CLK LATCH FXP FXN FYP FYN FZP FZN".split(), *PARALLEL_BUS),
     port_lines=("FXP", "FXN", "FYP", "FYN", "FZP", "FZN", "LATCH"),

@@ -48,6 +48,7 @@ SESSION = Session(
 BOARD = Board(
     name="pmka",
     device="Pmka",
+    schedule_s=8.0,
     lines=(
         *"KL1 KL2 KL3 KL4 TAU0 TAU1 TAU2 RP1 RN1 RP2 RN2 RP3 RN3 RP4 RN4 SH CONV MUX0 MUX1".split(),
         *PARALLEL_BUS,

@@ -69,6 +69,7 @@ SESSION = Session(
 BOARD = Board(
     name="psd1",
     device="Psd1",
+    schedule_s=1.5,
     lines=(*"A0 INT0 FL1 FL2 DR RFX RFY RFZ TFS SCLK SDAT CLK_1M25".split(), *PARALLEL_BUS),
     port_lines=("RFX", "RFY", "RFZ", "SCLK", "SDAT", "FL2", "CS"),
     bus=Bus(quiet="STATUS", harmless="TEMP", harmless_word=0),
