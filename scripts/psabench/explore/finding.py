@@ -26,9 +26,10 @@ Player = Callable[[Schedule], Played]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """schedule: shrunk. of: how many actions it had."""
+    """schedule: shrunk. of: how many actions it had. also: what else it violates."""
 
     violation: Violation
+    also: Sequence[Violation] = ()
     schedule: Schedule
     of: int
     folder: Path
@@ -60,7 +61,8 @@ def keep_finding(out: Path, schedule: Schedule, violation: Violation, player: Pl
     (folder / "schedule.json").write_text(json.dumps(shrunk.data(), indent=1) + "\n", encoding="utf-8")
     again = play_schedule(shrunk, folder)
     seen = next((v for v in again.violations if v.key == violation.key), violation)
-    finding = Finding(violation=seen, schedule=shrunk, of=len(schedule.actions), folder=folder)
+    also = [v for v in again.violations if v is not seen]
+    finding = Finding(violation=seen, also=also, schedule=shrunk, of=len(schedule.actions), folder=folder)
     (folder / "finding.txt").write_text(_finding_text(finding, _write_script(folder)), encoding="utf-8")
     return finding
 
@@ -79,7 +81,12 @@ def _write_script(folder: Path) -> str:
 
 
 def _finding_text(f: Finding, script: str) -> str:
-    lines = [f.violation.words(), "", *(f"{k}. {a.words()}" for k, a in enumerate(f.schedule.actions, 1)), ""]
+    lines = [
+        *(v.words() for v in (f.violation, *f.also)),
+        "",
+        *(f"{k}. {a.words()}" for k, a in enumerate(f.schedule.actions, 1)),
+        "",
+    ]
     lines += [f"psabench explore --replay {f.folder / 'schedule.json'}"]
     lines += [f"psa-emu --restore {f.folder / 'before.snapshot'}"]
     lines += [script] if script else []

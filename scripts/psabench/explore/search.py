@@ -6,6 +6,7 @@ search was interrupted.
 
 from __future__ import annotations
 
+import itertools
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -152,8 +153,8 @@ def run_search(
 ) -> Tally:
     """Play `count` schedules, or as many as `for_s` allows; ends after `most` findings.
 
-    Each key is shrunk and kept when it comes for the first time. told: after each part and each finding. Raises
-    BadInput.
+    A schedule that violates something for the first time is shrunk and kept, once for all that it violates. told: after
+    each part and each finding. Raises BadInput.
     """
     log = Log(out, search)
     tally = log.tally
@@ -165,11 +166,14 @@ def run_search(
     def go_on() -> bool:
         return not is_enough() and (ends_s is None or time.monotonic() < ends_s)
 
+    known = set(tally.times)
     for part in workers.map(compute_part, missing_tasks(search, count, log.done, go_on)):
-        for number, violation in part.found:
-            if violation.key not in tally.times | tally.findings and not is_enough():
-                tally.findings[violation.key] = keep_finding(out, search.schedule(number), violation)
-                told(tally, tally.findings[violation.key])
+        for number, violations in itertools.groupby(part.found, key=lambda found: found[0]):
+            new = [v for _, v in violations if v.key not in known]
+            if new and not is_enough():
+                known |= {v.key for v in new}
+                tally.findings[new[0].key] = keep_finding(out, search.schedule(number), new[0])
+                told(tally, tally.findings[new[0].key])
         log.add(part)
         told(tally, None)
     return tally

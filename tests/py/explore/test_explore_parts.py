@@ -256,10 +256,11 @@ def test_what_is_no_snapshot_is_told(text: str) -> None:
 
 
 def part(task: Task) -> Part:
-    """Stands for a board that is wrong in schedule 12 and 17."""
-    v = Violation(key="k", requirements=("X-01",), saw="1", due="2")
+    """Stands for a board that violates two things at once in schedule 12, and one of these again in 13 and 17."""
+    k, m = (Violation(key=key, requirements=("X-01",), saw="1", due="2") for key in "km")
     mine = range(task.first, task.first + task.count)
-    return Part(first=task.first, count=task.count, simulated_s=1.0, found=tuple((n, v) for n in (12, 17) if n in mine))
+    found = tuple((n, v) for n, v in ((12, k), (12, m), (13, m), (17, k)) if n in mine)
+    return Part(first=task.first, count=task.count, simulated_s=1.0, found=found)
 
 
 @pytest.fixture
@@ -281,8 +282,8 @@ def test_a_search_goes_on_where_it_was_ended(kept: list[int], tmp_path: Path) ->
     counts = (10, 15, 23)
     runs = [search.run_search(SEARCH, tmp_path, ThisProcess(), count=n) for n in counts]
     assert tuple(r.schedules for r in runs) == counts
-    assert [r.times for r in runs] == [{}, {"k": 1}, {"k": 2}]
-    assert kept == [12], "what was kept before is not kept again"
+    assert [r.times for r in runs] == [{}, {"k": 1, "m": 1}, {"k": 2, "m": 1}]
+    assert kept == [12], "what comes together, or was kept before, is kept once"
     assert [t.first for t in missing_tasks(SEARCH, 23, Log(tmp_path, SEARCH).done, lambda: True)] == []
 
 
