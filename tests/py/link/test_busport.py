@@ -1,4 +1,4 @@
-"""The host's end of the bus port, against a pseudo-terminal that says what the test wants."""
+"""The host's end of the bus port against a stand-in: a pseudo-terminal that says what the test wants."""
 
 from __future__ import annotations
 

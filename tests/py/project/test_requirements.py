@@ -328,6 +328,8 @@ def checkout(tmp_path: Path) -> Path:
             "static void runs(void **state)\n{\n}\nint main(void)\n{\n    const struct CMUnitTest tests[] = {\n"
             "        cmocka_unit_test(runs),\n    };\n    return cmocka_run_group_tests(tests, NULL, NULL);\n}\n"
         ),
+        "tests/py/test_b.py": '"""The node is a stand-in."""\ndef test_b(): ...\n',
+        "tests/py/project/test_c.py": '"""Files."""\ndef test_c(): ...\n',
         "docs/reference/a.md": "",
         "scripts/psabench/conform/device.py": '@proves("PSA2-FRAME-04")\ndef frame_is_whole(): ...\n',
     }
@@ -379,6 +381,14 @@ def replace(name: str, was: str, now: str) -> Callable[[Path], None]:
         (
             replace("tests/unit/test_a.c", "cmocka_unit_test(runs)", "/* runs */"),
             "test_a.c:runs is no test that is run",
+        ),
+        (
+            replace("proto/requirements/psa2.yaml", "tests/unit/test_a.c:runs", "tests/py/test_b.py:test_b"),
+            "FRAME-03: tests/py/test_b.py:test_b: expected a test of the board, got one of a stand-in",
+        ),
+        (
+            replace("proto/requirements/psa2.yaml", "tests/unit/test_a.c:runs", "tests/py/project/test_c.py:test_c"),
+            "FRAME-03: expected a test that runs the board, got tests/py/project/test_c.py:test_c, which reads files",
         ),
         (
             replace("scripts/psabench/conform/device.py", "FRAME-04", "FRAME-99"),

@@ -105,22 +105,74 @@ static void a_client_that_gives_up_finds_the_port_busy_until_the_board_is_done(v
     assert_int_equal(answer(r), 0);
 }
 
-static void a_port_fault_of_the_board_is_told_and_ends_with_data(void **state)
+static const struct port {
+    enum psa2_fault fault;
+    enum psa2_group group;
+    uint8_t status; /* of a frame that shows the port at work */
+    uint16_t code;
+    uint8_t source;
+} ports[] = {
+    {PSA2_FAULT_ACCEL_PORT, PSA2_ACCEL, PSA2_ST_SETTLED, 0xFF01, 1},
+    {PSA2_FAULT_TEMP_PORT, PSA2_TEMP, PSA2_ST_SETTLED | PSA2_ST_TEMP_NEW, 0xFF02, 2},
+};
+
+/* The only emergency since the last look: code, error register, source. */
+static void told(struct rig *r, uint16_t code, uint8_t reg, uint8_t source)
+{
+    settle(r);
+    assert_int_equal(count_id(r, 0x085), 1);
+    const uint8_t *const d = seen_id(r, 0x085)->data;
+    assert_int_equal(bits_get_le(d, 2), code);
+    assert_int_equal(d[2], reg);
+    assert_int_equal(d[3], source);
+    r->count = 0;
+}
+
+static void not_told(struct rig *r)
+{
+    settle(r);
+    assert_int_equal(count_id(r, 0x085), 0);
+}
+
+static void falls_silent(struct rig *r, const struct port *p)
+{
+    psa2_can_fault(&r->can, p->fault, r->s.now_ns);
+    told(r, p->code, 0x81, p->source);
+    psa2_can_fault(&r->can, p->fault, r->s.now_ns);
+    not_told(r);
+}
+
+static void frame_with(struct rig *r, uint8_t status)
+{
+    struct psa2_frame f = sample(r);
+    f.status = status;
+    psa2_can_frame(&r->can, &f, r->s.now_ns);
+}
+
+/* A request that times out tells a fault that is not told yet; one that is carried out ends it. */
+static void request_ends(struct rig *r, const struct port *p, enum psa2_result result)
+{
+    ask(r, 0x40, p->group == PSA2_ACCEL ? 0x2000 : 0x2001, 1, 0);
+    fake_done(r, result);
+}
+
+static void a_port_fault_is_told_once_and_ends_with_data_or_a_request(void **state)
 {
     (void)state;
-    struct rig *r = rig_up(1000000, 0, 1000);
-    psa2_can_fault(&r->can, PSA2_FAULT_ACCEL_PORT, r->s.now_ns);
-    psa2_can_fault(&r->can, PSA2_FAULT_TEMP_PORT, r->s.now_ns);
-    settle(r);
-    assert_int_equal(count_id(r, 0x085), 2);
-    struct psa2_frame f = sample(r);
-    f.status = PSA2_ST_SETTLED;
-    psa2_can_frame(&r->can, &f, r->s.now_ns);
-    assert_false(error_active(&r->can.node.node, PSA2_EMCY_ACCEL_PORT));
-    assert_true(error_active(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
-    f.status |= PSA2_ST_TEMP_NEW;
-    psa2_can_frame(&r->can, &f, r->s.now_ns);
-    assert_false(error_active(&r->can.node.node, PSA2_EMCY_TEMP_PORT));
+    for (size_t i = 0; i < COUNT(ports); i++) {
+        const struct port *const p = &ports[i], *const other = &ports[1 - i];
+        struct rig *r = rig_up(1000000, 0, 1000);
+        falls_silent(r, p);
+        request_ends(r, other, PSA2_OK);
+        if (p->group == PSA2_TEMP) frame_with(r, other->status); /* the axes go on */
+        not_told(r);
+        frame_with(r, p->status);
+        told(r, 0, 0, 0);
+        request_ends(r, p, PSA2_TIMEOUT);
+        told(r, p->code, 0x81, p->source);
+        request_ends(r, p, PSA2_OK);
+        told(r, 0, 0, 0);
+    }
 }
 
 /* ---- resets, mirrors, several units ---- */
@@ -153,7 +205,7 @@ int main(void)
         cmocka_unit_test(objects_outside_the_map_have_the_codes_of_cia_301),
         cmocka_unit_test(opcodes_reach_their_group_and_are_answered_when_accepted),
         cmocka_unit_test(a_client_that_gives_up_finds_the_port_busy_until_the_board_is_done),
-        cmocka_unit_test(a_port_fault_of_the_board_is_told_and_ends_with_data),
+        cmocka_unit_test(a_port_fault_is_told_once_and_ends_with_data_or_a_request),
         cmocka_unit_test(reset_node_is_the_reset_pin_and_restores_defaults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -42,6 +42,20 @@ static unsigned count_changes(const struct rig *r, enum psa2_line line, bool lev
     return n;
 }
 
+/* The names of the article's table, section 5. */
+static void the_sixteen_lines_are_those_of_the_article(void **state)
+{
+    (void)state;
+    static const char *const want[] = {
+        "SYNC_A", "SClk", "DRD_A", "DIn",  "DOutX", "DOutY", "DOutZ", "SYNC_T",
+        "CST",    "DRD_T", "DInT", "DOutT", "Res",  "Data",  "CLK",   "Int",
+    };
+    watched_run(&rig, "article", 1000000);
+    const struct trace *const t = &rig.b.base.trace;
+    assert_int_equal(t->count, COUNT(want));
+    for (size_t i = 0; i < COUNT(want); i++) assert_true(trace_find(t, want[i]) >= 0);
+}
+
 /* The article's bytes, then what the article does not show, then the first read. */
 static void set_up_is_the_articles_in_its_order(void **state)
 {
@@ -301,6 +315,7 @@ static void a_reset_cuts_the_frame_short(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_sixteen_lines_are_those_of_the_article),
         cmocka_unit_test(set_up_is_the_articles_in_its_order),
         cmocka_unit_test(each_transfer_follows_its_event),
         cmocka_unit_test(cst_frames_the_temperature_port),

@@ -79,13 +79,20 @@ static void a_silent_temperature_converter_too(void **state)
     rig_run(&rig, 30000000);
     struct psa2_request q = {.group = PSA2_TEMP, .op = PSA2_READ_REG, .addr = 0};
     assert_int_equal(rig_request(&rig, &q), PSA2_TIMEOUT);
+    assert_int_equal(rig.faults, 1);
     assert_int_equal(rig.fault[0], PSA2_FAULT_TEMP_PORT);
     const unsigned frames = rig.frames;
     rig_run(&rig, 100000000);
     near(rig.frames - frames, 100, 1); /* accelerations go on */
+    assert_int_equal(rig_request(&rig, &q), PSA2_TIMEOUT);
+    assert_int_equal(rig.faults, 1); /* told once */
     ads1256_reset_pin(&rig.b.tadc, true, rig.s.now_ns);
     rig_run(&rig, 400000000);
     assert_int_equal(rig_request(&rig, &q), PSA2_OK);
+    ads1256_reset_pin(&rig.b.tadc, false, rig.s.now_ns);
+    assert_int_equal(rig_request(&rig, &q), PSA2_TIMEOUT);
+    assert_int_equal(rig.faults, 2); /* the first has ended */
+    assert_int_equal(rig.fault[1], PSA2_FAULT_TEMP_PORT);
 }
 
 /* A set-up that puts the temperature converter to sleep (SYNC without WAKEUP) waits for DRD_T in vain: 100 ms and four
