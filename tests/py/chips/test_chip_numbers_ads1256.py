@@ -147,8 +147,8 @@ def loud_word(drate: int, gain_code: int, begin_ns: int) -> tuple[int, int]:
 
 
 def test_every_cell_of_the_noise_table_scales_the_same_draw() -> None:
-    """All 112 cells: the word of one instant is one draw times the printed figure, to a code. How large such draws are is
-    for the next test."""
+    """All 112 cells: the word of one instant is one draw times the printed figure, to a code. How large such draws
+    are is for the next test."""
     draw, least, off = math.nan, math.inf, []
     for drate, rate in RATES.items():
         settled_ns = loud_word(drate, 0, AT_NS)[0] - AT_NS

@@ -456,7 +456,7 @@ def test_noise_is_the_published_one_at_every_rate(dr: int) -> None:
 
 @pytest.mark.parametrize("dr", SNR_DB)
 def test_noise_of_every_gain_scales_the_same_draws_by_the_published_figures(dr: int) -> None:
-    """The same seed draws the same numbers: words at a gain are those at gain 64 times the ratio of two cells, to an LSB."""
+    """The same seed draws the same numbers: words at a gain are those at gain 64 times the cells' ratio, to an LSB."""
     words = []
     for gain_code in range(7):
         with awake(seed=5, noise_scale=1000) as s:

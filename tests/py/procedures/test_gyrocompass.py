@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_bench import seeded
-from fake_platform import FakePlatform
+from fake_platform import STEP_S, FakePlatform
 from psabench.errors import BadInput, LinkError
 from psabench.estimate.angles import wrapped_deg
 from psabench.native import nav
-from psabench.native.nav import DEGPH
+from psabench.native.nav import DEGPH, EARTH_RADPS
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
@@ -180,13 +180,21 @@ def _gauss_markov(rng: np.random.Generator, sigma: float, tau_s: float) -> objec
     return lambda t_s: 25.0 + float(np.interp(t_s, np.arange(n), x))
 
 
-def test_white_noise_of_the_level_widens_the_interval() -> None:
+@pytest.mark.parametrize("heading_deg", [0.0, 37.0, 90.0, 200.0])
+def test_white_noise_of_the_level_widens_the_interval(heading_deg: float) -> None:
+    """n sqrt(m1 dt)/T in each S, sqrt(1/2) of it in half the difference of the outer positions, sqrt(3/2) in the middle
+    one less their mean: so the heading, by where north is between them. Three windows tell n to 1.7 %."""
     none = {"gm_sigma_degph": 0.0, "angle_sd_arcmin": 0.0, "level_sd_arcmin": 0.0, "latitude_sd_arcmin": 0.0}
-    quiet = run(FakePlatform(), "article", **none)
-    loud = run(FakePlatform(noise_arcmin=0.05), "article", **none)
+    level = {"heading_deg": heading_deg, "pitch_deg": 0.0, "roll_deg": 0.0}
+    quiet = run(FakePlatform(**level), "article", **none)
+    loud = run(FakePlatform(noise_arcmin=0.05, **level), "article", **none)
     assert quiet.get("heading_deg").sd < 1e-6
-    # 0.6 deg/h per arc minute for m1 = 1, T = 10 s; half of the sum of two and four of them at 9.67 deg/h
-    assert loud.get("heading_deg").sd == pytest.approx(0.05 * 0.6 / 9.67 * 57.3 * 1.0, rel=0.45)
+    s_sd_radps = math.radians(0.05 / 60.0) * math.sqrt(1.0 * STEP_S) / 10.0
+    north_radps = EARTH_RADPS * math.cos(math.radians(50.0))
+    h = math.radians(heading_deg)
+    share = math.hypot(math.sqrt(0.5) * math.cos(h), math.sqrt(1.5) * math.sin(h))
+    want_deg = math.degrees(s_sd_radps / north_radps) * share
+    assert loud.get("heading_deg").sd == pytest.approx(want_deg, rel=0.08)  # 4.8 sd
 
 
 # ---- what is refused, and what is flagged

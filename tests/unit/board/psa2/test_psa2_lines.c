@@ -47,8 +47,8 @@ static void the_sixteen_lines_are_those_of_the_article(void **state)
 {
     (void)state;
     static const char *const want[] = {
-        "SYNC_A", "SClk", "DRD_A", "DIn",  "DOutX", "DOutY", "DOutZ", "SYNC_T",
-        "CST",    "DRD_T", "DInT", "DOutT", "Res",  "Data",  "CLK",   "Int",
+        "SYNC_A", "SClk",  "DRD_A", "DIn",   "DOutX", "DOutY", "DOutZ", "SYNC_T",
+        "CST",    "DRD_T", "DInT",  "DOutT", "Res",   "Data",  "CLK",   "Int",
     };
     watched_run(&rig, "article", 1000000);
     const struct trace *const t = &rig.b.base.trace;
