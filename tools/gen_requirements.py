@@ -3,8 +3,9 @@
 
 Usage:
     gen_requirements.py              write docs/reference/requirements.md
-    gen_requirements.py --check      exit 1 if the page is stale, a test that a row names is none or never sees the
-                                     board, an id in @proves is unknown, or a page, heading, table or number that a row cites is not there
+    gen_requirements.py --check      exit 1 if the page is stale, a test that a row names is none or never sees
+                                     the board, an id in @proves is unknown, or a page, heading, table or number
+                                     that a row cites is not there
     gen_requirements.py --complete   the same as --check, and if a requirement that can be observed has no test
     gen_requirements.py --root DIR   of another checkout
 

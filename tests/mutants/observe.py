@@ -31,8 +31,9 @@ SIZES = (b"\x01", b"\x00\x00", b"\x02\x00\x00", b"\x01\x00\x00\x00", b"\xff\xff\
 class Sum:
     """Of all that was seen."""
 
-    def __init__(self) -> None:
-        self._hash = hashlib.sha256()
+    def __init__(self, *, stamps: bool = True) -> None:
+        """stamps: the adapter tells the time of the bus; else that of this machine, which never comes again."""
+        self._hash, self._stamps = hashlib.sha256(), stamps
 
     def add(self, *what: object) -> None:
         self._hash.update(repr(what).encode())
@@ -40,7 +41,7 @@ class Sum:
     def take(self, take: Take) -> None:
         """Frames, lines, cycles."""
         for f in take.frames:
-            self.add(round(f.t_s * 1e9), f.can_id, f.data, f.fd, f.error)
+            self.add(round(f.t_s * 1e9) if self._stamps else 0, f.can_id, f.data, f.fd, f.error)
         self.lines(take.lines)
 
     def lines(self, log: LineLog | None) -> None:
@@ -129,6 +130,31 @@ def _cycles(s: Dut, total: Sum) -> None:
     total.take(take)
 
 
+def _odd_frames(s: Dut, total: Sum) -> None:
+    """SDO requests and network management of every length, of another node, and what is no service at all."""
+    with s.take() as take, talk(s) as t:
+        for length in range(8):
+            t.send(t.sdo_rx, read(0x1018, 1)[:length])
+            t.send(0x000, bytes([0x80, s.node, 0, 0, 0, 0, 0, 0])[:length])
+        for can_id in (t.sdo_rx + 1, 0x77F, 0x080 + s.node, 0x7E5):
+            t.send(can_id, read(0x1018, 4))
+        t.nmt(0x01)
+        s.run_for(0.05)
+    total.take(take)
+
+
+def _odd_lines(s: Dut, total: Sum) -> None:
+    """The bus port: who is there, and lines that are none."""
+    if s.port is None:
+        return
+    for line in ("?", "R", "X 1", "R 1 2 3", "R zz", "W 1", "W 1 10000", "R 1 -5", "r f", "R 1" + " " * 100, ""):
+        s.port.ask(line)
+        try:
+            total.add(line, s.port.answered(0.01))
+        except BenchError as e:
+            total.add(line, type(e).__name__)
+
+
 def _modes(s: Dut, total: Sum) -> None:
     """Each mode of a gyro unit: off, level, hold, a turn, a run, a calibration, navigation with its self test."""
     if s.variant.family != "gyro":
@@ -171,8 +197,14 @@ STEPS: tuple[Callable[[Dut, Sum], None], ...] = (_power, _states, _stream, _cycl
 
 def seen(target: Target) -> str:
     """The number of one board."""
-    total, v = Sum(), variant(target.board, target.profile)
-    for steps, at in ((STEPS, Addresses()), ((_beyond,), Addresses(inputs_v=BEYOND_V))):
+    total, v = Sum(stamps=not target.adapter), variant(target.board, target.profile)
+    adapter = target.adapter or Addresses().adapter
+    benches = [
+        (STEPS, Addresses(adapter=adapter)),
+        ((_beyond,), Addresses(adapter=adapter, inputs_v=BEYOND_V)),
+        ((_power, _states, _odd_frames, _odd_lines), Addresses(adapter=adapter, port_only=True)),
+    ]
+    for steps, at in benches:
         with Dut.open(v, at) as s:
             for step in steps:
                 try:

@@ -64,7 +64,7 @@ class Suite:
         """From another thread: what runs is ended, nothing is begun any more."""
         self._stopped = True
         if self._child is not None:
-            _end(self._child)
+            end_group(self._child)
 
     def run(self, emulator: Path, target: Target, timeout_s: float, only: Sequence[str] = ()) -> Run:
         """Judge this emulator. only: requirements; empty: all."""
@@ -100,7 +100,7 @@ class Suite:
     def python(self, emulator: Path, words: list[str], timeout_s: float) -> tuple[int | None, str]:
         """A program of ours beside this suite's modules: exit status (None: time-out) and the end of what it said."""
         env = self._env(emulator)
-        env["PYTHONPATH"] += os.pathsep + str(Path(__file__).parents[2])
+        env["PYTHONPATH"] = os.pathsep.join([env["PYTHONPATH"], str(ROOT), str(ROOT / "tools")])
         scratch = self._folder / "scratch"
         scratch.mkdir(exist_ok=True)
         return self._bounded([sys.executable, *words], env, scratch, timeout_s)
@@ -117,12 +117,12 @@ class Suite:
             except subprocess.TimeoutExpired:
                 pass
             finally:
-                _end(child)
+                end_group(child)
                 self._child = None
         return status, "\n".join(log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-12:])
 
 
-def _end(child: subprocess.Popen[bytes]) -> None:
+def end_group(child: subprocess.Popen[bytes]) -> None:
     """It and its group: first as Ctrl-C would, which lets it close its emulator."""
     for sign, timeout_s in ((signal.SIGINT, GRACE_S), (signal.SIGKILL, GRACE_S)):
         if child.poll() is not None:

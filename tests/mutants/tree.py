@@ -12,10 +12,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 DEVICE = ("Makefile", "pyproject.toml", "emu", "proto", "tools", "scripts")  # what an emulator is built from
+TESTS = ("tests", "setup.py", "share", "examples")  # and what its tests are run from
 SUITE = ("pyproject.toml", "scripts", "proto")  # what judges it
 OWN, CHECKOUT_S = "build-mutants", "build"
 BUILD_S = 600.0
-CFLAGS = "-O1"  # of our own build: half the time of the compiler
+# Of our own build: -O1 is half the time of the compiler; two arguments that change places must fit each other.
+CFLAGS = "-O1 -Werror=int-conversion -Werror=incompatible-pointer-types -Werror=implicit-function-declaration"
 
 
 class BuildError(Exception):
@@ -36,9 +38,12 @@ def copy(parts: tuple[str, ...], root: Path, to: Path) -> None:
 class Tree:
     """An emulator's sources and what they are built into."""
 
-    def __init__(self, folder: Path, root: Path = ROOT, *, borrow: bool = False) -> None:
-        """Copies and builds the unmutated one. borrow: begin with what the checkout has built. Raises BuildError."""
-        self._borrow = borrow
+    def __init__(self, folder: Path, root: Path = ROOT, *, borrow: bool = False, tests: bool = False) -> None:
+        """Copies and builds the unmutated one. Raises BuildError.
+
+        borrow: begin with what the checkout has built; tests: copy the tests, too.
+        """
+        self._borrow, self._tests = borrow, tests
         self.folder = folder / "device"
         self._name = CHECKOUT_S if borrow else OWN
         if not self.folder.is_dir():
@@ -51,28 +56,34 @@ class Tree:
     def beside(self, folder: Path) -> Tree:
         """The same tree once more, for another thread; nothing is compiled. Raises BuildError."""
         shutil.copytree(self.folder, folder / "device")
-        return Tree(folder, borrow=self._borrow)
+        return Tree(folder, borrow=self._borrow, tests=self._tests)
 
     @property
     def emulator(self) -> Path:
         return self.folder / self._name / "psa-emu"
 
     def _fetch(self, root: Path) -> None:
-        copy(DEVICE, root, self.folder)
+        copy(DEVICE + (TESTS if self._tests else ()), root, self.folder)
         if self._borrow and (root / CHECKOUT_S / "obj").is_dir():
             for part in ("obj", "gen"):
                 shutil.copytree(root / CHECKOUT_S / part, self.folder / CHECKOUT_S / part)
 
+    def make(self, *goals: str) -> list[str]:
+        """A command for these goals and settings, in `folder`."""
+        words = ["make", "-j2", "--no-print-directory", f"PY={sys.executable}", f"BUILD={self._name}"]
+        return [*words, *([f"CFLAGS={CFLAGS}"] if self._name == OWN else []), *goals]
+
+    def env(self) -> dict[str, str]:
+        """Of such a command: no jobs of a make around us."""
+        env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k != "MFLAGS"}
+        return env | {"PYTHONPATH": str(self.folder / "scripts")}
+
     def build(self) -> None:
         """Raises BuildError."""
-        make = ["make", "-j2", "--no-print-directory", f"PY={sys.executable}", f"BUILD={self._name}"]
-        make += [f"CFLAGS={CFLAGS}"] if self._name == OWN else []
-        env = {k: v for k, v in os.environ.items() if not k.startswith("MAKE") and k != "MFLAGS"}
-        env["PYTHONPATH"] = str(self.folder / "scripts")
         done = subprocess.run(
-            [*make, f"{self._name}/psa-emu"],
+            self.make(f"{self._name}/psa-emu"),
             cwd=self.folder,
-            env=env,
+            env=self.env(),
             capture_output=True,
             text=True,
             timeout=BUILD_S,

@@ -11,6 +11,7 @@ from psabench.conform.profile import variant
 from psabench.conform.requirements import requirements
 
 from tests.mutants.declared import ListError, Mutant, Target
+from tests.mutants.folder_tests import FolderTests
 from tests.mutants.suite import Run, Suite
 from tests.mutants.tree import BuildError, Tree
 
@@ -36,6 +37,7 @@ class Result:
     breaks: list[str] = field(default_factory=list)  # that the list says
     named: bool = False  # whether one of those was found
     failed: bool | None = None  # whether one of those found has failed; else they could no longer be carried out
+    by: str = ""  # what has killed it, where that was not the conformance suite: C tests, Python tests
     reason: str = ""
     took_s: float = 0.0
 
@@ -48,18 +50,23 @@ class Result:
 class Judge:
     """The unmutated emulator on every target, and mutants beside it."""
 
-    def __init__(self, tree: Tree, suite: Suite, *, compare: bool = False, quick: bool = False) -> None:
+    def __init__(
+        self, tree: Tree, suite: Suite, *, compare: bool = False, quick: bool = False, tests: FolderTests | None = None
+    ) -> None:
         """compare: mutants that `observe` does not tell from the unmutated one are equivalent.
 
         quick: the tests of the requirements that a mutant breaks are run first, all only where those find nothing.
+        tests: judge those that the suite has not found.
         """
-        self.tree, self.suite, self.compare, self.quick = tree, suite, compare, quick
+        self.tree, self.suite, self.compare, self.quick, self.tests = tree, suite, compare, quick, tests
         self._plain: dict[tuple[Target, Only], Run] = {}
         self._looks: dict[Target, str] = {}
 
     def beside(self, folder: Path) -> Judge:
         """Another one, for another thread, that knows of the unmutated emulator what this one knows."""
-        found = Judge(self.tree.beside(folder), self.suite.beside(folder), compare=self.compare, quick=self.quick)
+        tree = self.tree.beside(folder)
+        tests = FolderTests(tree) if self.tests else None
+        found = Judge(tree, self.suite.beside(folder), compare=self.compare, quick=self.quick, tests=tests)
         found._plain, found._looks = self._plain, self._looks
         return found
 
@@ -83,6 +90,8 @@ class Judge:
                     r.result, r.reason = "equivalent", "nothing differs on any wire in the fixed runs"
                 else:
                     self._run(m, emulator, runs, r)
+            if r.result == "survived" and self.tests:
+                self._run_tests(self.tests, m.file, text, r)
         except ListError as e:
             r.reason = str(e)
         except BuildError as e:
@@ -103,8 +112,14 @@ class Judge:
         return said.splitlines()[-1] if status == 0 and said else f"status {status}"
 
     def look(self, targets: Iterable[Target]) -> None:
-        """What is seen of the unmutated emulator; before the first mutant is built."""
-        self._looks.update((t, self._look(self.tree.emulator, t)) for t in targets)
+        """What is seen of the unmutated emulator; before the first mutant is built. Raises ListError."""
+        for target in targets:
+            found = self._look(self.tree.emulator, target)
+            if not found.startswith("seen "):
+                raise ListError(f"observe {target}: expected a sum of the unmutated emulator, got {found}")
+            if found != self._look(self.tree.emulator, target):
+                raise ListError(f"observe {target}: expected the same sum twice of the unmutated emulator")
+            self._looks[target] = found
 
     def _alike(self, m: Mutant, emulator: Path) -> bool:
         return all(self._look(emulator, t) == self._looks[t] for t in m.on)
@@ -119,6 +134,15 @@ class Judge:
             r.result, r.reason = _verdict(m, run, bool(r.found))
             if r.result not in SPARED:
                 return
+
+    def _run_tests(self, tests: FolderTests, file: str, text: str, r: Result) -> None:
+        """The tests of the folder, on the unmutated sources first."""
+        tests.prepare(file)
+        with self.tree.mutated(file, text):
+            r.by = tests.failing(file)
+        r.result = "killed" if r.by else "survived"
+        if not r.by and tests.unsound(file):
+            r.reason = f"{' and '.join(tests.unsound(file))} of the folder fail without it, too"
 
 
 def _verdict(m: Mutant, run: Run, found: bool) -> tuple[str, str]:

@@ -11,7 +11,8 @@ from typing import cast
 
 import pytest
 
-from tests.mutants.declared import Mutant, Target
+from tests.mutants.declared import ListError, Mutant, Target
+from tests.mutants.folder_tests import FolderTests
 from tests.mutants.run import judged
 from tests.mutants.suite import Run, Suite
 from tests.mutants.tree import BuildError, Tree
@@ -54,8 +55,55 @@ class FakeSuite:
         self.asked.append(("stop", ()))
 
 
-def judge(tmp_path: Path, suite: FakeSuite, *, quick: bool = False) -> Judge:
-    return Judge(cast(Tree, FakeTree(tmp_path)), cast(Suite, suite), quick=quick)
+class FakeTests:
+    """Tests of a folder that find what the test says."""
+
+    def __init__(self, by: str) -> None:
+        self.by, self.asked = by, 0
+
+    def prepare(self, _: str) -> None:
+        self.asked += 1
+
+    def failing(self, _: str) -> str:
+        return self.by
+
+    def unsound(self, _: str) -> list[str]:
+        return ["Python tests"]
+
+
+def judge(tmp_path: Path, suite: FakeSuite, *, quick: bool = False, tests: FakeTests | None = None) -> Judge:
+    return Judge(cast(Tree, FakeTree(tmp_path)), cast(Suite, suite), quick=quick, tests=cast(FolderTests | None, tests))
+
+
+@pytest.mark.parametrize(
+    ("run", "by", "result", "asked"),
+    [(BAD, "C tests", "killed", 0), (GOOD, "C tests", "killed", 1), (GOOD, "", "survived", 1)],
+)
+def test_the_tests_of_the_folder_judge_what_the_suite_has_not_found(
+    tmp_path: Path, run: Run, by: str, result: str, asked: int
+) -> None:
+    tests = FakeTests(by)
+    r = judge(tmp_path, FakeSuite(run), tests=tests).judge(MUTANT)
+    assert (r.result, r.by, tests.asked) == (result, by if asked else "", asked)
+    assert bool(r.reason) == (result == "survived"), "tests that fail without it are named"
+
+
+class Seeing(FakeSuite):
+    """What `observe` prints, one after the other."""
+
+    def __init__(self, *said: tuple[int, str]) -> None:
+        super().__init__(GOOD)
+        self.said = list(said)
+
+    def python(self, *_: object) -> tuple[int, str]:
+        return self.said.pop(0)
+
+
+@pytest.mark.parametrize("said", [[(1, "ModuleNotFoundError")], [(0, "seen psa2 1"), (0, "seen psa2 2")]])
+def test_nothing_is_equivalent_to_what_cannot_be_seen(tmp_path: Path, said: list[tuple[int, str]]) -> None:
+    """An `observe` that does not run, or never gives the same, would call every mutant equivalent, or none."""
+    with pytest.raises(ListError, match="observe psa2: expected"):
+        judge(tmp_path, Seeing(*said)).look([Target.of("psa2")])
 
 
 @pytest.mark.parametrize(

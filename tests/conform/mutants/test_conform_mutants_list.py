@@ -16,6 +16,8 @@ from tests.mutants import random_mutants as chance
 from tests.mutants import report
 from tests.mutants import run as mutants_run
 from tests.mutants.declared import ListError, Mutant, Target, load, problems
+from tests.mutants.folder_tests import TESTS, folder_of, found
+from tests.mutants.operators import PATTERNS, places
 from tests.mutants.results import Book
 from tests.mutants.run import sample, status
 from tests.mutants.suite import Run
@@ -101,14 +103,63 @@ def test_a_sample_is_the_same_each_time_and_of_many_kinds() -> None:
     assert not any(m.reason for m in first)
 
 
+def c_file(body: str) -> str:
+    return f"int a = 1 + 2;\n\nint f(int x)\n{{\n    {body}\n}}\n"
+
+
+def wrongs(kind: str, body: str) -> list[str]:
+    """What a body becomes by each place of a kind."""
+    text = c_file(body)
+    made = [text[:begin] + new + text[end:] for k, begin, end, new in places(text) if k == kind]
+    return [text.removeprefix(c_file("@").partition("@")[0]).removesuffix("\n}\n") for text in made]
+
+
 def test_random_mutants_leave_comments_texts_and_tables_alone() -> None:
-    body = '    /* x + 1 */\n    g("x + 1");\n    if (x < 3) return x + 7;\n    return 0;\n'
-    text = f"int a = 1 + 2;\n\nint f(int x)\n{{\n{body}}}\n"
-    found = {(kind, text[b:e].strip()) for kind, b, e, _ in chance.places("a.c", text)}
-    assert ("relation", "<") in found
-    assert ("condition", "if (x < 3)") in found
-    assert ("arithmetic", "+") in found
-    assert sum(kind == "arithmetic" for kind, *_ in chance.places("a.c", text)) == 1
+    text = c_file('/* x + 1 */\n    g("x + 1");\n    if (x < 3) return x + 7;\n    return 0;')
+    kinds = {(kind, text[b:e].strip()) for kind, b, e, _ in places(text)}
+    assert ("relation", "<") in kinds
+    assert ("condition", "if (x < 3)") in kinds
+    assert ("arithmetic", "+") in kinds
+    assert sum(kind == "arithmetic" for kind, *_ in places(text)) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "body", "want"),
+    [
+        ("constant", "x = 7;", ["x = (7 + 1);"]),
+        ("constant-less", "x = 0x40u;", ["x = (0x40u - 1);"]),
+        ("operands", "x = y->a - 3;", ["x = 3 - y->a;"]),
+        ("operands", "x = y - y;", []),
+        ("operands", "if (b[1] < x) x = 1;", ["if (x < b[1]) x = 1;"]),
+        ("arguments", "x = g(a, b.c, 3);", ["x = g(b.c, a, 3);"]),
+        ("index", "x = y[i];", ["x = y[0];"]),
+        ("index", "x = y[0];", ["x = y[1];"]),
+        ("condition", "while (x > 0) x--;", ["while (!(x > 0)) x--;"]),
+        ("call", "g(x);", [";"]),
+        ("call", "x = g(y);", []),
+        ("statement", "x = g(y);", [";"]),
+        ("statement", "g(x);", []),
+        ("relation", "if (a != x) x = 1;", ["if (a == x) x = 1;"]),
+    ],
+)
+def test_each_operator_makes_its_wrong(kind: str, body: str, want: list[str]) -> None:
+    assert wrongs(kind, body) == want
+
+
+def test_each_operator_has_places_and_each_folder_has_tests() -> None:
+    paths = chance.files(ROOT)
+    assert {kind for path in paths for kind, *_ in places((ROOT / path).read_text())} == set(PATTERNS)
+    assert {folder_of(path) for path in paths} == set(TESTS)
+    for c, python in TESTS.values():
+        assert found(ROOT / "tests/unit", c)
+        assert found(ROOT, python)
+
+
+def test_the_interval_is_that_of_clopper_and_pearson() -> None:
+    """The closed forms at the ends: (alpha/2)^(1/n) of n."""
+    assert report.interval(0, 0) == "-"
+    assert report.interval(20, 20) == f"{100 * 0.025 ** (1 / 20):.1f} to 100.0 %"
+    assert report.interval(0, 20) == f"0.0 to {100 * (1 - 0.025 ** (1 / 20)):.1f} %"
 
 
 def test_random_mutants_are_the_same_for_one_seed_and_apply() -> None:
