@@ -169,6 +169,17 @@ def plus_one(d: bytes) -> bytes:
     return d[:4] + (int.from_bytes(d[4:], "little") + 1 & 0xFFFFFFFF).to_bytes(4, "little") if d[0] == 0x43 else d
 
 
+def last(when: Callable[[int], bool], bit: int) -> Callable[[can.Message], list[can.Message]]:
+    """The bit that ends an upload in segments, where a segment has so many bytes without data."""
+
+    def change(m: can.Message) -> list[can.Message]:
+        command = m.data[0]
+        mine = command & 0xE0 == 0 and when(command >> 1 & 7)
+        return [changed(m, bytes([command & 0xFE | bit, *m.data[1:]]))] if mine else [m]
+
+    return change
+
+
 def frozen(d: bytes) -> bytes:
     return d[:4] + bytes([1, 0, 0, 0]) if d[0] == 0x43 else d
 
@@ -190,6 +201,15 @@ FAULTS: list[tuple[Active, Rule]] = [
     (can_nmt.a_stop_ends_a_transfer, aborts(other_code)),
     (can_nmt.a_new_period_holds_at_once, of("heartbeat", late(0.002))),
     (can_sdo.short_values_come_expedited, of("sdo_tx", lambda m: [changed(m, bytes([m.data[0] ^ 4, *m.data[1:]]))])),
+    (
+        can_sdo.long_values_come_in_segments,
+        of("sdo_tx", last(lambda empty: empty == 0, 0)),
+    ),  # after a full segment more
+    (
+        can_sdo.long_values_come_in_segments,
+        of("sdo_tx", last(lambda empty: empty == 0, 1)),
+    ),  # ends at the first full one
+    (can_sdo.long_values_come_in_segments, of("sdo_tx", last(lambda empty: empty > 0, 0))),
     (can_sdo.a_write_is_confirmed, answers(0x1017, lambda d: b"\x61" + d[1:] if d[0] == 0x60 else d)),
     (can_sdo.a_silent_client_is_given_up, of("sdo_tx", late(0.002))),
     (can_sdo.a_silent_client_is_given_up, aborts(other_code)),
