@@ -1,4 +1,4 @@
-"""Windows out of two streams: which frames belong to which reading, and what is missing."""
+"""Windows out of two streams: which frames belong to which reading, and what is missing; how long each may take."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from psabench.boards.gyro.device import Gyro, Phase
+from psabench.boards.gyro.device import Flag, Gyro, Phase
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import LinkError
-from psabench.procedures.wire_platform import _ahead, _LevelScale, _Tape
+from psabench.procedures.platform_bench import Table
+from psabench.procedures.wire_platform import SLICE_S, WirePlatform, _ahead, _LevelScale, _Tape
 
 from tests.py.boards.test_frames import pair
 from tests.py.boards.test_readings import reading
@@ -138,3 +140,78 @@ def test_volts_are_angles() -> None:
     found = scale.angles(x_v, y_v)
     assert np.allclose(found[0], beta, atol=1e-12)
     assert np.allclose(found[1], gamma, atol=1e-12)
+
+
+# ---- how long it waits
+
+
+class SilentBench:
+    """Both units, and a clock that only waits move; the run never comes to its first window."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+        self.level_unit = Psa2.__new__(Psa2)
+        self.level_unit.node = SimpleNamespace(node_id=5)  # type: ignore[assignment]
+        self.level_unit.frames = FrameReader(5)
+        self.units = {"level": self.level_unit}
+        self.wait_away = self.wait
+
+    def wait(self, dwell_s: float) -> None:
+        self.time_s += dwell_s
+
+    def board(self, _: object) -> Any:
+        settings = {"settle_limit_s": 30.0, "scale_x_v_per_g": 1.0, "scale_y_v_per_g": 1.0, "m1_per_s": 1.0}
+        return SimpleNamespace(
+            level_node=5,
+            step_s=STEP_S,
+            frames=ReadingReader(Gyro.layout, 9),
+            flags=Flag(0),
+            beta_deg=1.0,
+            get=lambda name: settings.get(name, 0.0),
+            set=lambda **_: None,
+            start=lambda: None,
+            stop=lambda: None,
+        )
+
+
+@pytest.mark.parametrize(
+    ("more", "want_s"),
+    [
+        ({}, 40.0 + 10.0 + 10.0 + 30.0 + 10.0),
+        ({"slew_dps": 18.0}, 20.0 + 10.0 + 10.0 + 30.0 + 10.0),
+        ({"settle_s": 17.0}, 40.0 + 10.0 + 17.0 + 30.0 + 10.0),
+        ({"settle_limit_s": 43.0}, 40.0 + 10.0 + 10.0 + 43.0 + 10.0),
+        ({"window_s": 25.0}, 40.0 + 10.0 + 10.0 + 30.0 + 25.0),
+    ],
+)
+def test_a_position_may_take_its_turn_its_settling_with_the_limit_and_its_window(
+    more: dict[str, float], want_s: float
+) -> None:
+    """360 deg at slew_dps and ten seconds, settle_s, settle_limit_s, window_s: then it is given up, not before."""
+    bench = SilentBench()
+    table = Table(angles_deg=(0.0, 90.0), **more)  # type: ignore[arg-type]
+    with pytest.raises(LinkError, match=f"position 1 was not measured in {want_s:.0f} s: no reading"):
+        WirePlatform(bench).measure(table, lambda: None)  # type: ignore[arg-type]
+    assert want_s < bench.time_s - 100.0 <= want_s + SLICE_S
+
+
+def test_a_calibration_may_take_its_settling_with_the_limit_and_its_length() -> None:
+    bench = SilentBench()
+    with pytest.raises(LinkError, match="position 1 was not measured in 112 s: no reading"):
+        WirePlatform(bench).calibrate(60.0, 12.0)  # type: ignore[arg-type]
+    assert 112.0 < bench.time_s - 100.0 <= 112.0 + SLICE_S
+
+
+@pytest.mark.parametrize(
+    ("m1_per_s", "timeout_s", "want_s"), [(1.0, 120.0, 25.0), (0.5, 120.0, 40.0), (1.0, 20.0, 20.0)]
+)
+def test_levelling_may_take_fifteen_time_constants_or_what_is_left(
+    m1_per_s: float, timeout_s: float, want_s: float
+) -> None:
+    """15/m1 and ten seconds of the torquer's own, or timeout_s, which is less; one degree off is told as 60'."""
+    bench = SilentBench()
+    platform = WirePlatform(bench)  # type: ignore[arg-type]
+    platform._m1_per_s = m1_per_s
+    with pytest.raises(LinkError, match=f"a level platform within {want_s:g} s, got 60.0' off"):
+        platform.level(timeout_s)
+    assert want_s <= bench.time_s - 100.0 < want_s + 0.2
