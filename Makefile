@@ -69,7 +69,7 @@ BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall foreign wheel clean help lock
+.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants mutate fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall foreign wheel clean help lock
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emulator build/psa-emu and the libraries (CC=clang: in build-clang, SAN=address,undefined: in build-san)
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
 $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
@@ -159,6 +159,8 @@ golden: all ## rewrite the golden traces; review the difference like code
 	GOLDEN=rewrite $(PY) -m pytest -q tests/golden
 mutants: | $(PY) ## broken boards that the conformance suite must find, docs/reference/mutants.md (some: make mutants MUTANTS='pik- sdo-')
 	@PYTHONPATH=tools $(PY) -m tests.mutants.run $(MUTANTS)
+mutate: all ## random mutants of folders, judged by the unit tests nearest to them: make mutate MUTATE='emu/chip/ads1256 --sample 20'
+	@PYTHONPATH=tools:scripts $(PY) -m tests.mutants.unit_mutants $(MUTATE)
 false-positives: all ## conforming boards that the suite must pass, docs/reference/false_positives.md (some: ARGS='w24 --minutes 5')
 	@PYTHONPATH=tools $(PY) -m tests.false_positives.run $(ARGS)
 fault-matrix: all ## every fault at every point, and the requirements that it breaks (docs/faults.md)

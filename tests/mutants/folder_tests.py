@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from tests.mutants.suite import end_group
@@ -57,21 +57,21 @@ class FolderTests:
         self._tree = tree
         self._sound: dict[tuple[str, str], bool] = {}
 
-    def prepare(self, file: str) -> None:
+    def prepare(self, file: str, kinds: Sequence[str] = (C, PYTHON)) -> None:
         """Runs them once on the unmutated sources, which are built at this moment: what fails there tells nothing."""
         folder = folder_of(file)
-        for kind in (C, PYTHON):
+        for kind in kinds:
             if (folder, kind) not in self._sound:
                 self._sound[folder, kind] = self._passes(folder, kind)
 
     def failing(self, file: str) -> str:
         """C tests, Python tests: the first kind that finds what is built at this moment; "": none."""
         folder = folder_of(file)
-        return next((k for k in (C, PYTHON) if self._sound[folder, k] and not self._passes(folder, k)), "")
+        return next((k for k in (C, PYTHON) if self._sound.get((folder, k)) and not self._passes(folder, k)), "")
 
     def unsound(self, file: str) -> list[str]:
         """Kinds that fail without a mutant, too."""
-        return [k for k in (C, PYTHON) if not self._sound[folder_of(file), k]]
+        return [k for (folder, k), sound in self._sound.items() if folder == folder_of(file) and not sound]
 
     def _passes(self, folder: str, kind: str) -> bool:
         c, python = TESTS[folder]

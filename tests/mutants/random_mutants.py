@@ -42,7 +42,7 @@ def _name(path: str) -> str:
     return room + p.stem.replace("_", "-")
 
 
-def _mutant(path: str, text: str, place: Place, on: str) -> Mutant:
+def mutant_of(path: str, text: str, place: Place, on: str) -> Mutant:
     """The text before the place is its address: it is there once."""
     kind, begin, end, new = place
     line, name = text.count("\n", 0, begin) + 1, _name(path)
@@ -73,4 +73,4 @@ def random_mutants(root: Path, count: int, seed: int) -> list[Mutant]:
     texts = {path: (root / path).read_text(encoding="utf-8") for path in boards}
     found = [(path, place) for path, text in texts.items() for place in places(text)]
     drawn = random.Random(seed).sample(found, min(count, len(found)))
-    return [_mutant(path, texts[path], place, boards[path]) for path, place in drawn]
+    return [mutant_of(path, texts[path], place, boards[path]) for path, place in drawn]
