@@ -84,10 +84,14 @@ def write(path: Path, parts: dict[str, Sequence[Result]], facts: dict[str, Any])
 
 
 def page(path: Path, parts: dict[str, Sequence[Result]], facts: Mapping[str, Any]) -> None:
-    """The tables of docs/reference/mutants.md, in place of those that are there."""
+    """The tables of docs/reference/mutants.md, in place of those that are there; a part without results stays."""
     titles = {"declared": "Declared mutants", "random": f"Random mutants, seed {facts.get('random_seed')}"}
-    body = "\n".join(row for name, results in parts.items() if results for row in _part(name, titles[name], results))
-    between.write(path, MARKS, f"\n{body}")
+    before = path.read_text(encoding="utf-8").partition(MARKS[0])[2].partition(MARKS[1])[0].split("### ")[1:]
+    bodies = []
+    for name, results in parts.items():
+        kept = [f"### {section.rstrip()}\n" for section in before if section.startswith(f"{name.capitalize()} mutants")]
+        bodies += ["\n".join(_part(name, titles[name], results))] if results else kept
+    between.write(path, MARKS, "\n" + "\n".join(bodies))
 
 
 def _part(name: str, title: str, results: Sequence[Result]) -> Iterator[str]:

@@ -202,6 +202,21 @@ def test_the_page_has_the_tables_between_its_marks(tmp_path: Path) -> None:
     assert "old" not in text
 
 
+def test_a_part_that_has_no_results_here_keeps_its_tables(tmp_path: Path) -> None:
+    page = tmp_path / "p.md"
+    page.write_text("{}\n{}\n".format(*report.MARKS))
+    drawn = replace(result("r", "killed"), by="C tests", file="emu/link/lines.c")
+    report.page(page, {"declared": [result("a", "survived", ["X-1"])], "random": []}, {})
+    report.page(page, {"declared": [], "random": [drawn]}, {"random_seed": 5})
+    both = page.read_text()
+    assert "| a | survived | X-1 |" in both
+    assert "### Random mutants, seed 5" in both
+    assert "| emu/link | 1 | 1 | 1 | 100.0 % |" in both
+    assert "Device conformance killed 0, 0.0 %; of the others 1 by C tests of their folder." in both
+    report.page(page, {"declared": [], "random": []}, {})
+    assert page.read_text() == both
+
+
 @pytest.mark.parametrize(
     ("text", "board", "profile", "adapter"),
     [("psa2", "psa2", None, ""), ("psa2:w24", "psa2", "w24", ""), ("psa2@slcan", "psa2", None, "slcan")],
