@@ -163,8 +163,8 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_001, 58_001),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_950, 44_950),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_679, 1_679),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_955, 44_955),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_685, 1_685),
 }
 
 

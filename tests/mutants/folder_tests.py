@@ -45,7 +45,7 @@ def folder_of(file: str) -> str:
     raise KeyError(file)
 
 
-def found(root: Path, patterns: Iterable[str]) -> list[Path]:
+def find_files(root: Path, patterns: Iterable[str]) -> list[Path]:
     """Files that there are."""
     return sorted(path for p in patterns for path in root.glob(p))
 
@@ -77,9 +77,9 @@ class FolderTests:
         c, python = TESTS[folder]
         root = self._tree.folder
         if kind == C:
-            names = " ".join(path.stem for path in found(root / "tests/unit", c))
+            names = " ".join(path.stem for path in find_files(root / "tests/unit", c))
             return self._ran(self._tree.make("check", f"T={names}"), C_S)
-        tests = [str(path.relative_to(root)) for path in found(root, python)]
+        tests = [str(path.relative_to(root)) for path in find_files(root, python)]
         words = ["-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not vcan and not slc0", *tests]
         return self._ran(self._tree.make("lib"), C_S) and self._ran([sys.executable, *words], PYTHON_S)
 

@@ -1,6 +1,6 @@
 """Operators of mutants for Python, from its syntax tree: the same small wrongs as those of C (operators.py).
 
-A place is cut out of the text as it stands: a mutant differs from its file in nothing else. Annotations, decorators and
+A place is cut out of the text as it is: a mutant differs from its file in nothing else. Annotations, decorators and
 texts are left alone.
 """
 

@@ -56,7 +56,7 @@ def mutant_of(path: str, text: str, place: Place, on: str) -> Mutant:
     )
 
 
-def files(root: Path) -> dict[str, str]:
+def mutated_files(root: Path) -> dict[str, str]:
     """The files that are mutated, and the boards that each is run on."""
     found: dict[str, str] = {}
     for prefix, on in ON:
@@ -69,7 +69,7 @@ def files(root: Path) -> dict[str, str]:
 
 def random_mutants(root: Path, count: int, seed: int) -> list[Mutant]:
     """So many, all different, the same for one seed and one state of the sources; each place as likely as any other."""
-    boards = files(root)
+    boards = mutated_files(root)
     texts = {path: (root / path).read_text(encoding="utf-8") for path in boards}
     found = [(path, place) for path, text in texts.items() for place in places(text)]
     drawn = random.Random(seed).sample(found, min(count, len(found)))

@@ -136,7 +136,7 @@ class PythonTests:
             end_group(child)
 
 
-def drawn(folder: str, count: int, seed: int, root: Path = ROOT) -> list[Mutant]:
+def draw_mutants(folder: str, count: int, seed: int, root: Path = ROOT) -> list[Mutant]:
     """So many of a folder and what is below it, the same for one seed and one state of it."""
     c = folder.startswith("emu/")
     found = []
@@ -156,14 +156,14 @@ def changed_lines(m: Mutant) -> tuple[str, str]:
     return old[k].strip(), new[k].strip()
 
 
-def read(path: Path) -> dict[str, Verdict]:
+def read_verdicts(path: Path) -> dict[str, Verdict]:
     """What is known, by stamp."""
     if not path.is_file():
         return {}
     return {row["stamp"]: Verdict(**row) for row in json.loads(path.read_text(encoding="utf-8"))}
 
 
-def judged(
+def judge_all(
     mutants: Sequence[tuple[str, Mutant]], known: dict[str, Verdict], tests: Callable[[Mutant], Tests], end_s: float
 ) -> Iterator[Verdict]:
     """Each that is not known, until the time is over."""
@@ -179,12 +179,12 @@ def judged(
         )
 
 
-def page(known: Mapping[str, Verdict]) -> None:
+def write_page(known: Mapping[str, Verdict]) -> None:
     """The table of docs/reference/mutants.md."""
-    between.write(PAGE, MUTATED, "\n".join(["", *table(list(known.values())), ""]))
+    between.write(PAGE, MUTATED, "\n".join(["", *rate_table(list(known.values())), ""]))
 
 
-def table(verdicts: Sequence[Verdict]) -> Iterator[str]:
+def rate_table(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """A row for each folder."""
     yield "| folder | killed | of | rate | 95 % |\n|---|---|---|---|---|"
     for folder in sorted({v.folder for v in verdicts}):
@@ -211,8 +211,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point."""
     args = parser().parse_args(argv)
     end_s = time.monotonic() + args.seconds
-    known = read(args.out)
-    of = {f.rstrip("/"): drawn(f.rstrip("/"), args.sample, args.seed) for f in args.folders}
+    known = read_verdicts(args.out)
+    of = {f.rstrip("/"): draw_mutants(f.rstrip("/"), args.sample, args.seed) for f in args.folders}
     mutants = [(f, row[k]) for k in range(args.sample) for f, row in of.items() if k < len(row)]  # of all folders alike
     made: dict[str, Tests] = {}
     with tempfile.TemporaryDirectory(prefix="unit-mutants-") as folder:
@@ -223,15 +223,15 @@ def main(argv: Sequence[str] | None = None) -> int:
                 made[kind] = CTests(Path(folder)) if kind == "c" else PythonTests(Path(folder))
             return made[kind]
 
-        for v in judged(mutants, known, tests, end_s):
+        for v in judge_all(mutants, known, tests, end_s):
             known[v.stamp] = v
             args.out.parent.mkdir(parents=True, exist_ok=True)
             replace_file(args.out, json.dumps([asdict(x) for x in known.values()], indent=1) + "\n")
             print(f"{v.result:10} {v.id:44} {v.was}  ->  {v.now}", flush=True)
     asked = {m.stamp() for _, m in mutants}
-    print("\n".join(table([v for v in known.values() if v.stamp in asked])))
+    print("\n".join(rate_table([v for v in known.values() if v.stamp in asked])))
     if args.docs:
-        page(known)
+        write_page(known)
     return 0
 
 

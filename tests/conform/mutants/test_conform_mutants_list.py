@@ -16,7 +16,7 @@ from tests.mutants import random_mutants as chance
 from tests.mutants import report
 from tests.mutants import run as mutants_run
 from tests.mutants.declared import ListError, Mutant, Target, load, problems
-from tests.mutants.folder_tests import TESTS, folder_of, found
+from tests.mutants.folder_tests import TESTS, find_files, folder_of
 from tests.mutants.operators import PATTERNS, places
 from tests.mutants.results import Book
 from tests.mutants.run import sample, status
@@ -147,12 +147,12 @@ def test_each_operator_makes_its_wrong(kind: str, body: str, want: list[str]) ->
 
 
 def test_each_operator_has_places_and_each_folder_has_tests() -> None:
-    paths = chance.files(ROOT)
+    paths = chance.mutated_files(ROOT)
     assert {kind for path in paths for kind, *_ in places((ROOT / path).read_text())} == set(PATTERNS)
     assert {folder_of(path) for path in paths} == set(TESTS)
     for c, python in TESTS.values():
-        assert found(ROOT / "tests/unit", c)
-        assert found(ROOT, python)
+        assert find_files(ROOT / "tests/unit", c)
+        assert find_files(ROOT, python)
 
 
 def test_the_interval_is_that_of_clopper_and_pearson() -> None:

@@ -12,7 +12,7 @@ import pytest
 from tests.mutants import unit_mutants as units
 from tests.mutants.declared import Mutant
 from tests.mutants.python_operators import python_places
-from tests.mutants.unit_mutants import Verdict, changed_lines, drawn, judged, table
+from tests.mutants.unit_mutants import Verdict, changed_lines, draw_mutants, judge_all, rate_table
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -62,9 +62,9 @@ def test_mutants_of_our_own_files_are_still_python() -> None:
 
 @pytest.mark.parametrize("folder", ["emu/chip/ads1256", "scripts/psabench/estimate"])
 def test_the_same_ones_are_drawn_each_time_and_apply(folder: str) -> None:
-    first, again = drawn(folder, 6, 1), drawn(folder, 6, 1)
+    first, again = draw_mutants(folder, 6, 1), draw_mutants(folder, 6, 1)
     assert first == again
-    assert drawn(folder, 6, 2) != first
+    assert draw_mutants(folder, 6, 2) != first
     for m in first:
         text = (ROOT / m.file).read_text(encoding="utf-8")
         was, now = changed_lines(m)
@@ -84,12 +84,14 @@ class Finds:
 
 def test_what_is_known_is_not_judged_again_and_the_time_is_kept() -> None:
     folder, tests = "scripts/psabench/estimate", Finds()
-    mutants = [(folder, m) for m in drawn(folder, 6, 1)]
-    found = list(judged(mutants, {}, lambda _: tests, time.monotonic() + 60.0))
+    mutants = [(folder, m) for m in draw_mutants(folder, 6, 1)]
+    found = list(judge_all(mutants, {}, lambda _: tests, time.monotonic() + 60.0))
     assert [v.result for v in found] == ["killed", "survived", "not judged"] * 2
     known = {v.stamp: v for v in found[:4]}
-    assert [v.id for v in judged(mutants, known, lambda _: tests, time.monotonic() + 60.0)] == [v.id for v in found[4:]]
-    assert list(judged(mutants, {}, lambda _: tests, time.monotonic() - 1.0)) == []
+    assert [v.id for v in judge_all(mutants, known, lambda _: tests, time.monotonic() + 60.0)] == [
+        v.id for v in found[4:]
+    ]
+    assert list(judge_all(mutants, {}, lambda _: tests, time.monotonic() - 1.0)) == []
 
 
 def test_a_folder_s_rate_counts_what_was_judged() -> None:
@@ -97,7 +99,7 @@ def test_a_folder_s_rate_counts_what_was_judged() -> None:
         return Verdict(id=str(k), kind="call", file="a.py", stamp=str(k), folder="scripts/a", result=result)
 
     rows = [*(verdict(k, "killed") for k in range(3)), verdict(3, "survived"), verdict(4, "not judged")]
-    assert list(table(rows))[-1] == "| scripts/a | 3 | 4 | 75.0 % | 19.4 to 99.4 % |"
+    assert list(rate_table(rows))[-1] == "| scripts/a | 3 | 4 | 75.0 % | 19.4 to 99.4 % |"
 
 
 def test_the_page_has_room_for_the_table() -> None:

@@ -208,7 +208,7 @@ def test_a_calibration_may_take_its_settling_with_the_limit_and_its_length() -> 
 def test_levelling_may_take_fifteen_time_constants_or_what_is_left(
     m1_per_s: float, timeout_s: float, want_s: float
 ) -> None:
-    """15/m1 and ten seconds of the torquer's own, or timeout_s, which is less; one degree off is told as 60'."""
+    """15/m1 and ten seconds of the torquer's own, or timeout_s, which is less; one degree off reads 60'."""
     bench = SilentBench()
     platform = WirePlatform(bench)  # type: ignore[arg-type]
     platform._m1_per_s = m1_per_s
