@@ -12,6 +12,7 @@ import pytest
 from tests.mutants import unit_mutants as units
 from tests.mutants.declared import Mutant
 from tests.mutants.python_operators import python_places
+from tests.mutants.report import MUTATED
 from tests.mutants.unit_mutants import Verdict, changed_lines, draw_mutants, judge_all, rate_table
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -88,9 +89,8 @@ def test_what_is_known_is_not_judged_again_and_the_time_is_kept() -> None:
     found = list(judge_all(mutants, {}, lambda _: tests, time.monotonic() + 60.0))
     assert [v.result for v in found] == ["killed", "survived", "not judged"] * 2
     known = {v.stamp: v for v in found[:4]}
-    assert [v.id for v in judge_all(mutants, known, lambda _: tests, time.monotonic() + 60.0)] == [
-        v.id for v in found[4:]
-    ]
+    others = judge_all(mutants, known, lambda _: tests, time.monotonic() + 60.0)
+    assert [v.id for v in others] == [v.id for v in found[4:]]
     assert list(judge_all(mutants, {}, lambda _: tests, time.monotonic() - 1.0)) == []
 
 
@@ -104,4 +104,4 @@ def test_a_folder_s_rate_counts_what_was_judged() -> None:
 
 def test_the_page_has_room_for_the_table() -> None:
     text = units.PAGE.read_text(encoding="utf-8")
-    assert [text.count(mark) for mark in units.MUTATED] == [1, 1]
+    assert [text.count(mark) for mark in MUTATED] == [1, 1]

@@ -145,10 +145,19 @@ def test_volts_are_angles() -> None:
 # ---- how long it waits
 
 
+class SilentGyro(SimpleNamespace):
+    """A gyro unit that sends nothing; beta is the next of those given, then the last for ever."""
+
+    @property
+    def beta_deg(self) -> float:
+        return float(self.betas_deg.pop(0) if len(self.betas_deg) > 1 else self.betas_deg[0])
+
+
 class SilentBench:
     """Both units, and a clock that only waits move; the run never comes to its first window."""
 
-    def __init__(self) -> None:
+    def __init__(self, *betas_deg: float) -> None:
+        self.betas_deg = list(betas_deg)
         self.time_s = 100.0
         self.level_unit = Psa2.__new__(Psa2)
         self.level_unit.node = SimpleNamespace(node_id=5)  # type: ignore[assignment]
@@ -160,13 +169,19 @@ class SilentBench:
         self.time_s += dwell_s
 
     def board(self, _: object) -> Any:
-        settings = {"settle_limit_s": 30.0, "scale_x_v_per_g": 1.0, "scale_y_v_per_g": 1.0, "m1_per_s": 1.0}
-        return SimpleNamespace(
+        settings = {
+            "settle_limit_s": 30.0,
+            "tolerance_arcmin": 1.0,
+            "scale_x_v_per_g": 1.0,
+            "scale_y_v_per_g": 1.0,
+            "m1_per_s": 1.0,
+        }
+        return SilentGyro(
+            betas_deg=self.betas_deg,
             level_node=5,
             step_s=STEP_S,
             frames=ReadingReader(Gyro.layout, 9),
             flags=Flag(0),
-            beta_deg=1.0,
             get=lambda name: settings.get(name, 0.0),
             set=lambda **_: None,
             start=lambda: None,
@@ -209,9 +224,16 @@ def test_levelling_may_take_fifteen_time_constants_or_what_is_left(
     m1_per_s: float, timeout_s: float, want_s: float
 ) -> None:
     """15/m1 and ten seconds of the torquer's own, or timeout_s, which is less; one degree off reads 60'."""
-    bench = SilentBench()
+    bench = SilentBench(1.0)
     platform = WirePlatform(bench)  # type: ignore[arg-type]
     platform._m1_per_s = m1_per_s
     with pytest.raises(LinkError, match=f"a level platform within {want_s:g} s, got 60.0' off"):
         platform.level(timeout_s)
     assert want_s <= bench.time_s - 100.0 < want_s + 0.2
+
+
+def test_a_platform_is_level_after_ten_looks_in_a_row() -> None:
+    """Nine within the tolerance, one beyond it, then ten."""
+    bench = SilentBench(*[0.001] * 9, 0.5, *[-0.001] * 10)
+    WirePlatform(bench).level(60.0)  # type: ignore[arg-type]
+    assert bench.time_s - 100.0 == pytest.approx(20 * 0.1)
