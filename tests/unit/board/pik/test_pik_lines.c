@@ -225,7 +225,13 @@ static void strobe_period_and_clear(void **state)
     assert_int_equal(r.reading[0].t_ns, 100001000); /* at the end of the strobe */
     assert_in_range(r.reading[0].total[0], 999, 1000);
     assert_int_equal(r.b.counters.strobes, 1);
+    assert_in_range(rig_bus(&r, false, PIK_REG_XP + 2, 0), 999, 1000);
     (void)rig_bus(&r, true, PIK_REG_CLEAR, 2);
+    for (uint8_t axis = 0; axis < 2; axis++) { /* what was latched of the cleared channel reads 0, too */
+        const uint8_t latched[] = {PIK_REG_X + axis, (uint8_t)(PIK_REG_XP + 2 * axis)};
+        for (unsigned i = 0; i < COUNT(latched); i++)
+            assert_in_range(rig_bus(&r, false, latched[i], 0), axis ? 0 : 999, axis ? 0 : 1000);
+    }
     rig_run_until(&r, 150 * INT64_C(1000000));
     (void)rig_bus(&r, true, PIK_REG_LATCH, 0xFFFF);
     assert_in_range(r.reading[1].total[0], 1499, 1501);
