@@ -28,6 +28,7 @@ from psabench.procedures.series import (
     measure_face,
     residual_rms_v,
 )
+from psabench.procedures.zero_wander import wander_doubts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +82,7 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
         residual_rms_v=residual_rms_v([face]),
         drift=face.drift if p.drift else None,
         notes=tuple(_notes(face)),
+        doubts=wander_doubts(readings, drift=p.drift),
     )
 
 

@@ -173,7 +173,7 @@ class _Truth:
         self._bench: Any = bench
         self._there = bench.truth_path is not None
         self._vehicle: Mapping[str, Any] = {}  # after the last window
-        self._drifts: list[tuple[float, float, float]] = []  # time of the readings, both drifts, deg/h
+        self._drifts: list[tuple[float, ...]] = []  # time of the readings, both drifts, deg/h
         self._headings: list[float] = []
 
     def watch_drift(self, t_s: float) -> None:

@@ -116,10 +116,10 @@ def rate_covariance(f: Fit) -> Floats:
 def drift_covariance(f: Fit) -> Floats:
     """Of the means of the random drift over the windows, (n, n), (rad/s)^2."""
     rows = [r.position for r in f.rows]
-    return covariance_of_means(f.noise, [r.t_mid_s for r in rows], [r.window_s for r in rows])
+    return covariance_of_means(f.noise, np.array([r.t_mid_s for r in rows]), np.array([r.window_s for r in rows]))
 
 
-def covariance_of_means(n: nav.Noise, t_mid_s: Sequence[float], length_s: Sequence[float]) -> Floats:
+def covariance_of_means(n: nav.Noise, t_mid_s: Floats, length_s: Floats) -> Floats:
     """Of the means of the random drift over spans that do not overlap, (n, n), (rad/s)^2."""
     spans = list(zip(map(float, t_mid_s), map(float, length_s), strict=True))
 

@@ -75,6 +75,7 @@ class ProcedureResult:
     residual_rms_v: float
     drift: Estimate | None  # V/s; None when no drift column was fitted
     notes: tuple[str, ...]  # warnings a reader needs to judge the numbers
+    doubts: tuple[str, ...] = ()  # reasons not to trust the intervals
 
     def get(self, name: str) -> Estimate:
         """The estimate of that name; raises KeyError with the names there are."""

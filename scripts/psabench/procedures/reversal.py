@@ -32,6 +32,7 @@ from psabench.procedures.series import (
     residual_rms_v,
     unit_cov,
 )
+from psabench.procedures.zero_wander import wander_doubts
 
 _UPRIGHT = (Face.DIRECT, Face.REVERSED)
 _SIDE = (Face.SIDE, Face.SIDE_REVERSED)
@@ -99,6 +100,7 @@ def estimate_reversal(readings: Sequence[Reading], p: ReversalParams, g_mps2: fl
         residual_rms_v=residual_rms_v(faces),
         drift=upright[0].drift if p.drift else None,
         notes=(*notes, *fit_notes(faces)),
+        doubts=wander_doubts(readings, drift=p.drift),
     )
 
 

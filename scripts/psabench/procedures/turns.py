@@ -21,6 +21,7 @@ from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_i
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import Array, FaceSeries, ProcedureResult, option
 from psabench.procedures.series import read_position
+from psabench.procedures.zero_wander import wander_doubts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +131,7 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
         residual_rms_v=float(np.sqrt(np.mean(np.concatenate([s.residual_v for s in series]) ** 2))),
         drift=None,
         notes=tuple(notes),
+        doubts=wander_doubts(readings, drift=False),
     )
 
 

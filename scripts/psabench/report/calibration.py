@@ -108,7 +108,7 @@ def _section(s: Section, ident: str) -> str:
         f"<p class=facts>{escape(ON_THE_HEAD[r.procedure])}<br>{' · '.join(facts)}</p>",
         _estimates(s),
         _budget_table(s),
-        bullets([_symbol(escape(n)) for n in r.notes]),
+        bullets([*(f"<span class=bad>{escape(d)}</span>" for d in r.doubts), *(_symbol(escape(n)) for n in r.notes)]),
         *pictures,
         _correlation(s),
     )

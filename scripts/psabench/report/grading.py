@@ -102,7 +102,7 @@ def _graded(e: Estimate, truth: float | None) -> Graded:
 
 def within_limits(sections: Sequence[Section]) -> bool:
     """Nothing that counts as measured misses the truth by more than its limits (exit status 0 or 1)."""
-    return not any(g.within is False for s in sections for g in grade(s))
+    return not any(s.result.doubts or g.within is False for s in sections for g in grade(s))
 
 
 def with_ci(value: float, ci_half: float, most: int = 9) -> tuple[str, str]:
@@ -147,6 +147,7 @@ def result_dict(section: Section) -> dict[str, object]:
             for g in grade(section)
         ],
         "correlation": {"names": list(r.correlation.names), "matrix": r.correlation.matrix.tolist()},
+        "doubts": list(r.doubts),
         "notes": list(r.notes),
     }
 
@@ -185,7 +186,7 @@ def console_table(section: Section) -> str:
         z, en = as_ratio(g.z, 1), as_ratio(g.en, 2)
         rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, z, en, _mark(g)))
     lines = [f"  {line}" for line in aligned(rows, left=(0, 8))]
-    notes = [f"  note: {n}" for n in r.notes]
+    notes = [f"  DOUBT: {d}" for d in r.doubts] + [f"  note: {n}" for n in r.notes]
     why = [f"  {e.name}: {e.reason}" for e in r.estimates if not e.identifiable]
     return "\n".join([head, *lines, *why, *notes])
 
@@ -201,7 +202,9 @@ def verdict(sections: Sequence[Section]) -> str:
     compared = [g for g in graded if g.within is not None]
     out = sum(g.within is False for g in compared)
     flagged = sum(not g.estimate.identifiable for g in graded)
-    if not compared:
+    if any(s.result.doubts for s in sections):
+        text = "The intervals are not to be trusted: see the doubts."
+    elif not compared:
         text = "No truth given: the numbers stand alone."
     else:
         head = "All" if out == 0 else f"{out} of"
