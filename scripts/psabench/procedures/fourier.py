@@ -27,8 +27,8 @@ from psabench.procedures.series import (
     fit_notes,
     measure_face,
     residual_rms_v,
+    wander_doubts,
 )
-from psabench.procedures.zero_wander import wander_doubts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

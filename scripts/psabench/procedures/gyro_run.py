@@ -21,7 +21,7 @@ from psabench.logs.call_log import Calls, check_procedure, refuse_beside_replay
 from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyro_params import ReadingParams
 from psabench.procedures.gyrocompass import GyrocompassResult
-from psabench.procedures.gyrocompass_drifts import WindowMean
+from psabench.procedures.gyrocompass_fit import WindowMean
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams

@@ -15,8 +15,16 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
-from psabench.procedures.gyrocompass_drifts import WindowMean, drift1_of, drift2_of
-from psabench.procedures.gyrocompass_fit import Fit, Row, attitude_sd_rad, fit, sensitivity
+from psabench.procedures.gyrocompass_fit import (
+    Fit,
+    Row,
+    WindowMean,
+    attitude_sd_rad,
+    drift1_of,
+    drift2_of,
+    fit,
+    sensitivity,
+)
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, latitude_effect
 from psabench.procedures.gyrocompass_params import NAME, GyrocompassParams
 from psabench.procedures.gyrocompass_windows import good_calibration, sorted_out

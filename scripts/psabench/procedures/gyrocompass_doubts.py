@@ -16,8 +16,15 @@ import numpy as np
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH, EARTH_RADPS, Flag
-from psabench.procedures.gyrocompass_drifts import WindowMean, drift1_gains
-from psabench.procedures.gyrocompass_fit import Fit, Sensitivity, alpha_turns, attitude_sd_rad, rate_covariance
+from psabench.procedures.gyrocompass_fit import (
+    Fit,
+    Sensitivity,
+    WindowMean,
+    alpha_turns,
+    attitude_sd_rad,
+    drift1_gains,
+    rate_covariance,
+)
 from psabench.procedures.gyrocompass_latitude import LatitudeEffect, passport_limit_radps
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.gyrocompass_windows import LEVEL_CODE_RAD, good_calibration, unsteady, why_not

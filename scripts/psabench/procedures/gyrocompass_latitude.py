@@ -16,8 +16,7 @@ import numpy.typing as npt
 from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import DEGPH, EARTH_RADPS, LATITUDE_LIMIT_RAD
-from psabench.procedures.gyrocompass_drifts import WindowMean, passport_sd_radps
-from psabench.procedures.gyrocompass_fit import Fit, again
+from psabench.procedures.gyrocompass_fit import Fit, WindowMean, again, passport_sd_radps
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.result import DEG
 

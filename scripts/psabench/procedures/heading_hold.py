@@ -15,7 +15,7 @@ from psabench.estimate.angles import wrapped
 from psabench.native import nav
 from psabench.native.nav import EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass import GyrocompassResult
-from psabench.procedures.gyrocompass_drifts import drift_variance
+from psabench.procedures.gyrocompass_fit import drift_variance
 from psabench.procedures.gyrocompass_params import noise_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench

@@ -31,8 +31,8 @@ from psabench.procedures.series import (
     pooled_sigma_v,
     residual_rms_v,
     unit_cov,
+    wander_doubts,
 )
-from psabench.procedures.zero_wander import wander_doubts
 
 _UPRIGHT = (Face.DIRECT, Face.REVERSED)
 _SIDE = (Face.SIDE, Face.SIDE_REVERSED)

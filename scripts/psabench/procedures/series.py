@@ -14,10 +14,12 @@ from psabench.estimate import harmonics
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Estimate, lack_of_fit_p
 from psabench.estimate.uncertainty import estimate as make_estimate
+from psabench.estimate.wander import wander_p
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import DEG, Array, FaceSeries, option
 
 LACK_OF_FIT_P = 1e-3  # below this the report warns
+WANDER_P = 1e-3  # below this the zero wanders
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,6 +168,25 @@ def fit_notes(faces: Sequence[FaceFit]) -> list[str]:
         f"(F test, p < {max(max(repeating.values()), 1e-15):.1e}); "
         "the model misses something that small, and the scatter does not contain it"
     ]
+
+
+def wander_doubts(readings: Sequence[Reading], *, drift: bool) -> tuple[str, ...]:
+    """Reason not to trust the intervals, (): none. drift: the procedure fits a zero that moves on a straight line."""
+    found = {}
+    for face, of_face in groupby(readings, key=lambda r: r.face):
+        at = [list(g) for _, g in groupby(of_face, key=lambda r: (r.realisation, r.set_deg))]
+        u_v, t_s = (np.array([np.mean([getattr(r, name) for r in g]) for g in at]) for name in ("u_v", "t_s"))
+        _, position = np.unique([g[0].set_deg for g in at], return_inverse=True)
+        p = wander_p(u_v, position, t_s if drift else None)
+        if p is not None:
+            found[face.value] = p
+    low = [face for face, p in found.items() if p * len(found) < WANDER_P]
+    if not low:
+        return ()
+    return (
+        f"the zero wanders on face {', '.join(low)}: positions that are measured again are off by more than noise "
+        "(p < 0.001), and the intervals do not contain that",
+    )
 
 
 def pooled_sigma_v(faces: Sequence[FaceFit]) -> tuple[float, int]:

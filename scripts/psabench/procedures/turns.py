@@ -20,8 +20,7 @@ from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Correlation, Estimate, estimate, not_identifiable
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
 from psabench.procedures.result import Array, FaceSeries, ProcedureResult, option
-from psabench.procedures.series import read_position
-from psabench.procedures.zero_wander import wander_doubts
+from psabench.procedures.series import read_position, wander_doubts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ from fake_platform import DEGPH, MIDDLES, FakePlatform
 from psabench.procedures import gyrocompass as g
 from psabench.procedures.gyro_run import mean_over_windows
 from psabench.procedures.gyrocompass import GyrocompassResult
-from psabench.procedures.gyrocompass_drifts import WindowMean, drift_variance
+from psabench.procedures.gyrocompass_fit import WindowMean, drift_variance
 from psabench.procedures.gyrocompass_params import noise_of, params_of
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.heading_hold import HoldParams, hold

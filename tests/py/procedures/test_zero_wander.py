@@ -1,4 +1,4 @@
-"""A zero that wanders is told, by the procedures that repeat their positions, and nothing else is taken for it."""
+"""A zero that wanders is reported by the procedures that repeat their positions, and nothing else is taken for it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def measured(procedure: str, bench: FakeBench) -> ProcedureResult:
 def test_a_wandering_zero_is_a_doubt(procedure: str, walk_v_per_rts: float, runs: int, least: int) -> None:
     """Few positions see a walk that is more than their noise in most runs, hundreds a smaller one in all."""
     rng = seeded(f"wander {procedure}")
-    found = []
+    found: list[str] = []
     for _ in range(runs):
         bench = WanderingBench(rng=rng, noise_v=NOISE_V, walk_v_per_rts=walk_v_per_rts, reading_s=0.1)
         found += measured(procedure, bench).doubts
