@@ -148,7 +148,7 @@ def alpha0_figure() -> Figure:
         Section(label="realistic, 1 mV", result=fourier(bench(1e-3, 2), FourierParams()), truth=TRUTH),
         Section(label="realistic, 1 mV", result=reversal(bench(1e-3, 3), ReversalParams()), truth=TRUTH),
     ]
-    figure = report_plots.alpha0_figure(rows)
+    figure = report_plots.alpha0_figure(rows, None)
     assert figure is not None
     return figure
 

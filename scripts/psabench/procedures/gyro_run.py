@@ -26,8 +26,8 @@ from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.heading_hold import Held, HoldParams
 from psabench.procedures.platform_bench import Floats
-from psabench.procedures.platform_series import PlatformRecorder
 from psabench.procedures.recorded_bench import BenchRecorder, RecordedBench
+from psabench.procedures.recording import PlatformRecorder
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth

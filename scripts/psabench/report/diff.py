@@ -21,7 +21,7 @@ from psabench.report.provenance import KEY
 
 FILES = ("result.json", "conform.json")  # of a folder
 ORIGIN = (KEY, "facts")  # keys that say where a result comes from
-VOLATILE = ("took_s",)  # measured anew by each run of the same program
+VOLATILE = ("took_s",)  # measured again by each run of the same program
 NAMES = ("procedure", "reading", "label", "name", "study", "case", "chain", "test", "number", "what")  # of a row
 
 
@@ -51,7 +51,7 @@ class Row:
     @property
     def difference(self) -> float | None:
         """b - a; None where they are not two numbers."""
-        a, b = _number(self.a), _number(self.b)
+        a, b = _number_of(self.a), _number_of(self.b)
         return None if a is None or b is None else b - a
 
     @property
@@ -117,8 +117,10 @@ def report_without_provenance(folder: Path) -> tuple[str, str]:
 
 def compare_results(a: Mapping[str, Any], b: Mapping[str, Any]) -> Diff:
     """Every value of two results, in the order of the first."""
-    rows = _rows({k: v for k, v in a.items() if k not in ORIGIN}, {k: v for k, v in b.items() if k not in ORIGIN})
-    origin = _rows({k: a.get(k) for k in ORIGIN}, {k: b.get(k) for k in ORIGIN})
+    rows = _paired_rows(
+        {k: v for k, v in a.items() if k not in ORIGIN}, {k: v for k, v in b.items() if k not in ORIGIN}
+    )
+    origin = _paired_rows({k: a.get(k) for k in ORIGIN}, {k: b.get(k) for k in ORIGIN})
     return Diff(
         origin=tuple(r for r in origin if r.differs),
         quantities=tuple(r for r in rows if isinstance(r.a, Quantity) or isinstance(r.b, Quantity)),
@@ -126,23 +128,23 @@ def compare_results(a: Mapping[str, Any], b: Mapping[str, Any]) -> Diff:
     )
 
 
-def _rows(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[Row]:
-    left, right = dict(_leaves(a, "")), dict(_leaves(b, ""))
+def _paired_rows(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[Row]:
+    left, right = dict(_leaves_of(a, "")), dict(_leaves_of(b, ""))
     return [Row(where=where, a=left.get(where), b=right.get(where)) for where in {**left, **right}]
 
 
-def _leaves(value: Any, where: str) -> Iterator[tuple[str, Leaf]]:
+def _leaves_of(value: Any, where: str) -> Iterator[tuple[str, Leaf]]:
     """Every value below, with its path; an estimate is one value and those of its other keys."""
     if isinstance(value, Mapping):
-        if (half := _half(value)) is not None:
+        if (half := _half_width(value)) is not None:
             yield where, Quantity(value=float(value["value"]), half=half)
         for key, inner in value.items():
             if key not in VOLATILE and not (half is not None and key == "value"):
                 inner = shlex.join(inner) if key == "command" and inner else inner
-                yield from _leaves(inner, f"{where}/{key}" if where else key)
+                yield from _leaves_of(inner, f"{where}/{key}" if where else key)
     elif isinstance(value, Sequence) and not isinstance(value, str):
         for name, inner in zip(_row_names(value), value, strict=True):
-            yield from _leaves(inner, f"{where}/{name}")
+            yield from _leaves_of(inner, f"{where}/{name}")
     else:
         yield where, value
 
@@ -156,7 +158,7 @@ def _row_names(rows: Sequence[Any]) -> list[str]:
     return [name if found.count(name) == 1 and name else f"{name or 'row'} {i}" for i, name in enumerate(found, 1)]
 
 
-def _half(row: Mapping[str, Any]) -> float | None:
+def _half_width(row: Mapping[str, Any]) -> float | None:
     """Half width of an estimate's interval: its expanded uncertainty; None: it is not an estimate."""
     if not isinstance(row.get("value"), int | float):
         return None
@@ -166,7 +168,7 @@ def _half(row: Mapping[str, Any]) -> float | None:
     return (float(ends[1]) - float(ends[0])) / 2.0 if isinstance(ends, Sequence) and len(ends) == 2 else None
 
 
-def _number(x: Leaf) -> float | None:
+def _number_of(x: Leaf) -> float | None:
     if isinstance(x, Quantity):
         return x.value
     return float(x) if isinstance(x, int | float) and not isinstance(x, bool) else None
@@ -198,10 +200,10 @@ def diff_lines(d: Diff) -> Iterator[str]:
 
 
 def _plain_rows(rows: Sequence[Row]) -> list[tuple[str, ...]]:
-    return [("", "A", "B"), *((_title(r), _text(r.a), _text(r.b)) for r in rows)]
+    return [("", "A", "B"), *((_row_title(r), _leaf_text(r.a), _leaf_text(r.b)) for r in rows)]
 
 
-def _title(r: Row) -> str:
+def _row_title(r: Row) -> str:
     """The path without the words that every path has."""
     return r.where.removeprefix("sections/").removeprefix(f"{KEY}/").replace("/estimates/", ": ")
 
@@ -209,10 +211,10 @@ def _title(r: Row) -> str:
 def _quantity_row(r: Row) -> tuple[str, ...]:
     difference = "" if r.difference is None else f"{r.difference:+.3g}"
     u, en = "" if r.u is None else f"{r.u:.2g}", "" if r.en is None else f"{r.en:+.2f}"
-    return (_title(r), _text(r.a), _text(r.b), difference, u, en)
+    return (_row_title(r), _leaf_text(r.a), _leaf_text(r.b), difference, u, en)
 
 
-def _text(x: Leaf) -> str:
+def _leaf_text(x: Leaf) -> str:
     """Cut to WIDTH characters."""
     text = f"{x.value:.9g}" if isinstance(x, Quantity) else "-" if x is None else str(x)
     return text if len(text) <= WIDTH else f"{text[: WIDTH - 3]}..."
@@ -227,8 +229,8 @@ def diff_dict(d: Diff) -> dict[str, Any]:
         "estimates": [
             {
                 "where": r.where,
-                "a": _number(r.a),
-                "b": _number(r.b),
+                "a": _number_of(r.a),
+                "b": _number_of(r.b),
                 "difference": r.difference,
                 "u": r.u,
                 "en": r.en,

@@ -121,7 +121,7 @@ def read_series(path: Path) -> Series:
         if len(row) != len(names):
             raise BadInput(expected(f"{len(names)} columns", len(row), f"{path}:{line}"))
     columns = zip(*rows[1:], strict=True) if rows[1:] else [()] * len(names)
-    arrays = {name: _array(column) for name, column in zip(names, columns, strict=True)}
+    arrays = {name: _typed_array(column) for name, column in zip(names, columns, strict=True)}
     return Series(path=path, arrays=arrays, units={name: unit_of_column(name) for name in names})
 
 
@@ -140,7 +140,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _array(column: Sequence[str]) -> Array:
+def _typed_array(column: Sequence[str]) -> Array:
     """Whole numbers, numbers, or text."""
     for kind in (np.int64, np.float64):
         try:

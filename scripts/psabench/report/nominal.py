@@ -113,12 +113,12 @@ def as_printed(value: float, printed: str) -> str:
     return f"{value:.{len(printed.partition('.')[2])}f}"
 
 
-def _rows(sections: Sequence[Section], nominal: Nominal) -> list[tuple[str, str]]:
+def _shown_rows(sections: Sequence[Section], nominal: Nominal) -> list[tuple[str, str]]:
     """The article's rows are all shown, of another sensor those that a section has an estimate of."""
-    return [(n, text) for n, text in nominal.values.items() if nominal.digits or any(_found(s, n) for s in sections)]
+    return [(n, text) for n, text in nominal.values.items() if nominal.digits or any(_found_in(s, n) for s in sections)]
 
 
-def _found(s: Section, name: str) -> Estimate | None:
+def _found_in(s: Section, name: str) -> Estimate | None:
     return next((e for e in s.result.estimates if e.name == name), None)
 
 
@@ -131,9 +131,9 @@ def nominal_section(sections: Sequence[Section], nominal: Nominal | None) -> str
         return ""
     head = "".join(f"<th>{escape(s.title)}</th>" for s in sections)
     rows = []
-    for name, printed in _rows(sections, nominal):
+    for name, printed in _shown_rows(sections, nominal):
         symbol, unit = QUANTITIES[name]
-        cells = "".join(f"<td>{_cell(_found(s, name), printed, nominal)}</td>" for s in sections)
+        cells = "".join(f"<td>{_page_cell(_found_in(s, name), printed, nominal)}</td>" for s in sections)
         first = f"<th>{symbol_html(symbol)}</th><td class=num>{printed}</td><td class=unit>{unit}</td>"
         rows.append(f"<tr>{first}{cells}</tr>")
     title = "printed" if nominal.digits else "nominal"
@@ -151,7 +151,7 @@ _LEGEND = {
 }
 
 
-def _cell(e: Estimate | None, printed: str, nominal: Nominal) -> str:
+def _page_cell(e: Estimate | None, printed: str, nominal: Nominal) -> str:
     if e is None:
         return "<span class=none>–</span>"
     value, ci = with_ci(e.value, e.ci_half, most=6)
@@ -175,8 +175,8 @@ def console_nominal(sections: Sequence[Section], nominal: Nominal | None) -> str
         ("", "", *(s.result.procedure for s in sections)),
         ("", "printed" if nominal.digits else "nominal", *(s.label for s in sections)),
     ]
-    for name, printed in _rows(sections, nominal):
-        rows.append((name, printed, *(_console_cell(_found(s, name), printed, nominal) for s in sections)))
+    for name, printed in _shown_rows(sections, nominal):
+        rows.append((name, printed, *(_console_cell(_found_in(s, name), printed, nominal) for s in sections)))
     how = "with its digits " if nominal.digits else ""
     head = f"beside {nominal.source}, {how}(?: not identifiable from these data)"
     return "".join(f"{line}\n" for line in (head, *(f"  {row}" for row in aligned(rows))))

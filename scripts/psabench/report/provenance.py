@@ -100,7 +100,7 @@ def noted_scenarios() -> list[dict[str, Any]]:
 def note_digest(name: str, seed: int, value: object) -> None:
     """What a command without an emulator computes from, as JSON has it."""
     if run := noted_run():
-        run.scenarios.append({"name": name, "seed": seed, "sha256": _digest(value)})
+        run.scenarios.append({"name": name, "seed": seed, "sha256": _json_digest(value)})
 
 
 def note_file(role: str, path: Path) -> None:
@@ -125,16 +125,16 @@ def scenario_digest(resolved: Mapping[str, Any]) -> dict[str, Any]:
     """Seed, and SHA-256 of a resolved scenario without its seed, of its profiles and of its sensors' passports."""
     body = {k: v for k, v in resolved.items() if k not in ("seed", "version")}
     units = body.get("units", [])
-    profiles = {u["profile_set"]["name"]: _digest(u["profile_set"]) for u in units if "profile_set" in u}
+    profiles = {u["profile_set"]["name"]: _json_digest(u["profile_set"]) for u in units if "profile_set" in u}
     return {
         "seed": int(resolved["seed"]),
-        "sha256": _digest(body),
+        "sha256": _json_digest(body),
         "profiles": dict(sorted(profiles.items())),
-        "passports_sha256": _digest([[u.get("name"), u.get("axes"), u.get("spread")] for u in units]),
+        "passports_sha256": _json_digest([[u.get("name"), u.get("axes"), u.get("spread")] for u in units]),
     }
 
 
-def _digest(value: object) -> str:
+def _json_digest(value: object) -> str:
     """SHA-256 of JSON: keys in order, no blanks."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
@@ -153,50 +153,50 @@ def provenance_of_run() -> dict[str, Any]:
     binaries = _loaded | (run.programs if run else {})
     return {
         "format": FORMAT,
-        "psabench": _version("psabench"),
-        "revision": _revision(),
+        "psabench": _installed_version("psabench"),
+        "revision": _git_revision(),
         "python": platform.python_version(),
-        "libraries": {name: _version(name) for name in LIBRARIES if name in sys.modules},
+        "libraries": {name: _installed_version(name) for name in LIBRARIES if name in sys.modules},
         "machine": f"{platform.system()} {platform.machine()}",
-        "binaries": [_binary(name, path) for name, path in sorted(binaries.items()) if path.is_file()],
+        "binaries": [_binary_dict(name, path) for name, path in sorted(binaries.items()) if path.is_file()],
         "command": list(run.words) if run else None,
         "begun": (run.begun if run else datetime.now(UTC)).isoformat(timespec="seconds"),
         "duration_s": round(time.monotonic() - run.start_s, 3) if run else None,
-        "seed": _seed(run) if run else None,
+        "seed": _common_seed(run) if run else None,
         "scenarios": list(run.scenarios) if run else [],
         "files": list(run.files) if run else [],
     }
 
 
-def _seed(run: Run) -> int | None:
+def _common_seed(run: Run) -> int | None:
     """The one that all scenarios have; each names its own as well."""
     seeds = {s["seed"] for s in run.scenarios}
     return seeds.pop() if len(seeds) == 1 else None
 
 
-def _version(package: str) -> str | None:
+def _installed_version(package: str) -> str | None:
     try:
         return version(package)
     except PackageNotFoundError:
         return None
 
 
-def _revision() -> str | None:
+def _git_revision() -> str | None:
     """`git describe` of the checkout that this program runs from; None: it is installed."""
     if not (CHECKOUT / ".git").exists():
         return None
-    return _output("git", "-C", str(CHECKOUT), "describe", "--tags", "--always", "--dirty")
+    return _program_output("git", "-C", str(CHECKOUT), "describe", "--tags", "--always", "--dirty")
 
 
-def _binary(name: str, path: Path) -> dict[str, Any]:
+def _binary_dict(name: str, path: Path) -> dict[str, Any]:
     """SHA-256; of the emulator its version, compiler and flags, too: they decide the last bit."""
-    told = (_output(str(path), "--version") or "").splitlines() if name == "psa-emu" else []
+    told = (_program_output(str(path), "--version") or "").splitlines() if name == "psa-emu" else []
     lines = dict(line.split(": ", 1) for line in told[1:] if ": " in line)
     own = {"version": told[0].removeprefix("psa-emu "), **lines} if told else {}
     return {"name": name, "sha256": _file_digest(path), **own}
 
 
-def _output(*command: str) -> str | None:
+def _program_output(*command: str) -> str | None:
     """Standard output of a program; None: there is none, or it fails."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=GIT_S, check=True)

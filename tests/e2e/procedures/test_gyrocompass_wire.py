@@ -276,7 +276,7 @@ def impatient(**given: float) -> tuple[str, ...]:
         platform.prepare(latitude_rad=p.latitude_rad, m1_per_s=given.get("m1", 1.0), m2_per_s=given.get("m2", 2.0))
         platform.level(60.0)
         table = Table(angles_deg=p.angles_deg, window_s=10.0, settle_s=given.get("settle_s", 10.0))
-        return g.estimate(platform.measure(table, lambda: None), p).doubts
+        return g.estimate(platform.measure(table, lambda _: None), p).doubts
 
 
 @pytest.mark.parametrize("given", [{"settle_s": 3.0}, {"m1": 0.4}, {"m2": 0.1}], ids=str)
@@ -318,7 +318,7 @@ def test_a_run_without_windows_gives_up(spoil: Callable[[WirePlatform], object],
         platform.level(60.0)
         spoil(platform)
         with pytest.raises(LinkError, match=f"position 1 was .*{why}"):
-            platform.measure(p.table, lambda: None)
+            platform.measure(p.table, lambda _: None)
         assert bench.time_s < by_s
 
 

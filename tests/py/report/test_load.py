@@ -15,8 +15,7 @@ from psabench.procedures import gyrocompass, heading_hold
 from psabench.procedures.gyrocompass_params import params_of
 from psabench.procedures.head_bench import Silent, Watch
 from psabench.procedures.heading_hold import HoldParams
-from psabench.procedures.platform_series import STEP_ARRAYS, PlatformRecorder
-from psabench.procedures.recording import CsvRecorder
+from psabench.procedures.recording import STEP_ARRAYS, CsvRecorder, PlatformRecorder
 from psabench.procedures.turns import TurnsParams, turns
 from psabench.report import provenance
 from psabench.report.load import unit_of_column

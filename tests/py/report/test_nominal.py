@@ -63,7 +63,7 @@ def test_a_page_of_the_users_sensor_shows_neither_the_articles_values_nor_its_di
     assert "class=same" not in page
     assert "<span class=other>1.0372" in page.replace("\u202f", "")
     assert "0.1121" not in page
-    assert "Beside" not in calibration.html_page(found(), {})  # nobody said what it is
+    assert "Beside" not in calibration.html_page(found(), {})  # of a sensor without nominal values
     said = console_nominal(found(), OWN)
     assert said.startswith("beside scenario own.yaml, (?: not identifiable")
     assert [line.split()[:2] for line in said.splitlines()[3:]] == [
