@@ -27,12 +27,6 @@ MARKS = {
     Verdict.NOT_APPLICABLE: "n/a",
 }
 
-STYLE = """<style>
-.v-passed { color: var(--good); } .v-failed { color: var(--bad); font-weight: 650; }
-.v-inconclusive { color: var(--s2); } .v-other { color: var(--muted); }
-td.id { white-space: nowrap; font-weight: 600; } .orig { color: var(--muted);
-  font-size: .85em; } .sign td { height: 3.2rem; min-width: 14rem; vertical-align: bottom; }
-</style>"""
 CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUSIVE: "v-inconclusive"}
 
 
@@ -229,7 +223,6 @@ _JUNIT = {
 def html_page(run: Run, folder: Path) -> str:
     """One file, nothing loaded from elsewhere; pictures are those of the folder. Same input, same bytes."""
     body = [
-        STYLE,
         _verdict(run),
         *(_failure(o, folder) for o in run.outcomes if o.verdict is Verdict.FAILED),
         _table(run),
@@ -285,4 +278,4 @@ def _seen(outcomes: list[Outcome], unobservable: str) -> str:
 
 def _signed(run: Run) -> str:
     lines = "".join(f"<tr><td>{what}</td><td></td></tr>" for what in ("Carried out by", "Checked by", "Date, place"))
-    return section("Signatures", f"<table class=sign>{lines}</table>") if run.suite != "host" else ""
+    return section("Signatures", html_table("", lines, "sign")) if run.suite != "host" else ""

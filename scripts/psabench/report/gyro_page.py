@@ -55,7 +55,7 @@ def _section(s: GyroSection, ident: str) -> str:
     return section(
         s.title,
         f"<p class=facts>|hypot(s, c) − 1| <b>{c.quality:.4f}</b> · determinant <b>{c.geometry:.2f}</b> We²</p>",
-        table(grading.table(s)),
+        table(grading.table(s), symbols={e.name: e.symbol for e in s.result.estimates}),
         f"<p class=facts>{escape(s.result.latitude.words)}</p>",
         bullets([*doubts, *map(escape, s.result.notes)]),
         _figure(rates_figure(s), ident + "rates", CAPTIONS["rates"]),
@@ -94,6 +94,8 @@ def _figure(picture: Figure, ident: str, caption: str) -> str:
 def _method() -> str:
     return section(
         "How to read this",
+        "<p>ψ: heading. α<sub>1</sub>: azimuth angle of the platform in the first position. ω<sub>d1</sub>, "
+        "ω<sub>d2</sub>: drift about the levelled and the azimuth axis. ϑ: pitch. γ: roll.</p>"
         "<p>limit: two half widths of the 95 % interval and the "
         "constant errors that no window sees (level sensors, zero of the angle sensor, scale of the torquers). "
         "Intervals count the random drift of the passport as a Gauss-Markov process. The article's figures are of one "

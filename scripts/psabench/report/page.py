@@ -15,6 +15,7 @@ from typing import Any
 
 from psabench.link.own import replace_file
 from psabench.report.provenance import KEY, provenance_of_run
+from psabench.report.quantities import page_words, symbol_html
 
 PAGE_NAME = "report.html"
 PAGE = """<!doctype html>
@@ -58,6 +59,10 @@ thead th { color: var(--muted); font-weight: 500; font-size: .85rem; } tbody th 
 figure { margin: 1rem 0 0; } figure svg { width: 100%; height: auto; max-width: 52rem; display: block; }
 details { margin-top: .8rem; } summary { cursor: pointer; color: var(--muted); } .notes { font-size: .9rem; }
 sub { font-size: .72em; line-height: 0; }
+.v-passed { color: var(--good); } .v-failed { color: var(--bad); font-weight: 650; }
+.v-inconclusive { color: var(--s2); } .v-other { color: var(--muted); }
+td.id { white-space: nowrap; font-weight: 600; } .orig { color: var(--muted);
+  font-size: .85em; } .sign td { height: 3.2rem; min-width: 14rem; vertical-align: bottom; }
 footer { color: var(--muted); font-size: .85rem; margin-top: 1.6rem; } footer td { overflow-wrap: anywhere; }
 @media print { body { max-width: none; } section { break-inside: avoid; } }
 </style></head><body>
@@ -91,15 +96,26 @@ def section(heading: str, *parts: str, kind: str = "") -> str:
     return f"<section{mark}><h2>{escape(heading)}</h2>{''.join(parts)}</section>"
 
 
-def table(rows: Sequence[Sequence[str]], heads: int = 1, *, numeric: bool = True) -> str:
-    """Plain text in cells: head rows first, the first column heads its row; numbers right-aligned, NO in red."""
+def table(
+    rows: Sequence[Sequence[str]], heads: int = 1, *, numeric: bool = True, symbols: Mapping[str, str] | None = None
+) -> str:
+    """Plain text in cells: head rows first, the first column heads its row; numbers right-aligned, NO in red.
+
+    symbols: of quantities whose names are in the first column.
+    """
 
     def cell(tag: str, text: str) -> str:
         kind = "" if not numeric else " class='num bad'" if text == "NO" else " class=num"
-        return f"<{tag}{kind}>{escape(text)}</{tag}>"
+        return f"<{tag}{kind}>{escape(page_words(text))}</{tag}>"
+
+    def first(name: str) -> str:
+        symbol = (symbols or {}).get(name)
+        return (
+            f"<th>{escape(name)}</th>" if symbol is None else f"<th title='{escape(name)}'>{symbol_html(symbol)}</th>"
+        )
 
     def row(tag: str, r: Sequence[str]) -> str:
-        return f"<tr><th>{escape(r[0])}</th>{''.join(cell(tag, x) for x in r[1:])}</tr>"
+        return f"<tr>{first(r[0])}{''.join(cell(tag, x) for x in r[1:])}</tr>"
 
     head, body = "".join(row("th", r) for r in rows[:heads]), "".join(row("td", r) for r in rows[heads:])
     return html_table(head, body)

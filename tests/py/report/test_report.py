@@ -22,6 +22,7 @@ from psabench.report import calibration as report
 from psabench.report.grading import (
     Graded,
     Section,
+    aligned,
     console_table,
     grade,
     sensor_of,
@@ -30,6 +31,8 @@ from psabench.report.grading import (
     within_limits,
 )
 from psabench.report.nominal import ARTICLE, as_printed, console_nominal
+from psabench.report.page import table
+from psabench.report.quantities import page_words, symbol_html
 
 TRUTH = {
     "u0_v": 2.5,
@@ -234,3 +237,14 @@ def test_truth_without_its_main_names_is_refused_with_what_it_has() -> None:
 def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="at least one"):
         report.write(tmp_path, [])
+
+
+def test_all_pages_write_quantities_alike() -> None:
+    """Symbols with their indices and signs of print, where the console has names and ASCII."""
+    rows = [("", "found", "+- 95 %", "unit"), ("drift2_degph", "1", "2", "V/g^2"), ("noise", "3", "4", "uV rms")]
+    assert "+- 95 %" in aligned(rows)[0]
+    page = table(rows, symbols={"drift2_degph": "ω_d2"})
+    assert "<th title='drift2_degph'>ω<sub>d2</sub></th>" in page
+    assert all(f">{words}</t" in page for words in ("± 95 %", "V/g²", "µV rms"))
+    assert symbol_html("alpha0 and k_xy of ϑ_1") == "α<sub>0</sub> and k<sub>xy</sub> of ϑ<sub>1</sub>"
+    assert "±" not in page_words("a+-b")  # no sign of an interval
