@@ -49,6 +49,7 @@ class Emulator:
     ) -> None:
         self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
         self.directory = Path(self._dir.name)
+        self._scenario = str(scenario or "")
         self.control_path = self.directory / "control" if control else None
         self.truth_path = self.directory / "truth" if truth else None
         self.argv = [str(find_emulator()), *([str(scenario)] if scenario else []), "--pace", pace, "--until-eof"]
@@ -58,7 +59,6 @@ class Emulator:
         for option, value in {"--seed": seed, **paths, "--scpi": "all:0" if scpi else None}.items():
             self.argv += [] if value is None else [option, str(value)]
         self.argv += [str(x) for x in extra]
-        self._scenario = str(scenario or "calibrate")
         if "--resolved" not in self.argv and provenance.noted_run():
             self.argv += ["--resolved", str(self.directory / "scenario.json")]
         self.endpoints: list[dict[str, str]] = []
@@ -141,17 +141,16 @@ class Emulator:
         self._dir.cleanup()
         return status
 
-    def resolved(self) -> dict[str, Any]:
-        """The scenario with every key and the seed; {}: the emulator was not asked for it."""
-        if "--resolved" not in self.argv:
-            return {}
-        return read_resolved(Path(self.argv[self.argv.index("--resolved") + 1]))
-
     def _note_run(self) -> None:
         """For the provenance of a report."""
         if provenance.noted_run():
             provenance.note_program("psa-emu", Path(self.argv[0]))
-            provenance.note_scenario(self._scenario, self.resolved())
+            name = self._value_of("--restore") or self._scenario or "calibrate"
+            provenance.note_scenario(name, Path(self._value_of("--resolved")).read_text(encoding="utf-8"))
+
+    def _value_of(self, option: str) -> str:
+        """Of an option of the emulator's; "": it is not given."""
+        return self.argv[self.argv.index(option) + 1] if option in self.argv else ""
 
     def _read_ready(self) -> None:
         assert self._process is not None

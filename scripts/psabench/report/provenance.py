@@ -36,10 +36,20 @@ class Run:
     words: tuple[str, ...]
     begun: datetime
     start_s: float  # time.monotonic
-    scenarios: list[dict[str, Any]] = field(default_factory=list)
+    started: dict[tuple[str, str], None] = field(default_factory=dict)  # name and text of scenarios, in order
+    rows: list[dict[str, Any]] = field(default_factory=list)  # of scenarios that were not started here
     files: list[dict[str, Any]] = field(default_factory=list)
     programs: dict[str, Path] = field(default_factory=dict)
     closed: bool = False  # to notes
+
+    @property
+    def scenarios(self) -> list[dict[str, Any]]:
+        """What the block says of each scenario. Digested when asked for: the shell of a fleet does without."""
+        found: list[dict[str, Any]] = []
+        digests = ({"name": Path(name).stem, **scenario_digest(json.loads(text))} for name, text in self.started)
+        for row in (*digests, *self.rows):
+            found += [] if row in found else [row]
+        return found
 
 
 _runs: list[Run] = []  # the last is the one under way; a list of the process: emulators are started from any thread
@@ -78,29 +88,28 @@ def without_notes() -> Iterator[None]:
 # ---- notes
 
 
-def note_scenario(name: str, resolved: Mapping[str, Any]) -> None:
+def note_scenario(name: str, text: str) -> None:
     """A scenario with every key, as `psa-emu --resolved` writes it."""
     if run := noted_run():
-        row = {"name": Path(name).stem, **scenario_digest(resolved)}
-        run.scenarios += [] if row in run.scenarios else [row]
+        run.started[name, text] = None
 
 
 def note_recorded(setup: Mapping[str, Any]) -> None:
     """The scenarios of a run that is replayed, from its set-up."""
     if run := noted_run():
-        run.scenarios += [row for row in setup.get("scenarios", []) if row not in run.scenarios]
+        run.rows += setup.get("scenarios", [])
 
 
 def noted_scenarios() -> list[dict[str, Any]]:
     """Those of the run under way, for the set-up of a recording."""
     run = noted_run()
-    return list(run.scenarios) if run else []
+    return run.scenarios if run else []
 
 
 def note_digest(name: str, seed: int, value: object) -> None:
     """What a command without an emulator computes from, as JSON has it."""
     if run := noted_run():
-        run.scenarios.append({"name": name, "seed": seed, "sha256": _json_digest(value)})
+        run.rows.append({"name": name, "seed": seed, "sha256": _json_digest(value)})
 
 
 def note_file(role: str, path: Path) -> None:
@@ -151,6 +160,7 @@ def provenance_of_run() -> dict[str, Any]:
     """The block of a report that is written now: plain data. Outside of a run: who and when, and no more."""
     run = _runs[-1] if _runs else None
     binaries = _loaded | (run.programs if run else {})
+    scenarios = run.scenarios if run else []
     return {
         "format": FORMAT,
         "psabench": _installed_version("psabench"),
@@ -162,15 +172,15 @@ def provenance_of_run() -> dict[str, Any]:
         "command": list(run.words) if run else None,
         "begun": (run.begun if run else datetime.now(UTC)).isoformat(timespec="seconds"),
         "duration_s": round(time.monotonic() - run.start_s, 3) if run else None,
-        "seed": _common_seed(run) if run else None,
-        "scenarios": list(run.scenarios) if run else [],
+        "seed": _common_seed(scenarios),
+        "scenarios": scenarios,
         "files": list(run.files) if run else [],
     }
 
 
-def _common_seed(run: Run) -> int | None:
+def _common_seed(scenarios: Sequence[Mapping[str, Any]]) -> int | None:
     """The one that all scenarios have; each names its own as well."""
-    seeds = {s["seed"] for s in run.scenarios}
+    seeds = {int(s["seed"]) for s in scenarios}
     return seeds.pop() if len(seeds) == 1 else None
 
 

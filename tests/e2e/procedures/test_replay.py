@@ -14,7 +14,7 @@ from psabench.link.log_file import FORMATS, LogFile
 from psabench.logs.call_log import calls_path
 from psabench.logs.formats import READABLE, read_frames
 from psabench.report.diff import read_result, report_without_provenance
-from rig import PSABENCH
+from rig import PSABENCH, ROOT
 
 pytestmark = [pytest.mark.host, pytest.mark.timeout(300)]
 
@@ -86,6 +86,27 @@ def test_whole_words_are_replayed_from_their_answers(tmp_path: Path) -> None:
     live_from, again_from = (read_result(tmp_path / x)["provenance"] for x in ("live", "again"))
     assert again_from["scenarios"] == live_from["scenarios"]  # the recording names them
     assert (again_from["seed"], [f["role"] for f in again_from["files"]]) == (1, ["recording", "calls"])
+
+
+def test_a_run_on_another_sensor_shows_its_own_values_live_and_replayed(tmp_path: Path) -> None:
+    own, passport, log = tmp_path / "own.yaml", tmp_path / "sn17.yaml", tmp_path / "run.log"
+    text = (ROOT / "proto/scenarios/quiet.yaml").read_text().replace("seed: 1", "seed: 41")
+    own.write_text(text.replace("kx_v_per_g: 1.0", "kx_v_per_g: 1.0372"))
+    passport.write_text("kx_v_per_g: 1.04\n")
+    words = ("run", "turns", "--realisations", "2", "--out")
+    live = ("--scenario", own, "--average", "0", "--record", log)
+    runs = {"live": live, "again": ("--replay", log), "passport": ("--replay", log, "--passport", passport)}
+    found = {}
+    for name, more in runs.items():
+        assert cli.main([*words, str(tmp_path / name), *map(str, more)]) in (0, 1)
+        data = read_result(tmp_path / name)
+        found[name] = (data["nominal"]["source"], data["nominal"]["values"]["kx_v_per_g"])
+        assert (data["facts"]["seed"], data["provenance"]["seed"]) == ("41", 41)
+    said = ("scenario own.yaml", "1.0372")
+    assert found == {"live": said, "again": said, "passport": ("passport sn17.yaml", "1.04")}
+    assert (
+        "the article" not in page_without_foot((tmp_path / "live/report.html").read_text()).partition("How to read")[0]
+    )
 
 
 @pytest.fixture(scope="module")

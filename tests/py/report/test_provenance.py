@@ -47,7 +47,7 @@ def test_a_report_says_who_made_it_when_and_from_what(tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     log.write_bytes(b"a")
     with provenance.command_run(["psabench", "run", "turns", "--out", "my folder"]):
-        with Emulator("quiet", cans=(), seed=7):
+        with Emulator("quiet", cans=["none"], seed=7):
             pass
         provenance.note_file("recording", log)
         written(tmp_path)
@@ -90,7 +90,7 @@ def test_a_digest_is_of_what_the_emulator_runs(tmp_path: Path) -> None:
     for name, old, new in (("a", "", ""), ("b", "seed: 1", "seed: 2"), ("c", "kx_v_per_g: 1.0", "kx_v_per_g: 1.1")):
         path = tmp_path / f"{name}.yaml"
         path.write_text(text.replace(old, new, 1) if old else text)
-        with provenance.command_run([]) as run, Emulator(path, cans=()):
+        with provenance.command_run([]) as run, Emulator(path, cans=["none"]):
             found += run.scenarios
     a, b, c = found
     assert (a["sha256"], a["profiles"], a["passports_sha256"]) == (b["sha256"], b["profiles"], b["passports_sha256"])
@@ -101,7 +101,7 @@ def test_a_digest_is_of_what_the_emulator_runs(tmp_path: Path) -> None:
 
 
 def test_no_notes_are_taken_outside_of_a_run_and_where_it_is_closed(tmp_path: Path) -> None:
-    resolved = {"seed": 3, "units": []}
+    resolved = '{"seed": 3, "units": []}'
     provenance.note_scenario("lost", resolved)
     with provenance.command_run(["a"]) as run:
         with provenance.without_notes():
@@ -118,7 +118,7 @@ def test_scenarios_of_several_seeds_have_no_common_one() -> None:
     with provenance.command_run(["a"]):
         provenance.note_digest("cases", 4, {"x": 1})
         assert provenance.provenance_of_run()["seed"] == 4
-        provenance.note_scenario("quiet", {"seed": 5, "units": []})
+        provenance.note_scenario("quiet", '{"seed": 5, "units": []}')
         assert provenance.provenance_of_run()["seed"] is None
 
 
