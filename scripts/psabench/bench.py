@@ -37,6 +37,7 @@ from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, ope
 from psabench.link.control import Control, Reply
 from psabench.link.endpoints import FIRST, emulator_buses, emulator_endpoints, opening_order, scpi_addresses
 from psabench.probe import Probe
+from psabench.report import provenance
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
@@ -437,7 +438,10 @@ class Bench(AbstractContextManager["Bench"]):
 
     def truth(self) -> dict[str, Any]:
         """The hidden parameters of the bench: for graders alone, after the estimate is made."""
-        return self._ask_truth("truth")
+        truth = self._ask_truth("truth")
+        if self.emulator is None:  # of one that was started, more is known
+            provenance.note_bench(str(truth["scenario"]), int(truth["seed"]))
+        return truth
 
     def truth_state(self, unit: str | None = None) -> dict[str, Any]:
         """True angles, specific force, rate, temperatures and supply of this instant: for graders alone."""

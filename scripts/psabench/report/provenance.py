@@ -94,6 +94,12 @@ def note_scenario(name: str, text: str) -> None:
         run.started[name, text] = None
 
 
+def note_bench(name: str, seed: int) -> None:
+    """The scenario of an emulator that was there already, as its truth port tells it."""
+    if run := noted_run():
+        run.rows.append({"name": Path(name).stem, "seed": seed})
+
+
 def note_recorded(setup: Mapping[str, Any]) -> None:
     """The scenarios of a run that is replayed, from its set-up."""
     if run := noted_run():

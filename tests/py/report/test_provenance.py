@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from psabench import cli
+from psabench.bench import Bench
 from psabench.emulator import Emulator
 from psabench.errors import BadInput
 from psabench.places import CHECKOUT
@@ -98,6 +99,18 @@ def test_a_digest_is_of_what_the_emulator_runs(tmp_path: Path) -> None:
     assert a["sha256"] != c["sha256"]
     assert a["passports_sha256"] != c["passports_sha256"]
     assert a["profiles"] == c["profiles"]
+
+
+def test_of_a_bench_that_was_there_the_truth_port_tells_the_seed() -> None:
+    with Emulator("quiet", truth=True, seed=11) as emulator, provenance.command_run(["a"]) as run:
+        with Bench.connect("none", control=emulator.control_path, truth=emulator.truth_path) as bench:
+            assert run.scenarios == []
+            bench.truth()
+        assert run.scenarios == [{"name": "quiet", "seed": 11}]
+    with provenance.command_run(["a"]) as run, Bench.start("quiet", seed=12) as bench:
+        bench.truth()
+        (scenario,) = run.scenarios
+        assert (scenario["seed"], len(scenario["sha256"])) == (12, 64)
 
 
 def test_no_notes_are_taken_outside_of_a_run_and_where_it_is_closed(tmp_path: Path) -> None:
