@@ -35,6 +35,8 @@ static const struct ads1256 *const_chip_of(const struct psabench_part *p)
       "resistance behind each input, ohm: sensor-detect currents meet it, an input without buffer loads it")           \
     X("cells_max", API_UINT, part_ads1256, cells_max, "0", 0, 65535, NULL,                                             \
       "looks at the input per conversion at 500 SPS and below; 0: one a millisecond")                                  \
+    X("every_word", API_BOOL, part_ads1256, cfg.every_word, "0", 0, 1, NULL,                                           \
+      "a look at the input for each word of the sinc5, 256 periods of CLKIN, at 500 SPS and below too")                \
     X("strict_timing", API_BOOL, part_ads1256, cfg.strict_timing, "0", 0, 1, NULL,                                     \
       "a data read inside t6 of its command gives FFh")                                                                \
     X("strict_bus", API_BOOL, part_ads1256, cfg.strict_bus, "0", 0, 1, NULL,                                           \

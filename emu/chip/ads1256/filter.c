@@ -79,8 +79,9 @@ double ads1256_noise_v(const struct ads1256_rate *r, unsigned gain_log2)
 
 void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max)
 {
-    const bool sinc5 = r->cell_words == 1;
-    const unsigned cells = r->navg / r->cell_words;
+    const unsigned cell_words = cells_max == ADS1256_EVERY_WORD ? 1 : r->cell_words;
+    const bool sinc5 = cell_words == 1;
+    const unsigned cells = r->navg / cell_words;
     *m = (struct ads1256_mean){
         .cells = !sinc5 && cells_max && cells > cells_max ? cells_max : cells,
         .sinc5 = sinc5,

@@ -7,6 +7,7 @@
 #ifndef PSABENCH_CHIP_ADS1256_FILTER_H
 #define PSABENCH_CHIP_ADS1256_FILTER_H
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -61,6 +62,8 @@ struct ads1256_mean {
     double sum;
     double out; /* the latest complete mean */
 };
+
+#define ADS1256_EVERY_WORD UINT_MAX /* as cells_max: a look a sinc5 word, which is computed, at any rate */
 
 /* Starts afresh at rate r. cells_max limits the looks at the input where the sinc5 is not computed; 0: no limit. */
 void ads1256_mean_start(struct ads1256_mean *m, const struct ads1256_rate *r, unsigned cells_max);

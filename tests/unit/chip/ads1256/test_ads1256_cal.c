@@ -1,5 +1,6 @@
 /* Calibrations of the ADS1256: the whole table of durations, and what they leave in OFC and FSC (sources 2.7). */
 #include "ads1256_rig.h"
+#include "base/bits.h"
 
 #define FS 8388608.0
 
@@ -257,6 +258,66 @@ static void system_calibrations_carry_the_noise(void **state)
     }
 }
 
+struct spread {
+    double ofc, fsc, correlation; /* standard deviations in counts; of OFC with FSC */
+};
+
+enum { CALIBRATIONS = 400 };
+
+static struct spread spread_of(uint8_t opcode, uint8_t drate, uint8_t pga_code)
+{
+    static struct rig r;
+    struct ads1256_cfg cfg = quiet;
+    cfg.noise_scale = 1.0;
+    cfg.cells_max = 1;
+    rig_up(&r, &cfg);
+    wreg(&r, ADS1256_ADCON, (uint8_t)(0x20 | pga_code));
+    set_rate(&r, drate);
+    double sum[2] = {0}, square[3] = {0};
+    const double usual = reg_peek24(&r.a.regs, ADS1256_FSC0);
+    for (int i = 0; i < CALIBRATIONS; i++) {
+        r.edges = 0;
+        command(&r, opcode);
+        await_fall(&r);
+        const double x[2] = {bits_sign_extend(reg_peek24(&r.a.regs, ADS1256_OFC0), 24),
+                             reg_peek24(&r.a.regs, ADS1256_FSC0) - usual};
+        for (int k = 0; k < 2; k++) sum[k] += x[k] / CALIBRATIONS;
+        square[0] += x[0] * x[0] / CALIBRATIONS, square[1] += x[1] * x[1] / CALIBRATIONS;
+        square[2] += x[0] * x[1] / CALIBRATIONS;
+    }
+    const double ofc = sqrt(fmax(square[0] - sum[0] * sum[0], 0.0)), fsc = sqrt(fmax(square[1] - sum[1] * sum[1], 0.0));
+    const double both = (square[2] - sum[0] * sum[1]) / (ofc * fsc);
+    return (struct spread){ofc, fsc, ofc > 0.0 && fsc > 0.0 ? both : 0.0};
+}
+
+/* Self-calibration measures zero at its own gain and VREF at gain 1 or 2; FSC has the noise of both. Published noise at
+ * VREF 2.5 V, in uV: at the gain, at gain 1 or 2. */
+static void self_calibrations_have_the_noise_of_what_they_measure(void **state)
+{
+    (void)state;
+    static const struct {
+        uint8_t drate, pga_code;
+        double alpha, fsc, zero_uv, vref_uv;
+    } rows[] = {{0xF0, 0, 0x400000, 0x44AC08, 10.73, 10.73}, {0xF0, 1, 0x400000, 0x44AC08, 6.71, 6.71},
+                {0xF0, 3, 0x400000, 0x44AC08, 3.28, 6.71},   {0xF0, 6, 0x400000, 0x44AC08, 1.74, 6.71},
+                {0xA1, 0, 0x3C0000, 0x494008, 2.93, 2.93},   {0xA1, 2, 0x3C0000, 0x494008, 1.33, 1.89}};
+    const double tolerance = 5.0 / sqrt(2.0 * CALIBRATIONS); /* five standard deviations of one */
+    for (unsigned k = 0; k < COUNT(rows); k++) {
+        const double gain = 1 << rows[k].pga_code, vref_gain = gain > 1.0 ? 2.0 : 1.0;
+        const double zero_fs = gain * rows[k].zero_uv * 1e-6 / 5.0, vref_fs = vref_gain * rows[k].vref_uv * 1e-6 / 5.0;
+        const double span_fs = vref_gain / 2.0;
+        const struct spread both = spread_of(0xF0, rows[k].drate, rows[k].pga_code);
+        const double fsc = rows[k].fsc * hypot(zero_fs, vref_fs) / span_fs;
+        near(both.ofc / (rows[k].alpha * zero_fs), 1.0, tolerance);
+        near(both.fsc / fsc, 1.0, tolerance);
+        near(both.correlation, zero_fs / hypot(zero_fs, vref_fs), 0.15);
+        const struct spread gain_alone = spread_of(0xF2, rows[k].drate, rows[k].pga_code);
+        near(gain_alone.fsc / (rows[k].fsc * vref_fs / span_fs), 1.0, tolerance);
+        near(gain_alone.ofc, 0.0, 0.01);
+        near(spread_of(0xF1, rows[k].drate, rows[k].pga_code).fsc, 0.0, 0.01);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -267,6 +328,7 @@ int main(void)
         cmocka_unit_test(system_calibrations_of_a_wrong_input),
         cmocka_unit_test(system_calibration_measures_before_it_settles),
         cmocka_unit_test(system_calibrations_carry_the_noise),
+        cmocka_unit_test(self_calibrations_have_the_noise_of_what_they_measure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
