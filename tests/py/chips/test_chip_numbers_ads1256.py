@@ -105,6 +105,18 @@ def test_rejects_the_mains() -> None:
         assert max(abs(c) for c in codes) < 2**23 * 1e-6, f"{drate:02X}h, {hz} Hz"
 
 
+def test_a_look_a_word_rejects_what_fewer_looks_fold() -> None:
+    """1 kHz at 100 SPS is a notch of the chip; with a look a millisecond it is the input at rest."""
+    found = {}
+    for every_word in (0, 1):
+        with Ads1256(noise_scale=0, every_word=every_word) as s:
+            s.adc.run_until_level("DRDY", 0)
+            s.write(3, 0x82)
+            s.adc.set_input(sine(1000.0, 0.5))
+            found[every_word] = max(abs(c) for c in s.codes(4)[2:])
+    assert found[1] < 2**23 * 1e-6 < 2**23 * 0.01 < found[0]
+
+
 @pytest.mark.parametrize("drate", RATES)
 def test_is_3_db_down_where_printed(drate: int) -> None:
     hz, navg = RATES[drate].corner_hz, RATES[drate].navg

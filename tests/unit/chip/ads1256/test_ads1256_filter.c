@@ -166,12 +166,12 @@ static double printed_response(double f_hz, unsigned navg)
 }
 
 /* Amplitude of the words for a sine of amplitude 1: from the sine and the cosine at one fixed conversion. */
-static double modelled_response(const struct ads1256_rate *r, double f_hz)
+static double response_with(const struct ads1256_rate *r, unsigned cells_max, double f_hz)
 {
     double quadrature[2];
     for (unsigned q = 0; q < 2; q++) {
         struct ads1256_mean m;
-        ads1256_mean_start(&m, r, 0);
+        ads1256_mean_start(&m, r, cells_max);
         const unsigned cells = m.cells + (m.sinc5 ? 4 : 0);
         for (unsigned i = 0; i < cells; i++) {
             const double t_s = (double)ads1256_cell_tau(&m, r, i) / CLKIN_HZ;
@@ -181,6 +181,11 @@ static double modelled_response(const struct ads1256_rate *r, double f_hz)
         quadrature[q] = m.out;
     }
     return hypot(quadrature[0], quadrature[1]);
+}
+
+static double modelled_response(const struct ads1256_rate *r, double f_hz)
+{
+    return response_with(r, 0, f_hz);
 }
 
 /* Where the sinc5 is computed, to its aliases; elsewhere the mean of 10 or more points is 0.5 % high at half the rate and
@@ -198,6 +203,23 @@ static void response_is_the_printed_one(void **state)
             const double relative = r->cell_words == 1 ? 0.02 : at[k] <= 0.5 ? 0.006 : 0.12;
             near(modelled_response(r, f_hz), want, relative * want + 1e-9);
         }
+    }
+}
+
+/* The few looks of the slow rates fold what lies at their own rate, 1000 Hz at 100 words/s and 500 Hz at 500; a look a word
+ * does not, up to where the words themselves would. */
+static void looks_fold_at_their_own_rate(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < ADS1256_RATES; i++) {
+        const struct ads1256_rate *r = &ads1256_rates[i];
+        const double looks_hz = CLKIN_HZ / (256.0 * r->cell_words);
+        near(modelled_response(r, looks_hz), 1.0, 0.01);
+        for (double f_hz = 37.0; f_hz < 9000.0; f_hz *= 1.7) {
+            const double want = printed_response(f_hz, r->navg);
+            near(response_with(r, ADS1256_EVERY_WORD, f_hz), want, 0.02 * want + 1e-9);
+        }
+        if (r->cell_words > 1) near(response_with(r, ADS1256_EVERY_WORD, looks_hz), 0.0, 1e-9);
     }
 }
 
@@ -305,6 +327,7 @@ int main(void)
         cmocka_unit_test(response_is_the_printed_one),
         cmocka_unit_test(sinc5_is_five_boxcars),
         cmocka_unit_test(minus_3_db_where_printed),
+        cmocka_unit_test(looks_fold_at_their_own_rate),
         cmocka_unit_test(mains_hum_vanishes_at_the_rates_meant_for_it),
         cmocka_unit_test(delay_of_a_ramp_is_that_of_the_filter),
         cmocka_unit_test(gain_code_7_acts_as_64),
