@@ -7,8 +7,8 @@ Usage:
                                    of them passed and none was skipped, write their files into the lock
     evidence.py --root DIR         of another checkout
 
-Tests of recordings of silicon (a group's `recordings`) are proved and locked apart: without the recordings, which are not in
-the repository, what they last said is kept, and --check notes that it was of other sources.
+Tests of recordings of silicon (a group's `recordings`) are proved and locked apart: without the recordings, which are
+not in the repository, what they last said is kept, and --check notes that it was of other sources.
 
 A file's digest is that of its tokens: comments, blank space and lines do not count (docs/evidence.md).
 """
@@ -104,8 +104,8 @@ def digest(path: Path) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Files of one model and the runs that prove them: test files, or "conform BOARD PROFILE"; and tests that compare it with
-    recordings of silicon."""
+    """Files of one model and the runs that prove them: test files, or "conform BOARD PROFILE"; and tests that compare
+    it with recordings of silicon."""
 
     name: str
     title: str
@@ -375,8 +375,8 @@ def main(argv: list[str] | None = None) -> int:
         ledger = load(root)
         if args.check:
             lines = report(root, ledger)
-            for name, what in not_judged_again(root, ledger).items():
-                print(f"evidence: {name}: E5 not judged again, its recordings: {', '.join(what)}")
+            for name, why in not_judged_again(root, ledger).items():
+                print(f"evidence: {name}: E5 not judged again, its recordings: {', '.join(why)}")
         else:
             known = [g.name for g in ledger.groups]
             if unknown := set(args.prove) - {*known, "all"}:

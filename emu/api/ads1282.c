@@ -175,7 +175,8 @@ static const struct api_counter counters[] = {
 
 #define COMMON                                                                                                         \
     .size = sizeof(struct part_ads1282), .pins = pins, .counters = API_ROWS(counters), .spi = API_SPI_MODE0,           \
-    .open = open_ads1282, .before_input = before_input, .play_bits = play_bits, .regs = offsetof(struct part_ads1282, chip.regs)
+    .open = open_ads1282, .before_input = before_input, .play_bits = play_bits,                                        \
+    .regs = offsetof(struct part_ads1282, chip.regs)
 
 const struct api_kind api_ads1281 = {COMMON,
                                      .name = "ads1281",

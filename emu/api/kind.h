@@ -97,7 +97,7 @@ struct api_kind {
     uint16_t inputs, fn_inputs; /* bit i: has input i; asks psabench_input_fn for it */
     enum api_spi spi;
     void (*open)(struct psabench_part *p); /* its options are set: makes the device and switches it on */
-    void (*before_input)(struct psabench_part *p, int64_t t_ns);  /* an input is about to change; may be NULL */
+    void (*before_input)(struct psabench_part *p, int64_t t_ns); /* an input is about to change; may be NULL */
     /* The bits of a modulator in place of its own; checked. May be NULL. */
     void (*play_bits)(struct psabench_part *p, const uint8_t *bits, size_t n, bool one_bit, int64_t t_ns);
     void (*follow)(struct psabench_part *p, int64_t t_ns);        /* time has come here; may be NULL */

@@ -220,17 +220,17 @@ static int check_bits(const psabench_part *p, const uint8_t *bits, size_t n, int
 {
     psabench *b = p->bench;
     if (!p->kind->play_bits)
-        return api_fail(b, PSABENCH_NOT_HERE, "%s: psabench_play_bits(): expected an ads1281 or ads1282, got %s", p->name,
-                        p->kind->name);
+        return api_fail(b, PSABENCH_NOT_HERE, "%s: psabench_play_bits(): expected an ads1281 or ads1282, got %s",
+                        p->name, p->kind->name);
     if (!bits) return PSABENCH_OK;
     if (kind != PSABENCH_ONE_BIT && kind != PSABENCH_M0_M1)
-        return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: kind of bits: expected PSABENCH_ONE_BIT or PSABENCH_M0_M1, got %d",
-                        p->name, kind);
+        return api_fail(b, PSABENCH_BAD_ARGUMENT,
+                        "%s: kind of bits: expected PSABENCH_ONE_BIT or PSABENCH_M0_M1, got %d", p->name, kind);
     const unsigned most = kind == PSABENCH_ONE_BIT ? 1 : 3;
     for (size_t i = 0; i < n; i++)
         if (bits[i] > most)
-            return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: bits of clock %zu: expected 0 to %u, got %u", p->name, i, most,
-                            bits[i]);
+            return api_fail(b, PSABENCH_BAD_ARGUMENT, "%s: bits of clock %zu: expected 0 to %u, got %u", p->name, i,
+                            most, bits[i]);
     return PSABENCH_OK;
 }
 

@@ -281,11 +281,11 @@ class Part:
         self.install("set_input", INPUT, fn and (lambda _ctx, _part, *args: float(fn(*args))))
 
     def play_bits(self, m0: Iterable[int] | None, m1: Iterable[int] | None = None) -> None:
-        """Bits of a modulator in place of the model's own and of the input, a level a clock of CLK/4: M0 and M1 of a real
-        ADS1281 or ADS1282, or one bit of another modulator. The converter restarts; the first bits are of the first clock
-        that it samples. After the last, zero is converted and the counter bits_missing counts. None: the model again.
-        BadInput for parts without modulator output, levels beside 0 and 1, and streams of different length."""
-        kind, bits = _bits(m0, m1)
+        """Bits of a modulator in place of the model's own and of the input, a level a clock of CLK/4: M0 and M1 of a
+        real ADS1281 or ADS1282, or one bit of another modulator. The converter restarts; the first bits are of the
+        first clock that it samples. After the last, zero is converted and the counter bits_missing counts. None: the
+        model again. BadInput for parts without modulator output, levels beside 0 and 1, streams of different length."""
+        kind, bits = _pack_bits(m0, m1)
         self.bench.done(self._lib.play_bits(self.live(), bits, len(bits or b""), kind))
         self._bits = bits  # C knows only its address
 
@@ -404,20 +404,20 @@ def _frame(f: FrameStruct) -> Frame:
     )
 
 
-def _bits(m0: Iterable[int] | None, m1: Iterable[int] | None) -> tuple[int, bytes | None]:
+def _pack_bits(m0: Iterable[int] | None, m1: Iterable[int] | None) -> tuple[int, bytes | None]:
     """enum psabench_bits, and a byte a clock; M1 weighs 2."""
     if m0 is None:
         return M0_M1, None
-    first = _levels("M0", m0)
+    first = _read_levels("M0", m0)
     if m1 is None:
         return ONE_BIT, first
-    second = _levels("M1", m1)
+    second = _read_levels("M1", m1)
     if len(first) != len(second):
         raise BadInput(expected(f"{len(first)} levels, as of M0", len(second), "M1"))
     return M0_M1, bytes(a + 2 * b for a, b in zip(first, second, strict=True))
 
 
-def _levels(what: str, levels: Iterable[int]) -> bytes:
+def _read_levels(what: str, levels: Iterable[int]) -> bytes:
     try:
         found = bytes(int(level) for level in levels)
     except ValueError:

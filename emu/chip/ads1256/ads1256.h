@@ -82,10 +82,9 @@ struct ads1256 {
     int64_t start_tau;   /* CLKIN count where the present run began */
     int64_t cell, ready; /* next cell and conversion of the run */
     enum ads1256_cal cal;
-    bool sync_due; /* SYNC has been commanded, conversions go on until WAKEUP */
-    bool cal_due;  /* a calibration waits for the converter to start */
-    bool updating; /* in the 16 tau before a new word */
-    int32_t word;  /* 24-bit code */
+    bool sync_due, cal_due; /* a SYNC waits for WAKEUP; a calibration for the converter to start */
+    bool updating;          /* in the 16 tau before a new word */
+    int32_t word;           /* 24-bit code */
     bool unread;
     bool powered_down;  /* by SYNC/PDWN, which is still low */
     int64_t pin_low_ns; /* when SYNC or RESET went low */

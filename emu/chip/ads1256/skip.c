@@ -6,9 +6,9 @@ bool ads1256_may_skip(const struct ads1256 *a, double low_v, double high_v)
     const bool plain = !a->fault.drdy && !a->fault.dout && !a->fault.lost_sync && !a->fault.clock_ppm;
     const bool buffered = ads1256_value(a, ADS1256_STATUS) & ADS1256_STATUS_BUFEN;
     const double top_v = a->cfg.avdd_v - (buffered ? ADS1256_AVDD_LESS_V : 0.0);
-    return plain && a->mode == ADS1256_RUNNING && a->sync && a->ready == 0 && !a->sync_due && !a->cal_due && !a->rdatac &&
-           a->rate == a->rate_next && !(ads1256_value(a, ADS1256_ADCON) & ADS1256_ADCON_SDCS) && low_v >= 0.0 &&
-           high_v <= top_v && !a->io.source_ohm && a->cfg.part == ADS1256_PART_1256 &&
+    return plain && a->mode == ADS1256_RUNNING && a->sync && a->ready == 0 && !a->sync_due && !a->cal_due &&
+           !a->rdatac && a->rate == a->rate_next && !(ads1256_value(a, ADS1256_ADCON) & ADS1256_ADCON_SDCS) &&
+           low_v >= 0.0 && high_v <= top_v && !a->io.source_ohm && a->cfg.part == ADS1256_PART_1256 &&
            ads1256_in_range(a, low_v, high_v);
 }
 

@@ -103,9 +103,10 @@ struct ads1282_limits {
 
 /* Bits of another modulator, that of a real chip for instance, in place of ours. They are the caller's, and stay. */
 struct ads1282_recording {
-    const uint8_t *bits; /* a byte a clock of the modulator: bit 0 M0, bit 1 M1, as the pins show them; NULL: our modulator */
+    const uint8_t
+        *bits; /* a byte a clock of the modulator: bit 0 M0, bit 1 M1, as the pins show them; NULL: our modulator */
     int64_t count;
-    bool one_bit; /* bit 0 alone, the input itself: +-1 stands for +-5/4 of full scale, as the bits of M0 do */
+    bool one_bit; /* bit 0 alone, the input itself: +-1 is +-5/4 of full scale, as in M0 */
     int64_t edge; /* CLK edge of its first clock; -1: the next that is sampled */
 };
 

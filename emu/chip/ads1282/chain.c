@@ -229,7 +229,7 @@ static void take_sinc(struct ads1282 *a, int64_t lsb)
         a->result[k / ADS1282_BLOCKS % ADS1282_RESULTS] = ads1282_filter_fir(&a->filter, a->sinc);
 }
 
-/* Of n clocks from CLK edge `edge` on. Past the recording's end M0 and M1 alternate, which stands for zero. */
+/* Of n clocks from CLK edge `edge` on. Past the recording's end M0 and M1 alternate: zero. */
 static void read_recording(struct ads1282 *a, int64_t edge, unsigned n, uint8_t *bits)
 {
     struct ads1282_recording *r = &a->recording;

@@ -36,7 +36,7 @@ void ads1282_mod_start(const struct ads1282_mod *m, struct ads1282_cic *c);
 void ads1282_mod_run(struct ads1282_mod *m, struct ads1282_cic *c, const int64_t *x, unsigned n);
 
 /* The same with bits that come from elsewhere, in place of those of the loops. A byte a clock: bit 0 is the level of M0, bit 1
- * that of M1; or, one_bit, bit 0 alone, which stands for the input itself, +-1 of the bits' range, four clocks late as y[n]. One
+ * that of M1; or, one_bit, bit 0 alone, which is the input itself, +-1 of the bits' range, four clocks late as y[n]. One
  * bit needs no ads1282_mod_start(). ads1282_mod_take() is one clock, into m alone. */
 void ads1282_mod_take(struct ads1282_mod *m, uint8_t bits);
 void ads1282_mod_play(struct ads1282_mod *m, struct ads1282_cic *c, const uint8_t *bits, unsigned n, bool one_bit);

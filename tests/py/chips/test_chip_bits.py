@@ -1,8 +1,6 @@
-"""Bits of another modulator as the input of an ADS1281/ADS1282: psabench.chips and the data sheet's figure for full scale."""
+"""Bits of another modulator as the input of an ADS1281/ADS1282, and the data sheet's figure for full scale."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import pytest
 from chip_bench import Ads1282
@@ -12,12 +10,12 @@ from psabench.errors import BadInput
 FULL_SCALE = 2**31
 
 
-def word_of(m0: Sequence[int] | None, m1: Sequence[int] | None = None) -> int:
+def word_of(m0: list[int] | None, m1: list[int] | None = None) -> int:
     """The first settled word of 2000 words/s for a pattern, repeated."""
     with Ads1282(noise_scale=0, power_up_tclk=0) as chip:
         chip.write(1, 0x5A)
         chip.adc.set_volts(0, -1.0)
-        chip.adc.play_bits(m0 and m0 * 4000, m1 and m1 * 4000)
+        chip.adc.play_bits(m0 * 4000 if m0 else None, m1 * 4000 if m1 else None)
         chip.adc.run_until_edge("DRDY")
         assert chip.adc.counters["bits_missing"] == 0
         return chip.word()

@@ -1,8 +1,8 @@
 """Bits of a real ADS1281's modulator through the model's filters, and beside the model's own (E5; docs/evidence.md).
 
-Thirteen captures of M0 and M1, both inverted, at +-10 V and less of that board's front end, one after the other. Captures
-are short: 5001 clocks settle the sinc, not the FIR filter behind it, so that the FIR is judged on the joined captures by
-exact arithmetic, everything else capture by capture.
+Thirteen captures of M0 and M1, both inverted, at +-10 V and less of that board's front end, one after the other. They
+are short: 5001 clocks settle the sinc, not the FIR filter behind it, so that the FIR is judged on the joined captures
+by exact arithmetic, everything else capture by capture.
 """
 
 from __future__ import annotations
@@ -43,16 +43,17 @@ def captures(bits: Levels) -> Iterator[tuple[int, Levels]]:
     yield from zip(CAPTURES_V, np.split(bits, np.cumsum(CLOCKS)[:-1]), strict=True)
 
 
-def decoded(levels: Levels) -> NDArray[np.int64]:
+def decoded(levels: Levels) -> Floats:
     """y[n], n = 4 ..., by the formula of the data sheet."""
-    m0, m1 = 2 * levels.T.astype(np.int64) - 1
+    m0, m1 = 2.0 * levels.T - 1.0
     n = np.arange(4, len(m0))
-    return 3 * m0[n - 2] - 6 * m0[n - 3] + 4 * m0[n - 4] + 9 * (m1[n] - 2 * m1[n - 1] + m1[n - 2])
+    y: Floats = 3 * m0[n - 2] - 6 * m0[n - 3] + 4 * m0[n - 4] + 9 * (m1[n] - 2 * m1[n - 1] + m1[n - 2])
+    return y
 
 
 def played(levels: Levels, config0: int) -> Floats:
-    """Words that the chip makes of them, as fractions of full scale. Those of the sinc are right-justified, those of the
-    FIR have a last bit that only repeats the sign."""
+    """Words that the chip makes of them, as fractions of full scale. Those of the sinc are right-justified, those of
+    the FIR have a last bit that only repeats the sign."""
     found = []
     with Ads1282(noise_scale=0, power_up_tclk=0) as chip:
         chip.write(1, config0)
@@ -64,8 +65,6 @@ def played(levels: Levels, config0: int) -> Floats:
     return np.array(found[:-1]) / 2**30  # the last knows clocks that are missing
 
 
-
-
 def boxcars(*lengths: int) -> Floats:
     h = np.ones(1)
     for n in lengths:
@@ -74,7 +73,7 @@ def boxcars(*lengths: int) -> Floats:
 
 
 def test_the_decoder_gives_the_words_of_the_recorders_own_filter(bits: Levels) -> None:
-    """Words that the recording's authors published of these bits: the bits are read as they were meant, polarity too."""
+    """Words that the recording's authors published of these bits: they are read as they were meant, polarity too."""
     want = np.loadtxt(recorded_file("ads1281/testbench_output.csv", WORDS_SHA256))
     got = fftconvolve(decoded(bits), boxcars(1000, 736, 128, 129), "valid")
     found = max(int(np.sum(np.abs(np.subtract.outer(got[k::1000], want)).min(axis=1) < 4)) for k in range(1000))
@@ -108,7 +107,7 @@ def test_words_are_those_of_the_cascade(bits: Levels, dr: int, phase: str | None
 
 
 def test_the_captures_lie_on_a_line(bits: Levels) -> None:
-    """Means of settled sinc words of nine captures with one source: within 4 ppm of full scale, offset 20 ppm at most."""
+    """Means of settled sinc words of nine captures with one source: to 4 ppm of full scale, offset 20 ppm at most."""
     found = [(v, float(played(levels, 0x41).mean())) for v, levels in captures(bits) if v not in OTHER_SOURCE_V]
     volts, mean = np.array(found).T
     slope, zero = np.polyfit(volts, mean, 1)

@@ -123,7 +123,10 @@ C_TYPES: dict[str, object] = {
     "psabench_input_fn *": clib.INPUT,
     "psabench_frame_fn *": clib.FRAME,
 }
-TX = {"spi": (1, ctypes.c_char_p), "play_bits": (1, ctypes.c_char_p)}  # bytes go in as they are; ctypes has no other type for that
+TX = {
+    "spi": (1, ctypes.c_char_p),
+    "play_bits": (1, ctypes.c_char_p),
+}  # bytes go in as they are; ctypes has no other type for that
 
 
 def c_type(words: str) -> object:

@@ -1,7 +1,8 @@
 """Recordings of real parts: where they are, and how they are read.
 
-They are no part of the project: the environment variable PSABENCH_RECORDINGS alone says where they lie, docs/evidence.md
-where they are public. A test that needs them is skipped without it, with a reason that tools/evidence.py knows.
+They are no part of the project: the environment variable PSABENCH_RECORDINGS alone says where they are here,
+docs/evidence.md where they are public. A test that needs them is skipped without it, with a reason that
+tools/evidence.py knows.
 """
 
 from __future__ import annotations
