@@ -107,7 +107,12 @@ static void op_watch(struct world *w, psabench_part *p)
 static void op_input(struct world *w, psabench_part *p)
 {
     static const double v[] = {0.0, 1.0, -1.0, 2.5, 1e300, -5.0};
+    static const uint8_t bits[] = {0, 1, 2, 3, 3, 2, 1, 0}; /* too many for one bit */
     const uint8_t b = script_byte(w->s);
+    if ((b & 60) == 60) {
+        error(w, psabench_play_bits(p, b & 128 ? bits : NULL, sizeof bits, (int)(b & 3)));
+        return;
+    }
     error(w, b & 128 ? psabench_set_input(p, b & 64 ? volts : NULL, w)
                      : psabench_set_volts(p, (int)(b % 10) - 1, v[b / 10 % 6]));
 }
