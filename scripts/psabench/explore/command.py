@@ -25,7 +25,7 @@ examples:
   psabench explore --replay build/explore/psa2-article/KEY/schedule.json
 
 A schedule takes at most --length of simulated time. A violation is shrunk to the shortest schedule that shows it; its
-folder has the schedule, a snapshot, and a scenario for psa-emu alone (docs/explore.md). The same command goes on where
+folder has the schedule, a snapshot, and a scenario for psa-emu alone (docs/tools/explore.md). The same command goes on where
 it was ended.
 
 Exit status: 0 no violation, 1 a violation, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
@@ -50,6 +50,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--findings", type=natural, metavar="N", help="end after N different violations")
     p.add_argument("--jobs", type=natural, metavar="N", help="processes (one per core for many schedules)")
     p.add_argument("--out", type=Path, metavar="FOLDER", help=f"folder of the findings ({OUT}/BOARD-PROFILE)")
+    p.add_argument("--fresh", action="store_true", help="play again what is done")
     p.add_argument("--replay", type=Path, metavar="FILE", help="play one schedule from its file")
     return p.parse_args(words)
 
@@ -71,7 +72,7 @@ def _replay_schedule(path: Path) -> int:
 def _explore_board(args: argparse.Namespace) -> int:
     from psabench.campaign.workers import workers
     from psabench.conform.profile import variant
-    from psabench.explore.search import Search, run_search
+    from psabench.explore.search import DONE, Search, run_search
 
     v = variant(args.board, args.profile)
     length_s = args.length or BOARDS[v.family].schedule_s
@@ -79,6 +80,8 @@ def _explore_board(args: argparse.Namespace) -> int:
     count = args.schedules if args.schedules is not None else None if args.hours else SCHEDULES
     jobs = args.jobs if args.jobs is not None or count is None or count > ALONE else 1
     out = args.out or OUT / f"{v.board}-{v.profile}"
+    if args.fresh:
+        (out / DONE).unlink(missing_ok=True)
     shown = Shown(v.name, count)
     for_s = None if args.hours is None else 3600.0 * args.hours
     with workers(jobs) as at_work:

@@ -256,7 +256,7 @@ def test_what_is_no_snapshot_is_told(text: str) -> None:
 
 
 def part(task: Task) -> Part:
-    """Stands for a board that violates two things at once in schedule 12, and one of these again in 13 and 17."""
+    """As of a board that violates two things at once in schedule 12, and one of these again in 13 and 17."""
     k, m = (Violation(key=key, requirements=("X-01",), saw="1", due="2") for key in "km")
     mine = range(task.first, task.first + task.count)
     found = tuple((n, v) for n, v in ((12, k), (12, m), (13, m), (17, k)) if n in mine)

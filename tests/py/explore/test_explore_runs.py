@@ -171,3 +171,12 @@ def test_a_catalogue_has_looks_points_and_objects() -> None:
     assert any(p.startswith("a.line.") for p in c.points["line.stuck"])
     assert not any(p.startswith("client") for points in c.points.values() for p in points)
     assert json.dumps([e.index for e in c.entries])
+
+
+@pytest.mark.parametrize("length_s", [0.02, 0.1])
+def test_a_schedule_ends_with_its_time_and_what_it_cut_is_not_judged(wrong: None, length_s: float) -> None:
+    """The look would find the wrong after 0.2 s."""
+    schedule = replace(storm("000#0105", looks=("stream",)), length_s=length_s)
+    played = play_schedule(schedule)
+    assert played.time_s == pytest.approx(length_s, abs=1e-9)
+    assert played.violations == ()
