@@ -25,8 +25,8 @@ examples:
   psabench explore --replay build/explore/psa2-article/KEY/schedule.json
 
 A schedule takes at most --length of simulated time. A violation is shrunk to the shortest schedule that shows it; its
-folder has the schedule, a snapshot, and a scenario for psa-emu alone (docs/tools/explore.md). The same command goes on where
-it was ended.
+folder has the schedule, a snapshot, and a scenario for psa-emu alone (docs/tools/explore.md). The same command goes on
+where it was ended.
 
 Exit status: 0 no violation, 1 a violation, 2 bad input, 3 the bench failed, 130 ended by Ctrl-C.
 """

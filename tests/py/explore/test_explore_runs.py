@@ -4,6 +4,7 @@ shrunk to what shows it, and shown again by each of the lines that its folder ha
 from __future__ import annotations
 
 import json
+import resource
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from psabench.explore.search import Search, run_search
 from psabench.places import find_emulator
 
 SEED = 23
+SCHEDULE_S = 2 * 3600 / 10_000  # of one core
 COUNT = {"psa2": 25, "psd1": 15, "pik": 15, "pmka": 15, "gyro": 5}
 
 
@@ -33,9 +35,19 @@ def search(board: str = "psa2", seed: int = SEED) -> Search:
     return Search(board=board, profile=variant(board).profile, seed=seed, length_s=BOARDS[board].schedule_s)
 
 
+def processor_s() -> float:
+    """Of this process and of the emulators that have ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
 @pytest.mark.parametrize("board", BOARDS)
 def test_schedules_of_a_fixed_seed_find_nothing(board: str, tmp_path: Path) -> None:
+    """At a pace of 10,000 an hour on two cores."""
+    search(board).schedule(0)  # loads the suite
+    begun_s = processor_s()
     tally = run_search(search(board), tmp_path, ThisProcess(), count=COUNT[board])
+    assert processor_s() - begun_s < SCHEDULE_S * COUNT[board]
     assert tally.times == {}, [f.words() for f in tally.findings.values()]
     assert tally.schedules == COUNT[board]
     assert tally.simulated_s > 0.1 * COUNT[board]

@@ -21,7 +21,7 @@ SESSION = Session(
 BOARD = Board(
     name="gyro",
     device="Gyro",
-    schedule_s=100.0,
+    schedule_s=70.0,
     lines=LINES,
     port_lines=LINES,
     beat=Beat(rows={"GYRO-CAN-02": "period_us"}, line="STEP", level=1, message="GYRO_ANGLES", counter="STEP"),
