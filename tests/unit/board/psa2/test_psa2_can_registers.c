@@ -121,10 +121,11 @@ static void told(struct rig *r, uint16_t code, uint8_t reg, uint8_t source)
 {
     settle(r);
     assert_int_equal(count_id(r, 0x085), 1);
-    const uint8_t *const d = seen_id(r, 0x085)->data;
-    assert_int_equal(bits_get_le(d, 2), code);
-    assert_int_equal(d[2], reg);
-    assert_int_equal(d[3], source);
+    const struct can_msg *const m = seen_id(r, 0x085);
+    if (!m) return; /* for the analyser: there is one */
+    assert_int_equal(bits_get_le(m->data, 2), code);
+    assert_int_equal(m->data[2], reg);
+    assert_int_equal(m->data[3], source);
     r->count = 0;
 }
 
