@@ -92,7 +92,6 @@ static void the_rom_has_the_specimen(void **state)
     assert_int_equal(PMKA_ROM_WORDS, 91);
     const uint16_t head[] = {1, 3, 7, (uint16_t)-40, 20, 4800};
     for (unsigned w = 0; w < COUNT(head); w++) assert_int_equal(rom_word(w), head[w]);
-    double asymmetry = 0.0;
     for (unsigned i = 0; i < PMKA_INTS; i++) {
         for (unsigned p = 0; p < 7; p++) {
             const struct pmka_int_cfg *c = &rig.b.channel[i].integrator.cfg;
@@ -106,10 +105,42 @@ static void the_rom_has_the_specimen(void **state)
             const double zero_vs = (c->zero_v + c->zero_tc_v_per_k * dt) * 4.8e-3;
             near((int16_t)rom_word(6 + 3 * (7 * i + p) + 2) * 1e-10, zero_vs, 0.501e-10);
         }
-        asymmetry += pmka_int_ct(&rig.b.channel[i].integrator.cfg, PMKA_PLUS, 10.0, 10.0, 25.0) -
-                     pmka_int_ct(&rig.b.channel[i].integrator.cfg, PMKA_MINUS, 10.0, 10.0, 25.0);
     }
-    near(asymmetry / 4.0, 200e-6, 250e-6); /* sd of the mean 70 ppm */
+}
+
+enum { SPECIMENS = 200 };
+
+static void init_specimen(uint32_t serial, double rom_ct_sd_ppm)
+{
+    struct pmka_profile p = rig_profile();
+    p.rom_ct_sd_ppm = rom_ct_sd_ppm;
+    struct board_cfg cfg = rig_cfg();
+    cfg.serial = serial;
+    rig_init(&rig, &p);
+    const struct board_io io = {.ctx = &rig, .accel = rig_accel_row, .temp_degc = rig_degc, .event = rig_event};
+    pmka_board.init(&rig.b.base, &p, &cfg, &io, &rig.s);
+}
+
+/* Rr(-) over Rr(+) of 800 integrators: 200 ppm, and 100 ppm of each resistor. 5 sigma of the mean, and of the spread. */
+static void resets_of_either_sign_differ_by_the_profile_s_asymmetry(void **state)
+{
+    (void)state;
+    const unsigned n = SPECIMENS * PMKA_INTS;
+    double sum = 0.0, sum2 = 0.0;
+    for (uint32_t serial = 1; serial <= SPECIMENS; serial++) {
+        init_specimen(serial, 0.2);
+        for (unsigned i = 0; i < PMKA_INTS; i++) {
+            const struct pmka_int_cfg *c = &rig.b.channel[i].integrator.cfg;
+            const double ppm =
+                1e6 *
+                (pmka_int_ct(c, PMKA_PLUS, 10.0, 10.0, 25.0) / pmka_int_ct(c, PMKA_MINUS, 10.0, 10.0, 25.0) - 1.0);
+            sum += ppm;
+            sum2 += ppm * ppm;
+        }
+    }
+    const double sd_ppm = sqrt(2.0) * 100.0, mean_ppm = sum / n;
+    near(mean_ppm, 200.0, 5.0 * sd_ppm / sqrt(n));
+    near(sqrt(sum2 / n - mean_ppm * mean_ppm), sd_ppm, 5.0 * sd_ppm / sqrt(2.0 * n));
 }
 
 /* Mean error of CT in the ROM of an integrator, relative; rounding hides in the mean of 14 words. */
@@ -134,15 +165,9 @@ static void the_rom_has_the_factory_s_error(void **state)
     static const double sd_ppm[] = {0.2, 1.0, 0.0};
     for (unsigned k = 0; k < COUNT(sd_ppm); k++) {
         double sum = 0.0, sum2 = 0.0, product = 0.0;
-        const unsigned specimens = 200;
-        for (unsigned n = 0; n < specimens; n++) {
-            struct pmka_profile p = rig_profile();
-            p.rom_ct_sd_ppm = sd_ppm[k];
-            struct board_cfg cfg = rig_cfg();
-            cfg.serial = n + 1;
-            rig_init(&rig, &p);
-            const struct board_io io = {.ctx = &rig, .accel = rig_accel_row, .temp_degc = rig_degc, .event = rig_event};
-            pmka_board.init(&rig.b.base, &p, &cfg, &io, &rig.s);
+        const unsigned specimens = SPECIMENS;
+        for (uint32_t n = 0; n < specimens; n++) {
+            init_specimen(n + 1, sd_ppm[k]);
             for (unsigned i = 0; i < PMKA_INTS; i++) {
                 const double e = 1e6 * ct_error(i);
                 sum += e;
@@ -285,6 +310,7 @@ int main(void)
         cmocka_unit_test(a_reading_that_nobody_took_is_told),
         cmocka_unit_test(numbers_of_resets),
         cmocka_unit_test(the_rom_has_the_specimen),
+        cmocka_unit_test(resets_of_either_sign_differ_by_the_profile_s_asymmetry),
         cmocka_unit_test(the_rom_has_the_factory_s_error),
         cmocka_unit_test(what_is_refused),
         cmocka_unit_test(strobes),
