@@ -39,7 +39,7 @@ What a board, and a host that listens to it, must do: every statement of the art
 be tested, each with its source, its grade of evidence and its tests. The rows are in
 `proto/requirements/<group>.yaml`, their grammar in `proto/requirements.yaml`; `psabench.conform.requirements` reads
 them, `tools/gen_requirements.py` makes this page (`make docs`), and `make lint` rejects a stale one, a test that is
-none and a source that is not there.
+none, a board's row that rests on a stand-in or on files alone, and a source that is not there.
 
 Tests in bold are of the conformance suite (`@proves` in `scripts/psabench`); the others belong to this
 repository and see what no wire shows. *Seen by* says how somebody observes it who has only the wires; a row that

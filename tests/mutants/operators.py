@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 
 BLANKS = re.compile(
     r"//[^\n]*|/\*.*?\*/|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])+'|^[ \t]*#(?:[^\n\\]|\\\n|\\.)*", re.S | re.M
@@ -84,8 +85,13 @@ def _in_function(text: str, at: int) -> bool:
     return begin >= 0 and text.find("\n}\n", begin, at) < 0
 
 
-def places(text: str) -> Iterator[Place]:
+@cache
+def places(text: str) -> tuple[Place, ...]:
     """Each place of a C file and what it becomes there; nothing that stays as it is."""
+    return tuple(_find_places(text))
+
+
+def _find_places(text: str) -> Iterator[Place]:
     code = blanked(text)
     for kind, (pattern, change) in PATTERNS.items():
         for m in pattern.finditer(code):
