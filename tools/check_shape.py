@@ -164,7 +164,7 @@ RULES = {
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_001, 58_001),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 44_955, 44_955),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_685, 1_685),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_686, 1_686),
 }
 
 

@@ -111,4 +111,5 @@ class Tree:
         for kept in self._kept.rglob("*"):
             path = self.folder / kept.relative_to(self._kept)
             if kept.is_file() and (not path.exists() or path.stat().st_mtime_ns != kept.stat().st_mtime_ns):
+                path.unlink(missing_ok=True)  # a mutant that still runs keeps its file busy
                 shutil.copy2(kept, path)
