@@ -428,7 +428,7 @@ SNR_DB = {  # by DR, gains 1 .. 64; sources 1.9
 
 def published_v(dr: int, gain_code: int) -> float:
     """Noise at the input, V rms: the SNR is that of a full-scale sine."""
-    return FULL_SCALE_V / math.sqrt(2) / 10 ** (SNR_DB[dr][gain_code] / 20) / 2**gain_code
+    return float(FULL_SCALE_V / math.sqrt(2) / 10 ** (SNR_DB[dr][gain_code] / 20) / 2**gain_code)
 
 
 @pytest.mark.parametrize("dr", SNR_DB)

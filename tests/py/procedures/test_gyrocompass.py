@@ -185,9 +185,10 @@ def test_white_noise_of_the_level_widens_the_interval(heading_deg: float) -> Non
     """n sqrt(m1 dt)/T in each S, sqrt(1/2) of it in half the difference of the outer positions, sqrt(3/2) in the middle
     one less their mean: so the heading, by where north is between them. Three windows tell n to 1.7 %."""
     none = {"gm_sigma_degph": 0.0, "angle_sd_arcmin": 0.0, "level_sd_arcmin": 0.0, "latitude_sd_arcmin": 0.0}
-    level = {"heading_deg": heading_deg, "pitch_deg": 0.0, "roll_deg": 0.0}
-    quiet = run(FakePlatform(**level), "article", **none)
-    loud = run(FakePlatform(noise_arcmin=0.05, **level), "article", **none)
+    quiet, loud = (
+        run(FakePlatform(noise_arcmin=n, heading_deg=heading_deg, pitch_deg=0.0, roll_deg=0.0), "article", **none)
+        for n in (0.0, 0.05)
+    )
     assert quiet.get("heading_deg").sd < 1e-6
     s_sd_radps = math.radians(0.05 / 60.0) * math.sqrt(1.0 * STEP_S) / 10.0
     north_radps = EARTH_RADPS * math.cos(math.radians(50.0))

@@ -146,7 +146,7 @@ def test_volts_are_angles() -> None:
 
 
 class SilentGyro(SimpleNamespace):
-    """A gyro unit that sends nothing; beta is the next of those given, then the last for ever."""
+    """A gyro unit that sends nothing; beta is the next of those given, then always the last."""
 
     @property
     def beta_deg(self) -> float:
