@@ -18,7 +18,7 @@ from typing import Protocol
 
 import between
 from psabench.link.own import replace_file
-from quick import PLACES, python_choice
+from quick import PLACES, mentions, near_by_name, python_choice
 
 from tests.mutants.declared import Mutant
 from tests.mutants.folder_tests import TESTS, C, FolderTests
@@ -35,7 +35,7 @@ FILES_AT_MOST, TESTS_S = 5, 150.0  # of Python tests nearest to a file, and the 
 
 EPILOG = """\
 A mutant is killed when the tests nearest to its file fail, or do not end. C (emu/...): the C tests of its folder.
-Python (scripts/psabench/...): the five files of tests/py that `make quick` would run first. Nothing tells which of
+Python (scripts/psabench/...): five files of tests/py: named after it, then importing it, then of its folder. Nothing tells which of
 those that survive change nothing at all: the rate is the least that the tests find.
 
 examples (in the root of a checkout; make mutate MUTATE='...'):
@@ -117,8 +117,14 @@ class PythonTests:
             path.write_text(text, encoding="utf-8")
 
     def _nearest(self, file: Path) -> tuple[Path, ...]:
-        found = python_choice([file], self._root, most=100).run
-        return tuple(t for t in found if t.parts[:2] == ("tests", "py"))[:FILES_AT_MOST]
+        """Named after it, then those that import it, then those of its folder."""
+        near, imports = python_choice([file], self._root, most=100).run, mentions(file)
+
+        def distance(test: Path) -> tuple[bool, bool]:
+            text = (self._root / test).read_text(encoding="utf-8")
+            return (near_by_name(file, test) or 9) > 2, not imports.search(text)
+
+        return tuple(sorted((t for t in near if t.parts[:2] == ("tests", "py")), key=distance)[:FILES_AT_MOST])
 
     def _passes(self, tests: Sequence[Path]) -> bool:
         path = os.pathsep.join(str(self._root / p) for p in ("scripts", "tools", "."))

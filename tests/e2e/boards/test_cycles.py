@@ -155,7 +155,7 @@ def test_what_is_written_is_read_back(rig: Rig) -> None:
     pmka.write_register("bus", beat, 180)
     assert pmka.register("bus", beat) == 180
     psd1: Psd1 = unit_of(rig, "psd1_host")
-    for word in (0x0000, 0xA55A):
+    for word in (0x0000, 0xA55A, 0x5AA5):  # nothing is left of the word before
         psd1.bus_write(UC_LOW, word)
         assert psd1.bus_read(UC_LOW) == word
 
