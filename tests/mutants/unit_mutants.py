@@ -35,7 +35,8 @@ FILES_AT_MOST, TESTS_S = 5, 150.0  # of Python tests nearest to a file, and the 
 
 EPILOG = """\
 A mutant is killed when the tests nearest to its file fail, or do not end. C (emu/...): the C tests of its folder.
-Python (scripts/psabench/...): five files of tests/py: named after it, then importing it, then of its folder. Nothing tells which of
+Python (scripts/psabench/...): five files of tests/py: named after it, then importing it, then of its folder. Nothing
+tells which of
 those that survive change nothing at all: the rate is the least that the tests find.
 
 examples (in the root of a checkout; make mutate MUTATE='...'):
