@@ -158,6 +158,9 @@ def test_what_is_written_is_read_back(rig: Rig) -> None:
     for word in (0x0000, 0xA55A, 0x5AA5):  # nothing is left of the word before
         psd1.bus_write(UC_LOW, word)
         assert psd1.bus_read(UC_LOW) == word
+    for flags in (INT0, FL1, 0):  # both would begin a cycle
+        psd1.bus_write(FLAGS, flags)
+        assert psd1.bus_read(FLAGS) == flags
 
 
 # ---- refusals
