@@ -207,16 +207,13 @@ def verdict(sections: Sequence[Section]) -> str:
     elif not compared:
         text = "No truth given: the numbers stand alone."
     else:
-        head = "All" if out == 0 else f"{out} of"
-        within = "within" if out == 0 else "not within"
-        beyond = sum(abs(g.en or 0.0) > 1.0 for g in compared)
+        head, within = ("All", "within") if out == 0 else (f"{out} of", "not within")
+        beyond, by_chance = sum(abs(g.en or 0.0) > 1.0 for g in compared), (1.0 - COVERAGE) * len(compared)
         text = (
-            f"{head} {len(compared)} numbers compared with the sensor's true parameters are {within} {LIMIT_CI:g} U; "
-            f"{beyond} are beyond U (expected: {(1.0 - COVERAGE) * len(compared):.1f})."
+            f"{head} {len(compared)} numbers are {within} {LIMIT_CI:g} U of the sensor's true parameters, "
+            f"{beyond} are beyond U (expected: {by_chance:.1f})."
         )
-    return text + (
-        f" {flagged} numbers are flagged and not compared: the data do not determine them." if flagged else ""
-    )
+    return text + (f" {flagged} flagged numbers are not compared." if flagged else "")
 
 
 def _mark(g: Graded) -> str:
