@@ -23,7 +23,6 @@ from tests.coverage.table import Run, chance_band, pooled_share, rows_of
 
 ARTICLE = {"u0_v": 2.5, "alpha0_deg": 0.1121, "kx_v_per_g": 1.0, "ky_v_per_g": 0.0098, "kz_v_per_g": 0.004}
 ARTICLE |= {"kxy_v_per_g2": 0.001}
-SHORT = {"fourier": FourierParams, "reversal": ReversalParams}
 ARCSEC = 1.0 / 3600.0
 
 
@@ -31,8 +30,9 @@ def short_params(name: str) -> TurnsParams | FourierParams | ReversalParams:
     """A run of seconds in memory; the reversal without its side faces."""
     if name == "turns":
         return TurnsParams(readings=2)
-    more = {"side": False} if name == "reversal" else {}
-    return SHORT[name](realisations=1, positions=24, step_deg=15.0, **more)
+    if name == "fourier":
+        return FourierParams(realisations=1, positions=24, step_deg=15.0)
+    return ReversalParams(realisations=1, positions=24, step_deg=15.0, side=False)
 
 
 def measured(name: str, bench: FakeBench, accuracy: BenchAccuracy, step_v: float = 0.0) -> ProcedureResult:
