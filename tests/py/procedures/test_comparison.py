@@ -90,7 +90,7 @@ def test_scale_and_zero_come_out_as_they_went_in() -> None:
         ("pik6", 1.0013, 0.0),
         ("pik6", 1.0, 4e-4),
         ("pik", 0.996, 0.0),
-        ("psa2", 1.00025, 0.0),
+        ("psa2", 1.0006, 0.0),
         ("psa2", 1.0, 6e-4),
         ("pmka", 1.000005, 0.0),
         ("pmka", 1.0, 1e-6),

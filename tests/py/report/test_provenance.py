@@ -20,6 +20,7 @@ from psabench.report.diff import Quantity, compare_results, diff_dict, diff_line
 from psabench.report.page import page_without_foot, whole_page, write_report
 
 ESTIMATE = {"name": "kx_v_per_g", "unit": "V/g", "value": 1.0, "sd": 0.01, "ci95": [0.97, 1.03]}
+SEED_OF_FACTS = "/".join(("facts", "seed"))  # where a difference of the seed is
 RESULT: Mapping[str, Any] = {
     "format": 1,
     "facts": {"seed": "1"},
@@ -156,7 +157,7 @@ def test_a_difference_is_over_the_uncertainty_of_both() -> None:
     assert row.u == pytest.approx(0.05)
     assert row.en == pytest.approx(0.4)
     assert not d.same
-    assert [r.where for r in d.origin] == ["facts/seed"]
+    assert [r.where for r in d.origin] == [SEED_OF_FACTS]
     assert d.told == ()  # the ends of the interval belong to the estimate
     wide = {**ESTIMATE, "expanded_u": 0.06}
     assert compare_results({"r": [wide]}, {"r": [wide]}).quantities[0].u == pytest.approx(0.06 * 2**0.5)
@@ -169,7 +170,7 @@ def test_where_a_result_comes_from_does_not_count(tmp_path: Path) -> None:
         written(tmp_path / "b", {**RESULT, "facts": {"seed": "9"}})
     d = compare_results(read_result(tmp_path / "a"), read_result(tmp_path / "b" / "result.json"))
     assert d.same
-    assert {"provenance/command", "facts/seed"} <= {r.where for r in d.origin}
+    assert {"provenance/command", SEED_OF_FACTS} <= {r.where for r in d.origin}
 
 
 @pytest.mark.parametrize(
