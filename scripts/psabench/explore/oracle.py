@@ -53,8 +53,12 @@ LONG_S: Mapping[str, float] = {
 }
 # Services that want no readings: they hold on a board whose readings are wrong or have stopped.
 SERVICES = ("BUS-BOOT", "BUS-HB", "BUS-ID-02", "BUS-ID-03", "BUS-SDO-0", "BUS-OD-02", "BUS-OD-03")
-# What is said of values beside the tests that want known inputs.
-OF_VALUES = ("PSA2-ADC", "PSA2-CHIP-05", "PSA2-CHIP-06", "PSA2-CHIP-07")
+# Of values beside the tests that want known inputs: steps and noise of codes. Boards that integrate have nothing else.
+OF_VALUES = (
+    "PSA2-ADC PSA2-CHIP-05 PSA2-CHIP-06 PSA2-CHIP-07 PSA2-READ-10 PSA2-REG-08 PSA2-FORM-01 PSA2-SAMP-04 "
+    "PSD1-CHIP PSD1-WORD"
+).split()
+BESIDE_VALUES = ("BUS-", "PSA2-", "PSD1-")
 SEEN_ON_LINES = frozenset({"line", "pins", "port", "bus"})
 
 
@@ -106,8 +110,13 @@ def _holds_services(_: SuiteTest, ids: Sequence[str]) -> bool:
     return all(i.startswith(SERVICES) for i in ids)
 
 
+def _holds_beside_values(test: SuiteTest, ids: Sequence[str]) -> bool:
+    of_values = any(i.startswith(tuple(OF_VALUES)) for i in ids) or "inputs" in plan_of(test.test).needs
+    return not of_values and all(i.startswith(BESIDE_VALUES) for i in ids)
+
+
 HOLDS: Mapping[str, Callable[[SuiteTest, Sequence[str]], bool]] = {
-    VALUES: lambda t, ids: "inputs" not in plan_of(t.test).needs and not any(i.startswith(OF_VALUES) for i in ids),
+    VALUES: _holds_beside_values,
     LINES: lambda t, _: not plan_of(t.test).needs & SEEN_ON_LINES,
     READINGS: _holds_services,
     NOTHING: lambda *_: False,

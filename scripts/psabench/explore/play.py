@@ -1,6 +1,7 @@
 """A schedule carried out: an emulator in lockstep from power-on, the host in this process, and what was violated.
 
-Before a look that is not `under` a fault, all faults are lifted and the node is reset. The same schedule and the same
+Before a look all faults are lifted and the node is reset; before one that is `under` a fault, this is done before the
+fault. The same schedule and the same
 build give the same frames and the same violations.
 """
 
@@ -47,7 +48,8 @@ class Session:
     violations: list[Violation] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)  # since the last reset
     rules: set[str] = field(default_factory=set)  # of these
-    is_dirty: bool = False  # sent or broken something since the last reset
+    is_dirty: bool = False  # something was sent or broken since the last reset
+    is_touched: bool = False  # the host has sent something, or the power was off
     waiting: int = 0  # frames sent while time stood still
     judged: int = 0  # frames of the take that are judged
 
@@ -69,7 +71,7 @@ class Session:
 
 def _do_frame(at: Session, text: str) -> None:
     can_id, _, data = text.partition("#")
-    at.is_dirty = True
+    at.is_dirty = at.is_touched = True
     at.s.host.send(int(can_id, 16), bytes.fromhex(data))
     at.waiting += 1
     if at.waiting >= AHEAD:
@@ -82,12 +84,14 @@ def _do_wait(at: Session, s: float) -> None:
 
 
 def _do_power(at: Session, off_s: float) -> None:
-    at.is_dirty = True
+    at.is_dirty = at.is_touched = True
     at.s.power_cycle(off_s)
 
 
-def _do_fault(at: Session, kind: str, point: str, values: Mapping[str, Any], for_s: float) -> None:
-    """One that the emulator rejects at this point changes nothing."""
+def _do_fault(at: Session, kind: str, point: str, values: Mapping[str, Any], for_s: float, fresh: bool) -> None:
+    """One that the emulator rejects at this point changes nothing. fresh: on a board at its defaults."""
+    if fresh:
+        recover_board(at)
     try:
         at.faults.append(at.s.bench.fault(kind, point, **values, **({} if RULES[kind].is_once else {"for_s": for_s})))
     except ControlError:
@@ -98,7 +102,7 @@ def _do_fault(at: Session, kind: str, point: str, values: Mapping[str, Any], for
 
 def _do_look(at: Session, name: str, under: bool) -> None:
     at.waiting = 0
-    if not under or NOTHING in at.rules:
+    if not under or not at.rules or NOTHING in at.rules or at.is_touched:
         recover_board(at)
     found = look_at_board(at.s, name, sorted(at.rules))
     at.judged = len(at.take.frames)
@@ -127,7 +131,7 @@ def recover_board(at: Session) -> None:
         at.s.reset()
         at.pass_time(RESET_S)
     at.rules.clear()
-    at.is_dirty = False
+    at.is_dirty = at.is_touched = False
     at.s.wait_ready()
     at.judged = len(at.take.frames)
 

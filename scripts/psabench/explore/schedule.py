@@ -5,7 +5,7 @@ An action is one of ACTIONS with its arguments, of JSON's types:
     frame   text: a frame as can-utils write it, "605#4000100000000000"
     wait    s: simulated time that passes
     power   off_s: the supply is off so long
-    fault   kind, point, values, for_s: from now on, so long
+    fault   kind, point, values, for_s: from now on, so long; fresh: after a reset
     look    name: a dialogue of the suite or a stimulus with its checks; under: while faults are on, else after a reset
 
 Every part of a schedule is a schedule: before a look the player brings the board back to its defaults by itself.
@@ -94,10 +94,10 @@ def draw_schedule(c: Catalogue, seed: int, number: int, length_s: float) -> Sche
         actions += _drawn_storm(c, rng)
     if rng.random() < FAULT_SHARE:
         at = rng.randint(0, len(actions))
-        actions[at:at] = [_drawn_fault(c, rng, rng.choice(LASTS_S)) for _ in range(rng.randint(1, 2))]
+        actions[at:at] = [_drawn_fault(c, rng, rng.choice(LASTS_S), fresh=False) for _ in range(rng.randint(1, 2))]
     looks = [_look_at(rng.choice(c.looks), under=False) for _ in range(rng.randint(1, LOOKS))]
     if rng.random() < UNDER_SHARE:
-        looks[:1] = [_drawn_fault(c, rng, UNDER_S), _look_at(str(looks[0].args["name"]), under=True)]
+        looks[:1] = [_drawn_fault(c, rng, UNDER_S, fresh=True), _look_at(str(looks[0].args["name"]), under=True)]
     return Schedule(
         board=c.board,
         profile=c.profile,
@@ -123,7 +123,8 @@ def _drawn_storm(c: Catalogue, rng: Random) -> list[Action]:
     return found
 
 
-def _drawn_fault(c: Catalogue, rng: Random, for_s: float) -> Action:
+def _drawn_fault(c: Catalogue, rng: Random, for_s: float, *, fresh: bool) -> Action:
     kind = rng.choice([k for k in RULES if c.points.get(k)])
     point = rng.choice(c.points[kind])
-    return Action("fault", {"kind": kind, "point": point, "values": drawn_values(rng, kind), "for_s": for_s})
+    values = drawn_values(rng, kind)
+    return Action("fault", {"kind": kind, "point": point, "values": values, "for_s": for_s, "fresh": fresh})

@@ -174,6 +174,7 @@ def test_what_always_holds_is_a_requirement() -> None:
     ("rule", "holds", "may_fail"),
     [
         (VALUES, "xy_and_zt_alternate", "codes_are_volts"),
+        (VALUES, "no_such_object", "three_axes_move_together"),
         (LINES, "xy_and_zt_alternate", "a_transfer_has_four_words"),
         (READINGS, "no_such_object", "xy_and_zt_alternate"),
         (NOTHING, "", "no_such_object"),

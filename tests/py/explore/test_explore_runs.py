@@ -108,12 +108,24 @@ def test_without_the_wrong_the_same_schedule_passes(
     assert play_schedule(schedule).violations == ()
 
 
+@pytest.mark.parametrize("has_fault", [False, True])
+def test_a_look_under_a_fault_begins_at_the_defaults(has_fault: bool) -> None:
+    """An inhibit time that a storm has left is no violation of the board."""
+    inhibit = Action("frame", {"text": "608#2B011803A2140000"})
+    values = {"kind": "sensor.bias", "point": "a.sensor.x", "values": {"bias_v": 0.1}, "for_s": 10.0, "fresh": True}
+    look = Action("look", {"name": "the_inhibit_time_keeps_tpdos_apart", "under": True})
+    actions = (inhibit, *([Action("fault", values)] if has_fault else []), look)
+    schedule = Schedule(board="pik", profile="pik", seed=1, number=0, length_s=1.5, actions=actions)
+    assert play_schedule(schedule).violations == ()
+
+
 # ---- the folder of a finding
 
 
 def storm(*frames: str, looks: tuple[str, ...] = ("device_type",)) -> Schedule:
     """Frames, a fault, a wait, looks."""
     fault = {"kind": "sensor.bias", "point": "a.sensor.x", "values": {"bias_v": 0.1}, "for_s": 0.005}
+    fault["fresh"] = False
     actions = [Action("frame", {"text": f}) for f in frames]
     actions += [Action("fault", fault), Action("wait", {"s": 0.01})]
     actions += [Action("look", {"name": name, "under": False}) for name in looks]
