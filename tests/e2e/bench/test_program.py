@@ -87,7 +87,7 @@ def test_the_command_runs_on_a_bench_by_its_addresses(tmp_path: Path) -> None:
     assert run.returncode == 0, out + err
     section = json.loads((tmp_path / "result.json").read_text())["sections"][0]
     assert section["procedure"] == "turns"
-    assert "within their limits of the truth" in out
+    assert "numbers are within 2 U of the sensor's true parameters" in out
 
 
 @HOST

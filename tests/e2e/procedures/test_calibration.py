@@ -64,7 +64,7 @@ def report(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
         (done, out), series = request.getfixturevalue("main_job"), 6
     assert done.returncode == 0, done.stdout[-3000:]
     page = (out / "report.html").read_text()
-    assert "compared with the sensor&#x27;s true parameters are within 2 U" in page
+    assert "numbers are within 2 U of the sensor&#x27;s true parameters" in page
     assert len(list(out.glob("*.csv"))) == series
     for label in ("quiet", "realistic"):
         assert json.loads((out / f"scenario-{label}.json").read_text())["units"]

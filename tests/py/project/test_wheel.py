@@ -80,7 +80,7 @@ def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> 
 def test_the_command_runs_a_procedure_on_its_own_emulator(programs: Path, tmp_path: Path) -> None:
     assert "psabench run all" in run([programs / "psabench", "--help"], tmp_path)
     said = run([programs / "psabench", "run", "turns", "--condition", "quiet"], tmp_path)
-    assert "lie within their limits of the truth" in said
+    assert "numbers are within 2 U of the sensor's true parameters" in said
     assert (tmp_path / "build/run/report.html").is_file()
 
 
