@@ -137,9 +137,7 @@ def test_a_measured_number_off_its_interval_is_out_of_limits_and_a_flagged_one_i
     assert not within_limits(quiet)
     assert "OUT OF LIMITS" in console_table(quiet[0])
     assert "are not within 2 U" in report.html_page(quiet, {})
-    words = (
-        "2 of 10 numbers are not within 2 U of the sensor's true parameters, 2 are beyond U (expected: 0.5)."
-    )
+    words = "2 of 10 numbers are not within 2 U of the sensor's true parameters, 2 are beyond U (expected: 0.5)."
     assert verdict(quiet).startswith(words)  # u0 and c0
     twisted = sections({**TRUTH, "alpha0_deg": 0.1121, "kxy_v_per_g2": 0.001})[2:3]  # turns: ky misses by 2 mV, flagged
     assert within_limits(twisted)
