@@ -289,6 +289,7 @@ static void init_accel(struct psa2 *b)
 static void init_temp(struct psa2 *b)
 {
     const struct ads1256_cfg cfg = {.clkin_hz = b->profile.temp_clkin_hz,
+                                    .sync_halts = true, /* an idle DRD_T tells KPSA of a converter that waits (E0) */
                                     .vref_v = b->profile.temp_vref_v,
                                     .noise_scale = b->base.cfg.temp_noise_scale,
                                     .offset_v = b->base.cfg.temp_adc_offset_v,

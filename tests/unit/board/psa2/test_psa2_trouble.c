@@ -95,13 +95,13 @@ static void a_silent_temperature_converter_too(void **state)
     assert_int_equal(rig.fault[1], PSA2_FAULT_TEMP_PORT);
 }
 
-/* A set-up that puts the temperature converter to sleep (STANDBY) waits for DRD_T in vain: 100 ms and four
+/* A set-up that puts the temperature converter to sleep (SYNC without WAKEUP) waits for DRD_T in vain: 100 ms and four
  * times t18 (4 * 0.213 ms at 30 kSPS) later that is a fault, told once; Res tries again. */
 static void a_set_up_that_waits_in_vain_is_a_fault(void **state)
 {
     (void)state;
     struct psa2_profile p = psa2_profile_file("article");
-    p.setup[1] = (struct psa2_setup_step){.on = PSA2_ON_DRD_T, .action = PSA2_WRITE_T, .bytes = {0xFD}, .count = 1};
+    p.setup[1] = (struct psa2_setup_step){.on = PSA2_ON_DRD_T, .action = PSA2_WRITE_T, .bytes = {0xFC}, .count = 1};
     rig_init(&rig, &p, 1.0);
     psa2_power_up(&rig.b, 0);
     rig_run(&rig, 164000000); /* the opcode is sent at 63.2 ms */
