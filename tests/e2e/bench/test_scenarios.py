@@ -125,6 +125,21 @@ def test_quiet_gives_every_printed_digit() -> None:
     assert (down[0] - up[0]) / 2 == pytest.approx(np.cos(np.radians(0.1121)), rel=GAIN)
 
 
+def test_realistic_is_another_unit_for_each_seed() -> None:
+    """The dump has what all have in common; the truth port has what was drawn: same seed, same unit."""
+    drawn = []
+    for seed in (1, 1, 2):
+        with Bench.start("realistic", seed=seed) as b:
+            x = next(iter(b.truth()["units"].values()))["axes"]["x"]
+            b.unit.wait_ready()
+            b.head.turn(0.0)
+            mean_v = float(b.unit.stream(400).axis("x").mean())
+            drawn.append((x["kxx_v_per_g2"], x["drift_v_per_s"], mean_v))
+    assert drawn[0] == drawn[1]
+    assert drawn[0] != drawn[2]
+    assert all(kxx == 2e-4 and drift == 5e-9 for kxx, drift, _ in drawn)
+
+
 @pytest.mark.parametrize(("name", "hz", "low", "high"), [("stream", 1000, 0.0, 1.0), ("fast", 4000, 0.44, 0.54)])
 def test_stream_and_fast_send_their_rate_by_themselves(name: str, hz: int, low: float, high: float) -> None:
     with Bench.start(name) as b:
