@@ -61,6 +61,8 @@ def run_missing(todo: Sequence[tuple[str, int]], args: argparse.Namespace) -> No
     """Runs and stores, a line for each. Ctrl-C ends it; what is stored stays."""
     ends_s = time.monotonic() + 60.0 * args.minutes
     args.out.parent.mkdir(parents=True, exist_ok=True)
+    if args.out.exists() and not args.out.read_text(encoding="utf-8").endswith("\n"):
+        args.out.write_text(args.out.read_text(encoding="utf-8") + "\n", encoding="utf-8")  # a line that was cut
     with ProcessPoolExecutor(args.jobs) as pool, args.out.open("a", encoding="utf-8") as out:
         waiting = iter(todo)
         futures = {pool.submit(run_study, *key): key for key in islice(waiting, args.jobs)}

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.budget.accuracy import BenchAccuracy
+from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.budget.gum import expand_estimate
 from psabench.estimate.face import Face
 from psabench.estimate.uncertainty import Component
@@ -103,7 +103,7 @@ def expand_result(
     """The result with a budget behind each estimate. `step_v`: resolution of one reading at the load."""
 
     def estimate_again(disturb: Disturb) -> Array:
-        again = procedure.estimate([disturb(r) for r in result.readings], params, result.g_mps2)
+        again = procedure.fit([disturb(r) for r in result.readings], params, result.g_mps2)
         return np.array([e.value for e in again.estimates])
 
     values = np.array([e.value for e in result.estimates])
@@ -118,7 +118,7 @@ def expand_result(
 def _influences_of(result: ProcedureResult, accuracy: BenchAccuracy, step_v: float) -> Iterator[Influence]:
     if step_v > NEGLIGIBLE * result.residual_rms_v:
         yield resolution_influence(result.readings, step_v)
-    if accuracy != BenchAccuracy(**dict.fromkeys(BenchAccuracy.__dataclass_fields__, 0.0)):
+    if accuracy != BenchAccuracy(**EXACT):
         yield from bench_influences(accuracy, sorted({r.face for r in result.readings}, key=lambda f: f.value))
 
 

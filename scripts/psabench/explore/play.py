@@ -1,8 +1,7 @@
 """A schedule carried out: an emulator in lockstep from power-on, the host in this process, and what was violated.
 
 Before a look all faults are lifted and the node is reset; before one that is `under` a fault, this is done before the
-fault. The same schedule and the same
-build give the same frames and the same violations.
+fault. The same schedule and the same build give the same frames and the same violations.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Schedules one after the other, in parts that workers take. What is done is in a file; the same search goes on there.
 
-The schedules depend on board, profile, seed and number; not on who plays them, how many at once, or how often the
-search was interrupted.
+The schedules depend on board, profile, seed and number, not on the number of processes nor on interruptions.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ from psabench.explore.finding import Finding, keep_finding
 from psabench.explore.oracle import Violation
 from psabench.explore.play import catalogue_of, play_schedule
 from psabench.explore.schedule import Schedule, draw_schedule
+from psabench.link.own import replace_file
 from psabench.places import find_emulator
 
 PART = 5  # schedules of a task: long beside what a task costs, short for a person who waits
@@ -102,22 +102,23 @@ class Log:
         if rows and rows[0] != mine:
             raise BadInput(expected("results of the same search and build (or another --out)", rows[0], self.path))
         for row in rows[1:]:
-            self.done.add(row["first"])
+            self.done |= set(range(row["first"], row["first"] + row["count"]))
             self.tally.add(row)
         if not rows:
             self._write_row(mine)
 
     def _read_rows(self) -> list[dict[str, Any]]:
-        """Whole lines; one that an end of the machine has cut is played again."""
+        """Whole lines; one that an end of the machine has cut is taken away, and played again."""
         if not self.path.exists():
             return []
-        found = []
-        for line in self.path.read_text(encoding="utf-8").splitlines():
-            try:
-                found.append(json.loads(line))
-            except ValueError:
-                break
-        return found
+        text = self.path.read_text(encoding="utf-8")
+        whole = text[: text.rfind("\n") + 1]
+        if whole != text:
+            replace_file(self.path, whole)
+        try:
+            return [json.loads(line) for line in whole.splitlines()]
+        except ValueError as e:
+            raise BadInput(expected("lines of JSON (--fresh begins again)", e, self.path)) from e
 
     def add(self, part: Part) -> None:
         """A part that is done."""
@@ -132,12 +133,16 @@ class Log:
 
 
 def missing_tasks(search: Search, count: int | None, done: Iterable[int], go_on: Callable[[], bool]) -> Iterator[Task]:
-    """Parts that are not done, up to a number of schedules (None: without end), while `go_on`."""
+    """Parts that are not done, up to a number of schedules (None: without end), while `go_on`.
+
+    done: numbers of schedules. A part of which a shorter search did the first ones has the others left.
+    """
     known, first = set(done), 0
     while (count is None or first < count) and go_on():
-        size = PART if count is None else min(PART, count - first)
-        if first not in known:
-            yield Task(search=search, first=first, count=size)
+        end = first + PART if count is None else min(first + PART, count)
+        left = [number for number in range(first, end) if number not in known]
+        if left:
+            yield Task(search=search, first=left[0], count=len(left))
         first += PART
 
 

@@ -19,7 +19,7 @@ from psabench.boards.pik import estimate as pik
 from psabench.boards.pik.device import Pik
 from psabench.boards.pmka import estimate as pmka
 from psabench.boards.pmka.device import Pmka
-from psabench.boards.psa2.device import Psa2
+from psabench.boards.psa2.device import CODE_V, Psa2
 from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY, Psd1, volts
 from psabench.boards.readings import Readings
 from psabench.boards.unit import Unit
@@ -32,7 +32,6 @@ SCENARIO = "converters"
 
 AMPERE_PER_G = 1.28e-3  # of the accelerometers, from their passport
 SETTLE_S = 4.0  # from power-on until every board of the scenario is set up
-PSA2_LSB_V = 10.0 / 2**23
 PLATE = PikObjects.PLATE  # of a PIK: type, K in 0.001 Hz/V
 
 
@@ -156,7 +155,7 @@ def _psa2(unit: Psa2, name: str) -> Track:
     frames, gain = unit.frames.take(), unit.filter_gain
     t_s = frames.t_rx_s[0] + np.arange(len(frames)) / unit.data_hz
     note = f"24-bit codes at the load, a mean of the filter each, less the filter's gain of {gain:.7g}"
-    return _means(name, PSA2_LSB_V / gain, t_s, frames.u_v / gain, note)
+    return _means(name, CODE_V / gain, t_s, frames.u_v / gain, note)
 
 
 def _pmka(unit: Pmka, r: Readings, name: str) -> Track:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,11 @@ def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> P
 
 def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: float) -> ProcedureResult:
     """The estimates of `fourier` from its readings. Pure; raises ValueError when they do not suffice."""
+    return replace(fit_fourier(readings, p, g_mps2), doubts=wander_doubts(readings, drift=p.drift))
+
+
+def fit_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: float) -> ProcedureResult:
+    """The same without a look for a zero that wanders, which takes longer than all else."""
     face = fit_face(readings, Face.DIRECT, p.drift)
     c = face.fit.c_v
     values = np.concatenate([model.one_face(c), model.measured(c)[:4], c])
@@ -82,7 +87,6 @@ def estimate_fourier(readings: Sequence[Reading], p: FourierParams, g_mps2: floa
         residual_rms_v=residual_rms_v([face]),
         drift=face.drift if p.drift else None,
         notes=tuple(_notes(face)),
-        doubts=wander_doubts(readings, drift=p.drift),
     )
 
 

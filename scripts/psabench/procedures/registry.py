@@ -13,10 +13,17 @@ from typing import Any
 
 from psabench.estimate.model import Sensor
 from psabench.estimate.uncertainty import Estimate
-from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, flag_fourier, fourier
+from psabench.procedures.fourier import (
+    FourierParams,
+    estimate_fourier,
+    expected_fourier,
+    fit_fourier,
+    flag_fourier,
+    fourier,
+)
 from psabench.procedures.result import ProcedureResult
-from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
-from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
+from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, fit_reversal, reversal
+from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, fit_turns, turns
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +34,9 @@ class Procedure:
     params: type[Any]
     run: Callable[..., ProcedureResult]  # (bench, params, watch) -> result
     estimate: Callable[..., ProcedureResult]  # (readings, params, g_mps2) -> result
-    expected: Callable[
-        [Sensor, Sensor], Mapping[str, float]
-    ]  # truth, and at the side faces -> what each should have been
+    fit: Callable[..., ProcedureResult]  # the same without its doubts: for the budget, which fits again and again
+    # truth, and at the side faces -> what each estimate should have been
+    expected: Callable[[Sensor, Sensor], Mapping[str, float]]
     flag: Callable[[Sequence[Estimate], Any], list[Estimate]]  # which estimates the data do not determine
 
 
@@ -41,8 +48,10 @@ def _keep_flags(estimates: Sequence[Estimate], _: Any) -> list[Estimate]:
 PROCEDURES: Mapping[str, Procedure] = {
     p.name: p
     for p in (
-        Procedure("turns", TurnsParams, turns, estimate_turns, expected_turns, _keep_flags),
-        Procedure("fourier", FourierParams, fourier, estimate_fourier, expected_fourier, flag_fourier),
-        Procedure("reversal", ReversalParams, reversal, estimate_reversal, expected_reversal, _keep_flags),
+        Procedure("turns", TurnsParams, turns, estimate_turns, fit_turns, expected_turns, _keep_flags),
+        Procedure("fourier", FourierParams, fourier, estimate_fourier, fit_fourier, expected_fourier, flag_fourier),
+        Procedure(
+            "reversal", ReversalParams, reversal, estimate_reversal, fit_reversal, expected_reversal, _keep_flags
+        ),
     )
 }

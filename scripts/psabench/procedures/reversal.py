@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,6 +80,11 @@ def estimate_reversal(readings: Sequence[Reading], p: ReversalParams, g_mps2: fl
     A side pair that is missing (interrupted run) is left out with a note; raises ValueError when DIRECT and
     REVERSED do not suffice.
     """
+    return replace(fit_reversal(readings, p, g_mps2), doubts=wander_doubts(readings, drift=p.drift))
+
+
+def fit_reversal(readings: Sequence[Reading], p: ReversalParams, g_mps2: float) -> ReversalResult:
+    """The same without a look for a zero that wanders, which takes longer than all else."""
     upright = [fit_face(readings, face, p.drift) for face in _UPRIGHT]
     side, notes = _side_faces(readings, p)
     faces = [*upright, *side]
@@ -100,7 +105,6 @@ def estimate_reversal(readings: Sequence[Reading], p: ReversalParams, g_mps2: fl
         residual_rms_v=residual_rms_v(faces),
         drift=upright[0].drift if p.drift else None,
         notes=(*notes, *fit_notes(faces)),
-        doubts=wander_doubts(readings, drift=p.drift),
     )
 
 

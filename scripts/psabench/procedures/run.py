@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
+from psabench.boards.psa2.device import CODE_V, WORD_V
 from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.budget.influences import expand_result
@@ -31,8 +32,6 @@ from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration as report
 from psabench.report.grading import Section
 from psabench.report.nominal import Nominal, nominal_dict, nominal_of_dict, nominal_of_scenario, read_passport
-
-CODE_V, WORD_V = 10.0 / 2**23, 10.0 / 2**30  # resolution at the load: of a code of the stream, of a whole word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,6 +103,11 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
     Pairs that are missing (interrupted run) are left out with a note; raises ValueError when Ox has fewer
     than two complete realisations.
     """
+    return replace(fit_turns(readings, p, g_mps2), doubts=wander_doubts(readings, drift=False))
+
+
+def fit_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -> ProcedureResult:
+    """The same without a look for a zero that wanders, which takes longer than all else."""
     halves: dict[str, _Halves] = {}
     notes: list[str] = []
     for pair in PAIRS:
@@ -130,7 +135,6 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
         residual_rms_v=float(np.sqrt(np.mean(np.concatenate([s.residual_v for s in series]) ** 2))),
         drift=None,
         notes=tuple(notes),
-        doubts=wander_doubts(readings, drift=False),
     )
 
 

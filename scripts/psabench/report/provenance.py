@@ -1,6 +1,6 @@
 """Where a result comes from: who computed it, when, from what; the key `provenance` of result.json, the foot of a page.
 
-`cli.main` opens a run with `command_run`; whoever starts an emulator, reads a recording or loads a library notes it
+`cli.main` opens a run with `command_run`. Code that starts an emulator, reads a recording or loads a library notes it
 there. Outside of a run notes are dropped. Nothing else of a report depends on what is noted: the same seed gives the
 same bytes but for this block.
 """

@@ -280,12 +280,12 @@ def kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
 
 
 def test_a_search_goes_on_where_it_was_ended(kept: list[int], tmp_path: Path) -> None:
-    counts = (10, 15, 23)
+    counts = (10, 15, 23, 40)  # 23 leaves a part of which three are done
     runs = [search.run_search(SEARCH, tmp_path, ThisProcess(), count=n) for n in counts]
     assert tuple(r.schedules for r in runs) == counts
-    assert [r.times for r in runs] == [{}, {"k": 1, "m": 1}, {"k": 2, "m": 1}]
+    assert [r.times for r in runs[:3]] == [{}, {"k": 1, "m": 1}, {"k": 2, "m": 1}]
     assert kept == [12], "what comes together, or was kept before, is kept once"
-    assert [t.first for t in missing_tasks(SEARCH, 23, Log(tmp_path, SEARCH).done, lambda: True)] == []
+    assert [t.first for t in missing_tasks(SEARCH, 40, Log(tmp_path, SEARCH).done, lambda: True)] == []
 
 
 def test_a_line_that_was_cut_is_played_again(kept: list[int], tmp_path: Path) -> None:
@@ -293,6 +293,9 @@ def test_a_line_that_was_cut_is_played_again(kept: list[int], tmp_path: Path) ->
     path = tmp_path / search.DONE
     path.write_text(path.read_text(encoding="utf-8")[:-5], encoding="utf-8")
     assert [t.first for t in missing_tasks(SEARCH, 10, Log(tmp_path, SEARCH).done, lambda: True)] == [PART]
+    for _ in range(2):  # what is written after the cut is read again
+        assert search.run_search(SEARCH, tmp_path, ThisProcess(), count=20).schedules == 20
+    assert len(path.read_text(encoding="utf-8").splitlines()) == 1 + 20 // PART
 
 
 def test_a_search_ends_after_its_findings_and_its_time(kept: list[int], tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ DATA_HZ = {0: 250, 1: 500, 2: 1000, 3: 2000, 4: 4000}
 # over 2^27 (converter data sheet, coefficient table; docs/chips/ads1282.md). Without the FIR (FILTR 1) it is 1.
 FIR_GAIN = {0: 134201050 * 134238266 / 2**54, 1: 134259543 * 134198608 / 2**54}
 SINC_ONLY = 1
+CODE_V, WORD_V = 10.0 / 2**23, 10.0 / 2**30  # resolution at the load: of a code of the stream, of a whole word
 SETTLE_PERIODS = 64  # 62.98 data periods and 468 clocks from a step to a settled word, rounded up
 
 
