@@ -162,9 +162,9 @@ RULES = {
     "one-word-functions-python": Rule(one_word_functions, 922, 922),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_201, 58_201),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 47_884, 47_884),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_731, 1_731),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_200, 58_200),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 47_908, 47_908),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_732, 1_732),
 }
 
 

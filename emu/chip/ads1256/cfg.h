@@ -63,8 +63,8 @@ struct ads1256_cfg {
     bool every_word; /* a look a sinc5 word (256 tau) at any rate: what folds on silicon folds, at 30 times the work */
     bool strict_timing; /* a data read inside t6 of its command gives FFh, as silicon would garble it */
     bool strict_bus;    /* other breaches do what silicon may do, not only count: docs/chips/ads1256.md */
-    bool sync_halts; /* SYNC halts the conversion, DRDY is high until WAKEUP; otherwise WAKEUP alone restarts */
-    bool strict_cs; /* CS high ends RDATAC; otherwise the mode outlives it (no source says which) */
+    bool sync_halts;    /* SYNC halts the conversion, DRDY is high until WAKEUP; otherwise WAKEUP alone restarts */
+    bool strict_cs;     /* CS high ends RDATAC; otherwise the mode outlives it (no source says which) */
 };
 
 /* Everything the chip can reach. NULL is allowed where it is said. */

@@ -45,16 +45,21 @@ static void unread_words_give_a_pulse_of_16_tau(void **state)
     assert_int_equal(r.a.n.overruns, overruns + 2);
 }
 
-/* Whether SYNC halts the conversion or WAKEUP alone does. */
+/* At 100 SPS; SYNC halts the conversion, or WAKEUP alone restarts it. */
+static void rig_of_sync(struct rig *r, bool halts)
+{
+    struct ads1256_cfg cfg = quiet;
+    cfg.sync_halts = halts;
+    rig_up(r, &cfg);
+    set_rate(r, 0x82);
+}
+
 static void sync_command_restarts_at_the_first_edge_of_wakeup(void **state)
 {
     (void)state;
     for (int halts = 0; halts < 2; halts++) {
-        struct ads1256_cfg cfg = quiet;
-        cfg.sync_halts = halts;
         struct rig r;
-        rig_up(&r, &cfg);
-        set_rate(&r, 0x82);
+        rig_of_sync(&r, halts);
         const unsigned edges = r.edges;
         command(&r, 0xFC);
         assert_int_equal(ads1256_drdy(&r.a), halts);
@@ -75,11 +80,8 @@ static void drdy_between_sync_and_wakeup_goes_on_unless_sync_halts(void **state)
 {
     (void)state;
     for (int halts = 0; halts < 2; halts++) {
-        struct ads1256_cfg cfg = quiet;
-        cfg.sync_halts = halts;
         struct rig r;
-        rig_up(&r, &cfg);
-        set_rate(&r, 0x82);
+        rig_of_sync(&r, halts);
         (void)rdata(&r); /* DRDY is high again */
         command(&r, 0xFC);
         for (int ms = 0; ms < 15 && ads1256_drdy(&r.a); ms++) wait_ns(&r, 1000000);
