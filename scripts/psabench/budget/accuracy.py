@@ -16,7 +16,7 @@ class BenchAccuracy:
     chain_zero_uv: float = option(100.0, "uV", "zero of the measuring chain at 25 °C, at the load")
     chain_gain_tc_ppm_per_k: float = option(5.0, "ppm/K", "temperature coefficient of that gain")
     chain_zero_tc_uv_per_k: float = option(10.0, "uV/K", "temperature coefficient of that zero")
-    chain_off_k: float = option(2.0, "K", "converter board beside 25 °C")
+    chain_off_k: float = option(2.0, "K", "distance of the converter board from 25 °C")
     circle_arcsec: float = option(3.0, "arcsec", "error of the head's divided circle, amplitude, one period a turn")
     mount_arcsec: float = option(3.0, "arcsec", "tilt about the head's axis, at each mounting")
 

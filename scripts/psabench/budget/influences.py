@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 Disturb = Callable[[Reading], Reading]
 
 PATTERNS = 16  # of signs, one sign a position: their mean square is the sum over as many positions, of more about so
+ROUNDING = 1e-6  # a component below this part of the scatter is a rounding of the differences
 NEGLIGIBLE = 0.01  # a step below this part of the scatter is in the scatter
 
 
@@ -109,7 +110,7 @@ def expand_result(
     values = np.array([e.value for e in result.estimates])
     rows = [(i.name, _component_u(i, estimate_again, values)) for i in _influences_of(result, accuracy, step_v)]
     estimates = [
-        expand_estimate(e, [Component(name=name, u=float(u[k])) for name, u in rows if u[k] > 0.0])
+        expand_estimate(e, [Component(name=name, u=float(u[k])) for name, u in rows if u[k] > ROUNDING * e.sd])
         for k, e in enumerate(result.estimates)
     ]
     return replace(result, estimates=tuple(procedure.flag(estimates, params)))

@@ -81,7 +81,7 @@ def _alpha0(sections: Sequence[Section], nominal: Nominal | None) -> str:
     if picture is None:
         return ""
     caption = "Green: identifiable. Orange: flagged. Dashed: the truth, or the nominal value where there is none."
-    return section("The mounting error α₀, 95 % intervals", figure(report_plots.svg(picture, "alpha0"), caption))
+    return section("The mounting error α₀, each value with its U", figure(report_plots.svg(picture, "alpha0"), caption))
 
 
 def _section(s: Section, ident: str) -> str:

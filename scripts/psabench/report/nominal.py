@@ -145,9 +145,8 @@ def nominal_section(sections: Sequence[Section], nominal: Nominal | None) -> str
 
 
 _LEGEND = {
-    True: "Large: our value with the digits that the article prints (green: the same). Below it: the value with its "
-    "95 % interval.",
-    False: "Large: our value. Below it: its 95 % interval, and the value less the nominal one.",
+    True: "Large: our value with the digits that the article prints (green: the same). Below it: the value with its U.",
+    False: "Large: our value. Below it: its U, and the value less the nominal one.",
 }
 
 
