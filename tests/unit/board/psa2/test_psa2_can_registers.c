@@ -137,9 +137,9 @@ static void not_told(struct rig *r)
 
 static void falls_silent(struct rig *r, const struct port *p)
 {
-    psa2_can_fault(&r->can, p->fault, r->s.now_ns);
+    psa2_can_fault(&r->can, (uint16_t)p->fault, r->s.now_ns);
     told(r, p->code, 0x81, p->source);
-    psa2_can_fault(&r->can, p->fault, r->s.now_ns);
+    psa2_can_fault(&r->can, (uint16_t)p->fault, r->s.now_ns);
     not_told(r);
 }
 
