@@ -1,0 +1,1 @@
+"""Accelerometers against temperature: polynomial compensation, its choice of degree, its export to a computer."""
