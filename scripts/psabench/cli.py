@@ -30,6 +30,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
     "report": ("report.diff_command", "compare the results of two runs"),
+    "passport": ("passport.command", "keep what was measured of each instrument: passports in one file"),
     "explore": ("explore.command", "play random schedules of faults and host behaviours, and check the requirements"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),

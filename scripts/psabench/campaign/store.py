@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,12 +21,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput, expected, output_error
-from psabench.link.own import sqlite_error
+from psabench.database import Database, Kind
+from psabench.errors import BadInput, expected
 
-FORMAT = 2  # of the tables below, the file's user_version; 1 had no build in the key
-APPLICATION = 0x70736162  # "psab", the file's application_id: `file` and we know what it is
-TIMEOUT_S = 60.0  # for another process that writes
 CELL = np.dtype("<f4")
 
 Rows = npt.NDArray[np.float32]
@@ -52,6 +48,15 @@ CREATE TABLE part (
     PRIMARY KEY (series, first_run)
 ) STRICT;
 """
+
+KIND = Kind(
+    what="a store of results",
+    application=0x70736162,  # "psab"
+    format=2,
+    schema=SCHEMA,
+    # Format 1: the same tables, but a series may hold runs of several builds: kept under its old key, for no one.
+    conversions={1: ""},
+)
 
 _OTHERS = "WHERE kind = ? AND input = ? AND seed = ? AND columns = ? AND key <> ?"
 
@@ -101,16 +106,7 @@ class Store(AbstractContextManager["Store"]):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, timeout=TIMEOUT_S, isolation_level=None)
-        except (OSError, sqlite3.Error) as e:
-            raise BadInput(expected("a store of results (SQLite)", e, path)) from e
-        try:
-            self._prepare()
-        except BaseException:
-            self._db.close()
-            raise
+        self._db = Database(path, KIND)
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -118,36 +114,18 @@ class Store(AbstractContextManager["Store"]):
     def close(self) -> None:
         self._db.close()
 
-    def _prepare(self) -> None:
-        with self._transaction():
-            application = int(self._one("PRAGMA application_id"))
-            tables = int(self._one("SELECT count(*) FROM sqlite_schema"))
-            if application == 0 and tables == 0:  # a new file
-                for statement in SCHEMA.split(";\n"):
-                    self._do(statement)
-                self._do(f"PRAGMA application_id = {APPLICATION}")
-                self._do(f"PRAGMA user_version = {FORMAT}")
-            elif application != APPLICATION:
-                raise BadInput(expected("a store of results", "an SQLite file of another program", self.path))
-            elif (found := int(self._one("PRAGMA user_version"))) == 1:
-                # The same tables, but a series may hold runs of several builds: kept under its old key, for no one.
-                self._do(f"PRAGMA user_version = {FORMAT}")
-            elif found != FORMAT:
-                raise BadInput(expected(f"a store of format {FORMAT}", f"format {found}", self.path))
-        self._do("PRAGMA foreign_keys = ON")
-
     # ---- what there is
 
     def runs(self, origin: Origin) -> dict[int, int]:
         """Parts that are there: number of runs by first run."""
-        found = self._do(
+        found = self._db.do(
             "SELECT first_run, runs FROM part JOIN series ON series = id WHERE key = ? ORDER BY first_run", origin.key
         )
         return {int(first): int(runs) for first, runs in found}
 
     def others(self, origin: Origin) -> dict[str, int]:
         """Runs of the same kind, input and seed by another build or version: their number by build."""
-        found = self._do(
+        found = self._db.do(
             f"SELECT build, sum(runs) FROM series JOIN part ON series = id {_OTHERS} GROUP BY build", *_other(origin)
         )
         return {str(build): int(runs) for build, runs in found}
@@ -155,7 +133,7 @@ class Store(AbstractContextManager["Store"]):
     def rows(self, origin: Origin, runs: int) -> Rows:
         """The first `runs` rows. Raises BadInput where some are missing or damaged."""
         width, at, found = len(origin.columns), 0, []
-        parts = self._do(
+        parts = self._db.do(
             "SELECT first_run, runs, sha256, data FROM part JOIN series ON series = id WHERE key = ?"
             " ORDER BY first_run",
             origin.key,
@@ -174,7 +152,7 @@ class Store(AbstractContextManager["Store"]):
 
     def origins(self) -> list[Origin]:
         """Of all series, in the order in which they were begun."""
-        found = self._do("SELECT kind, input, seed, version, build, columns FROM series ORDER BY id")
+        found = self._db.do("SELECT kind, input, seed, version, build, columns FROM series ORDER BY id")
         return [
             Origin(
                 kind=kind,
@@ -191,7 +169,7 @@ class Store(AbstractContextManager["Store"]):
 
     def put(self, parts: Iterable[Part]) -> None:
         """Add parts, all or none; one that is there already, from the same first run, is replaced."""
-        with self._transaction():
+        with self._db.transaction():
             for part in parts:
                 self._put(part)
 
@@ -200,12 +178,12 @@ class Store(AbstractContextManager["Store"]):
         if part.rows.ndim != 2 or part.rows.shape[1] != len(o.columns):
             raise ValueError(expected(f"rows of {len(o.columns)} columns", f"shape {part.rows.shape}", o.kind))
         data = np.ascontiguousarray(part.rows, CELL).tobytes()
-        self._do(
+        self._db.do(
             "INSERT INTO series (key, kind, input, seed, version, columns, build) VALUES (?, ?, ?, ?, ?, ?, ?)"
             " ON CONFLICT (key) DO NOTHING",
             *(o.key, o.kind, canonical(o.input), o.seed, o.version, canonical(o.columns), o.build),
         )
-        self._do(
+        self._db.do(
             "INSERT OR REPLACE INTO part (series, first_run, runs, sha256, data)"
             " VALUES ((SELECT id FROM series WHERE key = ?), ?, ?, ?, ?)",
             *(o.key, part.first_run, len(part.rows), hashlib.sha256(data).digest(), data),
@@ -213,35 +191,10 @@ class Store(AbstractContextManager["Store"]):
 
     def forget(self, origin: Origin) -> None:
         """Remove a series with all its parts, if there is one."""
-        with self._transaction():
-            self._do("DELETE FROM series WHERE key = ?", origin.key)
+        with self._db.transaction():
+            self._db.do("DELETE FROM series WHERE key = ?", origin.key)
 
     def forget_others(self, origin: Origin) -> None:
         """Remove what `others` counts."""
-        with self._transaction():
-            self._do(f"DELETE FROM series {_OTHERS}", *_other(origin))
-
-    # ---- SQLite
-
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        """All of a block, or nothing; takes the right to write at once, so that it cannot be rejected later."""
-        self._do("BEGIN IMMEDIATE")
-        try:
-            yield
-        except BaseException:
-            if self._db.in_transaction:  # a full disk ends it by itself; report that error
-                self._do("ROLLBACK")
-            raise
-        self._do("COMMIT")
-
-    def _one(self, sql: str) -> Any:
-        return self._do(sql).fetchone()[0]
-
-    def _do(self, sql: str, *values: Any) -> sqlite3.Cursor:
-        try:
-            return self._db.execute(sql, values)
-        except sqlite3.OperationalError as e:  # locked, read-only, disk full
-            raise output_error(self.path, sqlite_error(e)) from e
-        except sqlite3.DatabaseError as e:
-            raise BadInput(expected("a store of results", f"a damaged or other file ({e})", self.path)) from e
+        with self._db.transaction():
+            self._db.do(f"DELETE FROM series {_OTHERS}", *_other(origin))

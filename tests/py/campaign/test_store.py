@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from psabench.campaign.store import FORMAT, Origin, Part, Rows, Store
+from psabench.campaign.store import KIND, Origin, Part, Rows, Store
 from psabench.errors import BadInput
 
 ORIGIN = Origin(
@@ -97,7 +97,7 @@ def test_a_store_of_format_1_is_kept_and_not_used(tmp_path: Path) -> None:
         store.put([part(0, 2)])
         assert np.array_equal(store.rows(ORIGIN, 2), rows(0, 2))
     with sqlite3.connect(path) as db:
-        assert db.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        assert db.execute("PRAGMA user_version").fetchone() == (KIND.format,)
 
 
 def test_a_part_grows_and_a_series_can_be_forgotten(tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ def _foreign(path: Path) -> None:
 def _newer(path: Path) -> None:
     Store(path).close()
     with sqlite3.connect(path) as db:
-        db.execute(f"PRAGMA user_version = {FORMAT + 1}")
+        db.execute(f"PRAGMA user_version = {KIND.format + 1}")
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def _newer(path: Path) -> None:
     [
         (_text, "expected a store of results"),
         (_foreign, "an SQLite file of another program"),
-        (_newer, f"expected a store of format {FORMAT}, got format {FORMAT + 1}"),
+        (_newer, f"expected a store of results of format {KIND.format}, got format {KIND.format + 1}"),
         (Path.mkdir, "expected a store of results .SQLite."),
     ],
 )
@@ -208,7 +208,7 @@ def test_a_writer_that_is_killed_leaves_only_whole_parts(tmp_path: Path) -> None
 def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     path = tmp_path / "s"
     with Store(path) as store, sqlite3.connect(path, isolation_level=None) as other:
-        store._db.execute("PRAGMA busy_timeout = 0")
+        store._db.do("PRAGMA busy_timeout = 0")
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(BadInput, match="database is locked"):
             store.put([part(0, 3)])

@@ -1,0 +1,1 @@
+"""Passports of instruments: what was measured of each unit, by which run, and what is valid now."""

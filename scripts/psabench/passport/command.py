@@ -1,0 +1,144 @@
+"""`psabench passport`: its options, and what is printed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from psabench.options import Parser
+
+STORE = Path("build/passports.sqlite")
+
+EPILOG = """\
+A unit is known by its serial number. `add` enters the sections of a calibration's result.json, a run of the unit each;
+a later run of the same method supersedes the one before, which stays. What is there already is not entered twice.
+
+examples:
+  psabench run turns --out build/a
+  psabench passport add build/a --serial QA-0001 --type mems
+  psabench passport list
+  psabench passport show QA-0001 --all       with the runs that are superseded
+  psabench passport diff QA-0001@1 QA-0001   the first run, and the last of the same method
+  psabench passport export QA-0001 --out qa-0001.json
+  psabench passport header QA-0001 --quantity u0_ug --step 0.01 --out zero.h
+
+Exit status: 0 done, for diff: the same; 1 diff: they differ; 2 bad input, 3 the store cannot be written.
+"""
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """What follows `psabench passport`. Raises BadInput."""
+    p = Parser(prog="psabench passport", description="Passports of instruments, in one SQLite file.", epilog=EPILOG)
+    commands = p.add_subparsers(required=True, metavar="COMMAND")
+    add = _subcommand(commands, "add", "enter the results of a calibration", _add_results)
+    add.add_argument("result", type=Path, metavar="RESULT", help="folder of a report, or its result.json")
+    add.add_argument("--serial", required=True, metavar="SERIAL", help="of the unit; made where it is new")
+    add.add_argument("--type", required=True, metavar="TYPE", help="of the unit: mems, quartz, ...")
+    _subcommand(commands, "list", "list the units", _list_units)
+    show = _subcommand(commands, "show", "show what is valid of a unit", _show_unit)
+    show.add_argument("serial", metavar="SERIAL")
+    show.add_argument("--all", action="store_true", help="show the runs that are superseded as well")
+    export = _subcommand(commands, "export", "write a passport as JSON (proto/passport.schema.json)", _export_unit)
+    export.add_argument("serial", metavar="SERIAL")
+    export.add_argument("--out", type=Path, metavar="FILE", help="in place of the terminal")
+    diff = _subcommand(commands, "diff", "compare two runs", _compare_runs)
+    diff.add_argument("a", metavar="A", help="SERIAL@NUMBER of a run; SERIAL: its last one")
+    diff.add_argument("b", metavar="B", help="the other one")
+    diff.add_argument("--json", action="store_true", help="print JSON in place of tables")
+    header = _subcommand(commands, "header", "write a compensation as a C header in integers", _write_header)
+    header.add_argument("serial", metavar="SERIAL[@NUMBER]")
+    header.add_argument("--quantity", required=True, metavar="NAME", help="that was fitted against temperature")
+    header.add_argument("--step", required=True, type=float, metavar="STEP", help="of the result, the quantity's unit")
+    header.add_argument("--name", metavar="NAME", help="of the C function (the quantity's)")
+    header.add_argument("--out", type=Path, metavar="FILE", help="in place of the terminal")
+    return p.parse_args(words)
+
+
+def _subcommand(commands: argparse._SubParsersAction[Parser], name: str, text: str, handler: object) -> Parser:
+    made = commands.add_parser(name, help=text, description=f"{text.capitalize()}.", epilog=EPILOG)
+    made.set_defaults(handler=handler)
+    made.add_argument("--store", type=Path, default=STORE, metavar="FILE", help="(%(default)s)")
+    return made
+
+
+def _add_results(args: argparse.Namespace) -> int:
+    from psabench.passport.entry import runs_of_result
+    from psabench.passport.store import PassportStore
+
+    runs = runs_of_result(args.result)
+    with PassportStore(args.store) as store:
+        for run in runs:
+            number = store.put(args.serial, args.type, run)
+            print(f"{args.serial}: run {number}, {run.method}, {len(run.quantities)} quantities")
+    return 0
+
+
+def _list_units(args: argparse.Namespace) -> int:
+    from psabench.passport.document import list_lines
+    from psabench.passport.store import PassportStore
+
+    with PassportStore(args.store, read_only=True) as store:
+        print("\n".join(list_lines([store.passport(serial) for serial in store.serials()])))
+    return 0
+
+
+def _show_unit(args: argparse.Namespace) -> int:
+    from psabench.passport.document import passport_lines
+    from psabench.passport.store import PassportStore
+
+    with PassportStore(args.store, read_only=True) as store:
+        print("\n".join(passport_lines(store.passport(args.serial), history=args.all)))
+    return 0
+
+
+def _export_unit(args: argparse.Namespace) -> int:
+    from psabench.passport.document import passport_dict
+    from psabench.passport.store import PassportStore
+
+    with PassportStore(args.store, read_only=True) as store:
+        made = passport_dict(store.passport(args.serial))
+    return _write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", args.out)
+
+
+def _compare_runs(args: argparse.Namespace) -> int:
+    from psabench.passport.document import comparable_dict
+    from psabench.passport.store import PassportStore, find_run
+    from psabench.report import diff
+
+    with PassportStore(args.store, read_only=True) as store:
+        a, b = (comparable_dict(find_run(store, name)) for name in (args.a, args.b))
+    found = diff.compare_results(a, b)
+    if args.json:
+        print(json.dumps(diff.diff_dict(found), indent=1, ensure_ascii=False))
+    else:
+        print("\n".join(diff.diff_lines(found)))
+    return 0 if found.same else 1
+
+
+def _write_header(args: argparse.Namespace) -> int:
+    from psabench.errors import BadInput, expected
+    from psabench.passport.store import PassportStore, find_run
+    from psabench.thermal.fixed_point import c_header, fixed_point
+
+    with PassportStore(args.store, read_only=True) as store:
+        run = find_run(store, args.serial)
+    fitted = {q.name: q.compensation for q in run.quantities if q.compensation}
+    if args.quantity not in fitted:
+        known = ", ".join(fitted) or "a run with a compensation"
+        raise BadInput(expected(known, args.quantity, f"{args.serial}: run {run.number}"))
+    made = fixed_point(fitted[args.quantity], args.step)
+    return _write_text(c_header(made, args.name or args.quantity), args.out)
+
+
+def _write_text(text: str, path: Path | None) -> int:
+    """To a file, whole or not at all, or to the terminal."""
+    from psabench.link.own import replace_file
+
+    if path is None:
+        print(text, end="")
+    else:
+        replace_file(path, text)
+        print(path)
+    return 0

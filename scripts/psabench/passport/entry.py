@@ -1,0 +1,64 @@
+"""What enters a passport: the sections of a calibration's result.json, a run of the unit each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from psabench.errors import BadInput, expected
+from psabench.passport.store import Covariance, Measured, UnitRun, data_digest
+from psabench.report.diff import read_result
+from psabench.report.provenance import KEY
+
+
+def runs_of_result(path: Path) -> list[UnitRun]:
+    """Of a folder of a report or its result.json. Raises BadInput for one without estimates or provenance."""
+    data = read_result(path)
+    origin = data.get(KEY)
+    if not isinstance(origin, dict) or not {"begun", "psabench"} <= origin.keys():
+        raise BadInput(expected("a result with its provenance", "none", path))
+    sections = [s for s in data.get("sections", []) if s.get("estimates")]
+    if not sections:
+        raise BadInput(expected("a result with estimates", "none", path))
+    try:
+        return [_run_of_section(section, origin) for section in sections]
+    except (KeyError, TypeError, ValueError) as e:
+        raise BadInput(expected("the sections of a calibration", f"{type(e).__name__}: {e}", path)) from e
+
+
+def _run_of_section(section: Mapping[str, Any], origin: Mapping[str, Any]) -> UnitRun:
+    words = (section.get(key) for key in ("procedure", "reading", "label"))
+    estimates = [e for e in section["estimates"] if e.get("identifiable", True)]
+    judged = [e["within_limits"] for e in estimates if e.get("within_limits") is not None]
+    seed = origin.get("seed")
+    return UnitRun(
+        method=" ".join(str(w) for w in words if w),
+        begun=str(origin["begun"]),
+        version=str(origin["psabench"]),
+        data_sha256=data_digest(section),
+        seed=seed if isinstance(seed, int) else None,
+        within=all(judged) if judged else None,
+        quantities=tuple(_measured_of(e) for e in estimates),
+        covariance=_covariance_of(section, {e["name"]: float(e["sd"]) for e in estimates}),
+        provenance=origin,
+    )
+
+
+def _measured_of(estimate: Mapping[str, Any]) -> Measured:
+    low, high = (float(x) for x in estimate["ci95"])
+    value, half = float(estimate["value"]), (high - low) / 2.0
+    if not (math.isfinite(value) and math.isfinite(half)):
+        raise ValueError(expected("a finite estimate", f"{value} +- {half}", estimate["name"]))
+    return Measured(name=str(estimate["name"]), unit=str(estimate["unit"]), value=value, half_width=half)
+
+
+def _covariance_of(section: Mapping[str, Any], sd: Mapping[str, float]) -> Covariance | None:
+    """Correlation times standard deviations, of the quantities that enter."""
+    found = section.get("correlation")
+    if not found:
+        return None
+    at = {name: k for k, name in enumerate(found["names"]) if name in sd}
+    rows = tuple(tuple(float(found["matrix"][at[a]][at[b]]) * sd[a] * sd[b] for b in at) for a in at)
+    return Covariance(names=tuple(at), matrix=rows) if at else None

@@ -1,0 +1,243 @@
+"""The store of passports: one SQLite file with units, runs, their results and calibrations (docs/tools/passports.md).
+
+It is not the store of results: that one may be emptied and computed again, a passport may not. A run enters whole, with
+all its numbers and what it supersedes, or not at all, whatever ends us.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.database import Database, Kind
+from psabench.errors import BadInput, expected
+from psabench.thermal.compensation import Compensation, compensation_dict, compensation_of_dict
+
+MOST_SERIAL = 64  # characters
+
+SCHEMA = """
+CREATE TABLE unit (
+    id     INTEGER PRIMARY KEY,
+    serial TEXT NOT NULL UNIQUE,
+    type   TEXT NOT NULL            -- mems, quartz, ...
+) STRICT;
+CREATE TABLE run (
+    id          INTEGER PRIMARY KEY,
+    unit        INTEGER NOT NULL REFERENCES unit (id),
+    number      INTEGER NOT NULL,   -- of the unit's runs, from 1
+    method      TEXT NOT NULL,      -- procedure and reading
+    begun       TEXT NOT NULL,      -- ISO 8601, UTC
+    seed        INTEGER,            -- NULL: not of an emulator
+    version     TEXT NOT NULL,      -- of psabench
+    data_sha256 TEXT NOT NULL,      -- of the result that was entered
+    within      INTEGER,            -- limits: 1 kept, 0 not, NULL none
+    low_c       REAL,               -- temperatures for which it is valid
+    high_c      REAL,
+    supersedes  INTEGER REFERENCES run (id), -- the run whose numbers these replace
+    provenance  TEXT NOT NULL,      -- JSON
+    UNIQUE (unit, number),
+    UNIQUE (unit, data_sha256)
+) STRICT;
+CREATE TABLE quantity (
+    run          INTEGER NOT NULL REFERENCES run (id),
+    name         TEXT NOT NULL,
+    unit         TEXT NOT NULL,
+    value        REAL NOT NULL,
+    half_width   REAL NOT NULL,     -- of the 95 % interval, or U (k = 2)
+    compensation TEXT,              -- JSON: the quantity against temperature
+    PRIMARY KEY (run, name)
+) STRICT;
+CREATE TABLE covariance (
+    run    INTEGER PRIMARY KEY REFERENCES run (id),
+    names  TEXT NOT NULL,           -- JSON
+    matrix TEXT NOT NULL            -- JSON, rows
+) STRICT;
+"""
+
+KIND = Kind(what="a store of passports", application=0x70737070, format=1, schema=SCHEMA)  # "pspp"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """One quantity of a run."""
+
+    name: str  # with its unit at the end
+    unit: str
+    value: float
+    half_width: float
+    compensation: Compensation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Covariance:
+    """Of some quantities of a run; matrix: (n, n)."""
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnitRun:
+    """What a procedure found of a unit."""
+
+    method: str
+    begun: str
+    version: str
+    data_sha256: str
+    quantities: tuple[Measured, ...]
+    seed: int | None = None
+    within: bool | None = None
+    range_c: tuple[float, float] | None = None
+    covariance: Covariance | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    number: int = 0  # the store gives it
+    supersedes: int | None = None  # number of the run that this one replaces; the store gives it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passport:
+    """A unit and its runs, the earliest first."""
+
+    serial: str
+    type: str
+    runs: tuple[UnitRun, ...]
+
+    def current_runs(self) -> tuple[UnitRun, ...]:
+        """Those that no later one supersedes."""
+        gone = {run.supersedes for run in self.runs}
+        return tuple(run for run in self.runs if run.number not in gone)
+
+    def run_of(self, number: int) -> UnitRun:
+        """Raises BadInput."""
+        for run in self.runs:
+            if run.number == number:
+                return run
+        raise BadInput(expected(f"a run of 1 to {len(self.runs)}", number, self.serial))
+
+
+class PassportStore(AbstractContextManager["PassportStore"]):
+    """An open store: `with PassportStore(path) as store: ...`; made when there is none, unless it is only read.
+
+    Raises BadInput for a file that is not a store, a newer or a damaged one, OutputError where it cannot be written.
+    """
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self.path = path
+        self._db = Database(path, KIND, read_only=read_only)
+
+    def __exit__(self, *_: object) -> None:
+        self._db.close()
+
+    # ---- what there is
+
+    def serials(self) -> list[str]:
+        """Of all units, in alphabetical order."""
+        return [str(row[0]) for row in self._db.do("SELECT serial FROM unit ORDER BY serial")]
+
+    def passport(self, serial: str) -> Passport:
+        """Raises BadInput for a unit that is not there."""
+        row = self._db.do("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
+        if row is None:
+            raise BadInput(expected("a serial number of the store", serial, self.path))
+        return Passport(serial=serial, type=str(row[1]), runs=tuple(self._runs(int(row[0]))))
+
+    def _runs(self, unit: int) -> Iterator[UnitRun]:
+        found = self._db.do(
+            "SELECT r.id, r.number, r.method, r.begun, r.seed, r.version, r.data_sha256, r.within, r.low_c, r.high_c,"
+            " r.provenance, s.number, names, matrix FROM run r LEFT JOIN run s ON r.supersedes = s.id"
+            " LEFT JOIN covariance ON covariance.run = r.id WHERE r.unit = ? ORDER BY r.number",
+            unit,
+        ).fetchall()
+        for row, number, method, begun, seed, version, sha, within, low, high, origin, gone, names, matrix in found:
+            yield UnitRun(
+                number=number,
+                method=method,
+                begun=begun,
+                seed=seed,
+                version=version,
+                data_sha256=sha,
+                within=None if within is None else bool(within),
+                range_c=None if low is None else (low, high),
+                provenance=json.loads(origin),
+                supersedes=gone,
+                quantities=tuple(self._quantities(row)),
+                covariance=None if names is None else _covariance(names, matrix),
+            )
+
+    def _quantities(self, run: int) -> Iterator[Measured]:
+        found = self._db.do(
+            "SELECT name, unit, value, half_width, compensation FROM quantity WHERE run = ? ORDER BY rowid", run
+        )
+        for name, unit, value, half_width, text in found.fetchall():
+            where = f"{self.path}: compensation of {name}"
+            made = None if text is None else compensation_of_dict(json.loads(text), where)
+            yield Measured(name=name, unit=unit, value=value, half_width=half_width, compensation=made)
+
+    # ---- changes, each whole or not at all
+
+    def put(self, serial: str, kind: str, run: UnitRun) -> int:
+        """Enter a run of a unit, which is made where it is new; the number it has. A run of the same method is
+        superseded. What is there already, the same data of the same unit, is left as it is.
+
+        Raises BadInput for a serial number that is none, or one of another type of unit.
+        """
+        if not (serial.isprintable() and serial.strip() == serial and 0 < len(serial) <= MOST_SERIAL):
+            raise BadInput(expected(f"1 to {MOST_SERIAL} printable characters", repr(serial), "serial number"))
+        with self._db.transaction():
+            self._db.do("INSERT INTO unit (serial, type) VALUES (?, ?) ON CONFLICT (serial) DO NOTHING", serial, kind)
+            unit, found = self._db.do("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
+            if found != kind:
+                raise BadInput(expected(f"a unit of type {found}", kind, serial))
+            same = self._db.do("SELECT number FROM run WHERE unit = ? AND data_sha256 = ?", unit, run.data_sha256)
+            there = same.fetchone()
+            return int(there[0]) if there else self._put(int(unit), run)
+
+    def _put(self, unit: int, run: UnitRun) -> int:
+        number = int(self._db.value("SELECT coalesce(max(number), 0) + 1 FROM run WHERE unit = ?", unit))
+        before = self._db.do(
+            "SELECT id FROM run WHERE unit = ? AND method = ? ORDER BY number DESC LIMIT 1", unit, run.method
+        ).fetchone()
+        low, high = run.range_c or (None, None)
+        cursor = self._db.do(
+            "INSERT INTO run (unit, number, method, begun, seed, version, data_sha256, within, low_c, high_c,"
+            " supersedes, provenance) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            *(unit, number, run.method, run.begun, run.seed, run.version, run.data_sha256, run.within, low, high),
+            *(before[0] if before else None, json.dumps(run.provenance, ensure_ascii=False)),
+        )
+        for q in run.quantities:
+            text = None if q.compensation is None else json.dumps(compensation_dict(q.compensation))
+            self._db.do(
+                "INSERT INTO quantity (run, name, unit, value, half_width, compensation) VALUES (?, ?, ?, ?, ?, ?)",
+                *(cursor.lastrowid, q.name, q.unit, q.value, q.half_width, text),
+            )
+        if run.covariance:
+            names, matrix = json.dumps(run.covariance.names), json.dumps(run.covariance.matrix)
+            self._db.do("INSERT INTO covariance VALUES (?, ?, ?)", cursor.lastrowid, names, matrix)
+        return number
+
+
+def _covariance(names: str, matrix: str) -> Covariance:
+    rows: Sequence[Sequence[float]] = json.loads(matrix)
+    return Covariance(names=tuple(json.loads(names)), matrix=tuple(tuple(row) for row in rows))
+
+
+def data_digest(data: Any) -> str:
+    """SHA-256 of JSON's types, 64 hexadecimal digits; the same for the same values."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def find_run(store: PassportStore, name: str) -> UnitRun:
+    """SERIAL@NUMBER: a run; SERIAL: its last one. Raises BadInput for what is not there."""
+    serial, at, number = name.rpartition("@")
+    if not at or not number.isascii() or not number.isdigit():
+        serial, number = name, ""
+    passport = store.passport(serial)
+    if not passport.runs:
+        raise BadInput(expected("a unit with a run", "none", serial))
+    return passport.run_of(int(number)) if number else passport.runs[-1]
