@@ -163,8 +163,8 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 58_200, 58_200),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 47_908, 47_908),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_732, 1_732),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 49_004, 49_004),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_752, 1_752),
 }
 
 

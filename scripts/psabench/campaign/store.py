@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.database import Database, Kind
 from psabench.errors import BadInput, expected
+from psabench.link.database import Database, Kind
 
 CELL = np.dtype("<f4")
 
@@ -118,14 +118,14 @@ class Store(AbstractContextManager["Store"]):
 
     def runs(self, origin: Origin) -> dict[int, int]:
         """Parts that are there: number of runs by first run."""
-        found = self._db.do(
+        found = self._db.execute_sql(
             "SELECT first_run, runs FROM part JOIN series ON series = id WHERE key = ? ORDER BY first_run", origin.key
         )
         return {int(first): int(runs) for first, runs in found}
 
     def others(self, origin: Origin) -> dict[str, int]:
         """Runs of the same kind, input and seed by another build or version: their number by build."""
-        found = self._db.do(
+        found = self._db.execute_sql(
             f"SELECT build, sum(runs) FROM series JOIN part ON series = id {_OTHERS} GROUP BY build", *_other(origin)
         )
         return {str(build): int(runs) for build, runs in found}
@@ -133,7 +133,7 @@ class Store(AbstractContextManager["Store"]):
     def rows(self, origin: Origin, runs: int) -> Rows:
         """The first `runs` rows. Raises BadInput where some are missing or damaged."""
         width, at, found = len(origin.columns), 0, []
-        parts = self._db.do(
+        parts = self._db.execute_sql(
             "SELECT first_run, runs, sha256, data FROM part JOIN series ON series = id WHERE key = ?"
             " ORDER BY first_run",
             origin.key,
@@ -152,7 +152,7 @@ class Store(AbstractContextManager["Store"]):
 
     def origins(self) -> list[Origin]:
         """Of all series, in the order in which they were begun."""
-        found = self._db.do("SELECT kind, input, seed, version, build, columns FROM series ORDER BY id")
+        found = self._db.execute_sql("SELECT kind, input, seed, version, build, columns FROM series ORDER BY id")
         return [
             Origin(
                 kind=kind,
@@ -169,7 +169,7 @@ class Store(AbstractContextManager["Store"]):
 
     def put(self, parts: Iterable[Part]) -> None:
         """Add parts, all or none; one that is there already, from the same first run, is replaced."""
-        with self._db.transaction():
+        with self._db.whole_change():
             for part in parts:
                 self._put(part)
 
@@ -178,12 +178,12 @@ class Store(AbstractContextManager["Store"]):
         if part.rows.ndim != 2 or part.rows.shape[1] != len(o.columns):
             raise ValueError(expected(f"rows of {len(o.columns)} columns", f"shape {part.rows.shape}", o.kind))
         data = np.ascontiguousarray(part.rows, CELL).tobytes()
-        self._db.do(
+        self._db.execute_sql(
             "INSERT INTO series (key, kind, input, seed, version, columns, build) VALUES (?, ?, ?, ?, ?, ?, ?)"
             " ON CONFLICT (key) DO NOTHING",
             *(o.key, o.kind, canonical(o.input), o.seed, o.version, canonical(o.columns), o.build),
         )
-        self._db.do(
+        self._db.execute_sql(
             "INSERT OR REPLACE INTO part (series, first_run, runs, sha256, data)"
             " VALUES ((SELECT id FROM series WHERE key = ?), ?, ?, ?, ?)",
             *(o.key, part.first_run, len(part.rows), hashlib.sha256(data).digest(), data),
@@ -191,10 +191,10 @@ class Store(AbstractContextManager["Store"]):
 
     def forget(self, origin: Origin) -> None:
         """Remove a series with all its parts, if there is one."""
-        with self._db.transaction():
-            self._db.do("DELETE FROM series WHERE key = ?", origin.key)
+        with self._db.whole_change():
+            self._db.execute_sql("DELETE FROM series WHERE key = ?", origin.key)
 
     def forget_others(self, origin: Origin) -> None:
         """Remove what `others` counts."""
-        with self._db.transaction():
-            self._db.do(f"DELETE FROM series {_OTHERS}", *_other(origin))
+        with self._db.whole_change():
+            self._db.execute_sql(f"DELETE FROM series {_OTHERS}", *_other(origin))

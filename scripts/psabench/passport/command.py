@@ -32,22 +32,22 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench passport`. Raises BadInput."""
     p = Parser(prog="psabench passport", description="Passports of instruments, in one SQLite file.", epilog=EPILOG)
     commands = p.add_subparsers(required=True, metavar="COMMAND")
-    add = _subcommand(commands, "add", "enter the results of a calibration", _add_results)
+    add = _add_subcommand(commands, "add", "enter the results of a calibration", _add_results)
     add.add_argument("result", type=Path, metavar="RESULT", help="folder of a report, or its result.json")
     add.add_argument("--serial", required=True, metavar="SERIAL", help="of the unit; made where it is new")
     add.add_argument("--type", required=True, metavar="TYPE", help="of the unit: mems, quartz, ...")
-    _subcommand(commands, "list", "list the units", _list_units)
-    show = _subcommand(commands, "show", "show what is valid of a unit", _show_unit)
+    _add_subcommand(commands, "list", "list the units", _list_units)
+    show = _add_subcommand(commands, "show", "show what is valid of a unit", _show_unit)
     show.add_argument("serial", metavar="SERIAL")
     show.add_argument("--all", action="store_true", help="show the runs that are superseded as well")
-    export = _subcommand(commands, "export", "write a passport as JSON (proto/passport.schema.json)", _export_unit)
+    export = _add_subcommand(commands, "export", "write a passport as JSON (proto/passport.schema.json)", _export_unit)
     export.add_argument("serial", metavar="SERIAL")
     export.add_argument("--out", type=Path, metavar="FILE", help="in place of the terminal")
-    diff = _subcommand(commands, "diff", "compare two runs", _compare_runs)
+    diff = _add_subcommand(commands, "diff", "compare two runs", _compare_runs)
     diff.add_argument("a", metavar="A", help="SERIAL@NUMBER of a run; SERIAL: its last one")
     diff.add_argument("b", metavar="B", help="the other one")
     diff.add_argument("--json", action="store_true", help="print JSON in place of tables")
-    header = _subcommand(commands, "header", "write a compensation as a C header in integers", _write_header)
+    header = _add_subcommand(commands, "header", "write a compensation as a C header in integers", _write_header)
     header.add_argument("serial", metavar="SERIAL[@NUMBER]")
     header.add_argument("--quantity", required=True, metavar="NAME", help="that was fitted against temperature")
     header.add_argument("--step", required=True, type=float, metavar="STEP", help="of the result, the quantity's unit")
@@ -56,7 +56,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _subcommand(commands: argparse._SubParsersAction[Parser], name: str, text: str, handler: object) -> Parser:
+def _add_subcommand(commands: argparse._SubParsersAction[Parser], name: str, text: str, handler: object) -> Parser:
     made = commands.add_parser(name, help=text, description=f"{text.capitalize()}.", epilog=EPILOG)
     made.set_defaults(handler=handler)
     made.add_argument("--store", type=Path, default=STORE, metavar="FILE", help="(%(default)s)")
@@ -70,7 +70,7 @@ def _add_results(args: argparse.Namespace) -> int:
     runs = runs_of_result(args.result)
     with PassportStore(args.store) as store:
         for run in runs:
-            number = store.put(args.serial, args.type, run)
+            number = store.put_run(args.serial, args.type, run)
             print(f"{args.serial}: run {number}, {run.method}, {len(run.quantities)} quantities")
     return 0
 
@@ -80,7 +80,7 @@ def _list_units(args: argparse.Namespace) -> int:
     from psabench.passport.store import PassportStore
 
     with PassportStore(args.store, read_only=True) as store:
-        print("\n".join(list_lines([store.passport(serial) for serial in store.serials()])))
+        print("\n".join(list_lines([store.read_passport(serial) for serial in store.unit_serials()])))
     return 0
 
 
@@ -89,7 +89,7 @@ def _show_unit(args: argparse.Namespace) -> int:
     from psabench.passport.store import PassportStore
 
     with PassportStore(args.store, read_only=True) as store:
-        print("\n".join(passport_lines(store.passport(args.serial), history=args.all)))
+        print("\n".join(passport_lines(store.read_passport(args.serial), history=args.all)))
     return 0
 
 
@@ -98,7 +98,7 @@ def _export_unit(args: argparse.Namespace) -> int:
     from psabench.passport.store import PassportStore
 
     with PassportStore(args.store, read_only=True) as store:
-        made = passport_dict(store.passport(args.serial))
+        made = passport_dict(store.read_passport(args.serial))
     return _write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", args.out)
 
 

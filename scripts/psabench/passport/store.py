@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from psabench.database import Database, Kind
 from psabench.errors import BadInput, expected
+from psabench.link.database import Database, Kind
 from psabench.thermal.compensation import Compensation, compensation_dict, compensation_of_dict
 
 MOST_SERIAL = 64  # characters
@@ -135,19 +135,19 @@ class PassportStore(AbstractContextManager["PassportStore"]):
 
     # ---- what there is
 
-    def serials(self) -> list[str]:
+    def unit_serials(self) -> list[str]:
         """Of all units, in alphabetical order."""
-        return [str(row[0]) for row in self._db.do("SELECT serial FROM unit ORDER BY serial")]
+        return [str(row[0]) for row in self._db.execute_sql("SELECT serial FROM unit ORDER BY serial")]
 
-    def passport(self, serial: str) -> Passport:
+    def read_passport(self, serial: str) -> Passport:
         """Raises BadInput for a unit that is not there."""
-        row = self._db.do("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
+        row = self._db.execute_sql("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
         if row is None:
             raise BadInput(expected("a serial number of the store", serial, self.path))
-        return Passport(serial=serial, type=str(row[1]), runs=tuple(self._runs(int(row[0]))))
+        return Passport(serial=serial, type=str(row[1]), runs=tuple(self._runs_of(int(row[0]))))
 
-    def _runs(self, unit: int) -> Iterator[UnitRun]:
-        found = self._db.do(
+    def _runs_of(self, unit: int) -> Iterator[UnitRun]:
+        found = self._db.execute_sql(
             "SELECT r.id, r.number, r.method, r.begun, r.seed, r.version, r.data_sha256, r.within, r.low_c, r.high_c,"
             " r.provenance, s.number, names, matrix FROM run r LEFT JOIN run s ON r.supersedes = s.id"
             " LEFT JOIN covariance ON covariance.run = r.id WHERE r.unit = ? ORDER BY r.number",
@@ -165,12 +165,12 @@ class PassportStore(AbstractContextManager["PassportStore"]):
                 range_c=None if low is None else (low, high),
                 provenance=json.loads(origin),
                 supersedes=gone,
-                quantities=tuple(self._quantities(row)),
-                covariance=None if names is None else _covariance(names, matrix),
+                quantities=tuple(self._quantities_of(row)),
+                covariance=None if names is None else _covariance_of(names, matrix),
             )
 
-    def _quantities(self, run: int) -> Iterator[Measured]:
-        found = self._db.do(
+    def _quantities_of(self, run: int) -> Iterator[Measured]:
+        found = self._db.execute_sql(
             "SELECT name, unit, value, half_width, compensation FROM quantity WHERE run = ? ORDER BY rowid", run
         )
         for name, unit, value, half_width, text in found.fetchall():
@@ -180,7 +180,7 @@ class PassportStore(AbstractContextManager["PassportStore"]):
 
     # ---- changes, each whole or not at all
 
-    def put(self, serial: str, kind: str, run: UnitRun) -> int:
+    def put_run(self, serial: str, kind: str, run: UnitRun) -> int:
         """Enter a run of a unit, which is made where it is new; the number it has. A run of the same method is
         superseded. What is there already, the same data of the same unit, is left as it is.
 
@@ -188,22 +188,26 @@ class PassportStore(AbstractContextManager["PassportStore"]):
         """
         if not (serial.isprintable() and serial.strip() == serial and 0 < len(serial) <= MOST_SERIAL):
             raise BadInput(expected(f"1 to {MOST_SERIAL} printable characters", repr(serial), "serial number"))
-        with self._db.transaction():
-            self._db.do("INSERT INTO unit (serial, type) VALUES (?, ?) ON CONFLICT (serial) DO NOTHING", serial, kind)
-            unit, found = self._db.do("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
+        with self._db.whole_change():
+            self._db.execute_sql(
+                "INSERT INTO unit (serial, type) VALUES (?, ?) ON CONFLICT (serial) DO NOTHING", serial, kind
+            )
+            unit, found = self._db.execute_sql("SELECT id, type FROM unit WHERE serial = ?", serial).fetchone()
             if found != kind:
                 raise BadInput(expected(f"a unit of type {found}", kind, serial))
-            same = self._db.do("SELECT number FROM run WHERE unit = ? AND data_sha256 = ?", unit, run.data_sha256)
+            same = self._db.execute_sql(
+                "SELECT number FROM run WHERE unit = ? AND data_sha256 = ?", unit, run.data_sha256
+            )
             there = same.fetchone()
-            return int(there[0]) if there else self._put(int(unit), run)
+            return int(there[0]) if there else self._insert_run(int(unit), run)
 
-    def _put(self, unit: int, run: UnitRun) -> int:
-        number = int(self._db.value("SELECT coalesce(max(number), 0) + 1 FROM run WHERE unit = ?", unit))
-        before = self._db.do(
+    def _insert_run(self, unit: int, run: UnitRun) -> int:
+        number = int(self._db.first_value("SELECT coalesce(max(number), 0) + 1 FROM run WHERE unit = ?", unit))
+        before = self._db.execute_sql(
             "SELECT id FROM run WHERE unit = ? AND method = ? ORDER BY number DESC LIMIT 1", unit, run.method
         ).fetchone()
         low, high = run.range_c or (None, None)
-        cursor = self._db.do(
+        cursor = self._db.execute_sql(
             "INSERT INTO run (unit, number, method, begun, seed, version, data_sha256, within, low_c, high_c,"
             " supersedes, provenance) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             *(unit, number, run.method, run.begun, run.seed, run.version, run.data_sha256, run.within, low, high),
@@ -211,17 +215,17 @@ class PassportStore(AbstractContextManager["PassportStore"]):
         )
         for q in run.quantities:
             text = None if q.compensation is None else json.dumps(compensation_dict(q.compensation))
-            self._db.do(
+            self._db.execute_sql(
                 "INSERT INTO quantity (run, name, unit, value, half_width, compensation) VALUES (?, ?, ?, ?, ?, ?)",
                 *(cursor.lastrowid, q.name, q.unit, q.value, q.half_width, text),
             )
         if run.covariance:
             names, matrix = json.dumps(run.covariance.names), json.dumps(run.covariance.matrix)
-            self._db.do("INSERT INTO covariance VALUES (?, ?, ?)", cursor.lastrowid, names, matrix)
+            self._db.execute_sql("INSERT INTO covariance VALUES (?, ?, ?)", cursor.lastrowid, names, matrix)
         return number
 
 
-def _covariance(names: str, matrix: str) -> Covariance:
+def _covariance_of(names: str, matrix: str) -> Covariance:
     rows: Sequence[Sequence[float]] = json.loads(matrix)
     return Covariance(names=tuple(json.loads(names)), matrix=tuple(tuple(row) for row in rows))
 
@@ -237,7 +241,7 @@ def find_run(store: PassportStore, name: str) -> UnitRun:
     serial, at, number = name.rpartition("@")
     if not at or not number.isascii() or not number.isdigit():
         serial, number = name, ""
-    passport = store.passport(serial)
+    passport = store.read_passport(serial)
     if not passport.runs:
         raise BadInput(expected("a unit with a run", "none", serial))
     return passport.run_of(int(number)) if number else passport.runs[-1]

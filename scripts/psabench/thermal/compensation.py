@@ -1,8 +1,8 @@
 """Polynomial compensation of one quantity of an accelerometer against temperature, with a column for the lag.
 
 The article's polynomial of sixth degree, y = a x^6 + ... + g, fitted in Chebyshev polynomials of the scaled temperature
-s = (2 T - low - high) / (high - low): powers of degrees lose 11 of 16 digits on the way (`degree.conditioning`). On a
-sweep the element follows the case with a time constant; with both legs of a sweep the fit takes the element's
+s = (2 T - low - high) / (high - low): powers of degrees lose 11 of 16 digits (`degree.condition_numbers`). On a sweep
+the element follows the case with a time constant; with both legs of a sweep the fit takes the element's
 temperature as the polynomial's argument and case less element as one column more.
 """
 
@@ -108,7 +108,7 @@ def fit_soak(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree: int = 
     """
     t_c, y = checked_readings(quantity, t_c, y, degree)
     low, high = float(t_c.min()), float(t_c.max())
-    return _fitted(quantity, low, high, t_c, y, degree)
+    return _fit_readings(quantity, low, high, t_c, y, degree)
 
 
 def fit_sweep(
@@ -128,7 +128,7 @@ def fit_sweep(
     tau_s = _best_tau_s(t_s, case_c, y, degree)
     element = element_temperature(t_s, case_c, tau_s)
     low, high = float(element.min()), float(element.max())
-    return _fitted(quantity, low, high, element, y, degree, Lag(tau_s=tau_s, per_k=0.0), case_c - element)
+    return _fit_readings(quantity, low, high, element, y, degree, Lag(tau_s=tau_s, per_k=0.0), case_c - element)
 
 
 def turns_of(case_c: Array) -> int:
@@ -160,19 +160,19 @@ def checked_readings(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree
     return t_c, y
 
 
-def _design(scaled: Array, degree: int, column: Array | None) -> Array:
+def _design_matrix(scaled: Array, degree: int, column: Array | None) -> Array:
     rows = chebvander(scaled, degree)
     return np.asarray(rows if column is None else np.column_stack([rows, column]), np.float64)
 
 
-def _scale(t_c: Array) -> Array:
+def _scale_to_range(t_c: Array) -> Array:
     low, high = float(t_c.min()), float(t_c.max())
     return np.asarray((2.0 * t_c - low - high) / (high - low))
 
 
-def _squares(case_c: Array, element_c: Array, y: Array, degree: int) -> float:
+def _residual_squares(case_c: Array, element_c: Array, y: Array, degree: int) -> float:
     """Sum of the residuals' squares with that temperature of the element."""
-    rows = _design(_scale(element_c), degree, case_c - element_c)
+    rows = _design_matrix(_scale_to_range(element_c), degree, case_c - element_c)
     residual = y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]
     return float(residual @ residual)
 
@@ -183,12 +183,12 @@ def _best_tau_s(t_s: Array, case_c: Array, y: Array, degree: int) -> float:
     for _ in range(SCANS):
         scan = np.geomspace(low, high, SCAN)
         element = element_temperature(t_s, case_c, scan)
-        best = int(np.argmin([_squares(case_c, column, y, degree) for column in element.T]))
+        best = int(np.argmin([_residual_squares(case_c, column, y, degree) for column in element.T]))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, SCAN - 1)]
     return float(np.sqrt(low * high))
 
 
-def _fitted(
+def _fit_readings(
     quantity: str,
     low_c: float,
     high_c: float,
@@ -199,7 +199,7 @@ def _fitted(
     column: Array | None = None,
 ) -> Compensation:
     """Least squares by QR; the lag's time constant counts as a parameter that was found."""
-    rows = _design((2.0 * t_c - low_c - high_c) / (high_c - low_c), degree, column)
+    rows = _design_matrix((2.0 * t_c - low_c - high_c) / (high_c - low_c), degree, column)
     q, r = np.linalg.qr(rows)
     found = np.linalg.solve(r, q.T @ y)
     residual = y - rows @ found
@@ -239,8 +239,8 @@ def compensation_dict(c: Compensation) -> dict[str, Any]:
 def compensation_of_dict(data: Mapping[str, Any], where: str = "compensation") -> Compensation:
     """Raises BadInput for what is none."""
     try:
-        coefficients = _numbers(data["chebyshev"])
-        covariance = np.array([_numbers(row) for row in data["covariance"]])
+        coefficients = _number_tuple(data["chebyshev"])
+        covariance = np.array([_number_tuple(row) for row in data["covariance"]])
         lag = data["lag"]
         made = Compensation(
             quantity=str(data["quantity"]),
@@ -261,5 +261,5 @@ def compensation_of_dict(data: Mapping[str, Any], where: str = "compensation") -
     return made
 
 
-def _numbers(values: Sequence[Any]) -> tuple[float, ...]:
+def _number_tuple(values: Sequence[Any]) -> tuple[float, ...]:
     return tuple(float(v) for v in values)

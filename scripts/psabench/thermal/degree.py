@@ -31,10 +31,10 @@ def degree_rows(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degrees: Se
     Raises BadInput as fit_soak does, for the highest degree.
     """
     t_c, y = checked_readings(quantity, t_c, y, max(degrees))
-    return [_row(quantity, t_c, y, degree) for degree in degrees]
+    return [_degree_row(quantity, t_c, y, degree) for degree in degrees]
 
 
-def _row(quantity: str, t_c: Array, y: Array, degree: int) -> DegreeRow:
+def _degree_row(quantity: str, t_c: Array, y: Array, degree: int) -> DegreeRow:
     fit = fit_soak(quantity, t_c, y, degree)
     residual = y - fit.value_at(t_c)
     n, parameters = len(y), degree + 2  # the variance is one of them
@@ -54,7 +54,7 @@ def best_degree(rows: Sequence[DegreeRow]) -> int:
     return min(rows, key=lambda row: row.bic).degree
 
 
-def conditioning(t_c: npt.ArrayLike, degree: int) -> dict[str, float]:
+def condition_numbers(t_c: npt.ArrayLike, degree: int) -> dict[str, float]:
     """Condition number (2-norm) of the matrix of each form's fit at these temperatures, (n,)."""
     t_c = np.asarray(t_c, np.float64)
     low, high = float(t_c.min()), float(t_c.max())

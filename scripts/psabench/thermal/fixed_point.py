@@ -39,12 +39,12 @@ class FixedPoint:
         x = np.asarray((2 * t - self.low_mdegc - self.high_mdegc) * (1 << X_BITS)) // span
         after = last = np.zeros_like(x)
         for c in self.coefficients[:0:-1]:
-            after, last = c + _times(x, after, X_BITS - 1) - last, after
-        total = self.coefficients[0] + _times(x, after, X_BITS) - last
+            after, last = c + _rounded_product(x, after, X_BITS - 1) - last, after
+        total = self.coefficients[0] + _rounded_product(x, after, X_BITS) - last
         return np.asarray((total + (1 << (FINE_BITS - 1))) >> FINE_BITS)
 
 
-def _times(x: Integers, y: Integers, shift: int) -> Integers:
+def _rounded_product(x: Integers, y: Integers, shift: int) -> Integers:
     """Product, rounded to the nearest."""
     return np.asarray((x * y + (1 << (shift - 1))) >> shift)
 

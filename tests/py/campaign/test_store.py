@@ -208,7 +208,7 @@ def test_a_writer_that_is_killed_leaves_only_whole_parts(tmp_path: Path) -> None
 def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     path = tmp_path / "s"
     with Store(path) as store, sqlite3.connect(path, isolation_level=None) as other:
-        store._db.do("PRAGMA busy_timeout = 0")
+        store._db.execute_sql("PRAGMA busy_timeout = 0")
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(BadInput, match="database is locked"):
             store.put([part(0, 3)])

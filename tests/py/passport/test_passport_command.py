@@ -61,7 +61,7 @@ def test_a_calibration_enters_and_is_shown(tmp_path: Path, capsys: pytest.Captur
     assert run_passport(tmp_path, "show", "QA-1", "--all") == 0
     assert "run 1:" in capsys.readouterr().out
     with PassportStore(tmp_path / "p.sqlite", read_only=True) as store:
-        found = store.passport("QA-1").runs[0].covariance
+        found = store.read_passport("QA-1").runs[0].covariance
     assert found is not None
     assert found.names == ("u0_v", "kx_v_per_g")
     assert np.allclose(found.matrix, [[1e-12, 1e-12], [1e-12, 4e-12]])
@@ -85,7 +85,7 @@ def test_export_and_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     run = make_run(1)
     first = replace(run.quantities[0], compensation=fitted)
     with PassportStore(tmp_path / "p.sqlite") as store:
-        store.put("QA-1", "quartz", replace(run, quantities=(first, *run.quantities[1:])))
+        store.put_run("QA-1", "quartz", replace(run, quantities=(first, *run.quantities[1:])))
     out = tmp_path / "q.json"
     assert run_passport(tmp_path, "export", "QA-1", "--out", str(out)) == 0
     assert json.loads(out.read_text())["runs"][0]["estimates"][0]["compensation"]["low_c"] == -60

@@ -26,11 +26,11 @@ SEED = 27
 
 def test_what_is_read_is_what_was_entered(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "p") as store:
-        assert [store.put("QA-1", "quartz", make_run(n)) for n in (1, 2)] == [1, 2]
-        assert store.put("QA-1", "quartz", make_run(3, "reversal quiet")) == 3
+        assert [store.put_run("QA-1", "quartz", make_run(n)) for n in (1, 2)] == [1, 2]
+        assert store.put_run("QA-1", "quartz", make_run(3, "reversal quiet")) == 3
     with PassportStore(tmp_path / "p", read_only=True) as store:
-        p = store.passport("QA-1")
-        assert store.serials() == ["QA-1"]
+        p = store.read_passport("QA-1")
+        assert store.unit_serials() == ["QA-1"]
     all_entered = make_run(1), make_run(2), make_run(3, "reversal quiet")
     for entered, found, gone in zip(all_entered, p.runs, (None, 1, None), strict=True):
         assert found.supersedes == gone
@@ -47,15 +47,15 @@ def test_what_is_read_is_what_was_entered(tmp_path: Path) -> None:
 
 def test_the_same_data_enter_once(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "p") as store:
-        assert [store.put("QA-1", "quartz", make_run(n)) for n in (1, 2, 1, 2)] == [1, 2, 1, 2]
-        assert len(store.passport("QA-1").runs) == 2
-        assert store.put("QA-2", "quartz", make_run(1)) == 1  # of another unit: its own run
+        assert [store.put_run("QA-1", "quartz", make_run(n)) for n in (1, 2, 1, 2)] == [1, 2, 1, 2]
+        assert len(store.read_passport("QA-1").runs) == 2
+        assert store.put_run("QA-2", "quartz", make_run(1)) == 1  # of another unit: its own run
 
 
 def test_runs_by_name(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "p") as store:
-        store.put("QA@1", "quartz", make_run(1))
-        store.put("QA@1", "quartz", make_run(2))
+        store.put_run("QA@1", "quartz", make_run(1))
+        store.put_run("QA@1", "quartz", make_run(2))
         assert [find_run(store, n).number for n in ("QA@1@1", "QA@1@2")] == [1, 2]
         for name, says in (("QA@1@3", "a run of 1 to 2, got 3"), ("QB", "a serial number of the store, got QB")):
             with pytest.raises(BadInput, match=says):
@@ -66,9 +66,9 @@ def test_the_export_follows_its_schema(tmp_path: Path) -> None:
     schema = json.loads((CHECKOUT / "proto/passport.schema.json").read_text())
     Draft202012Validator.check_schema(schema)
     with PassportStore(tmp_path / "p") as store:
-        store.put("QA-1", "quartz", make_run(1))
-        store.put("QA-1", "quartz", replace(make_run(2), covariance=None, range_c=None, seed=None, within=None))
-        made = json.loads(json.dumps(passport_dict(store.passport("QA-1"))))
+        store.put_run("QA-1", "quartz", make_run(1))
+        store.put_run("QA-1", "quartz", replace(make_run(2), covariance=None, range_c=None, seed=None, within=None))
+        made = json.loads(json.dumps(passport_dict(store.read_passport("QA-1"))))
     validator = Draft202012Validator(schema)
     validator.validate(made)
     made["runs"][0]["estimates"][0]["ci95"] = [1.0]
@@ -84,7 +84,7 @@ from unit_runs import make_run
 with PassportStore(Path(sys.argv[1])) as store:
     print("open", flush=True)
     for n in range(1, 100_000):
-        store.put("QA-1", "quartz", make_run(n, count=40))
+        store.put_run("QA-1", "quartz", make_run(n, count=40))
         print(n, flush=True)
 """
 
@@ -108,7 +108,7 @@ def test_a_writer_that_is_killed_at_any_instant_leaves_whole_runs(tmp_path: Path
         told = max([told, *(int(line) for line in child.stdout if line.strip().isdigit())])
         assert child.wait() == -signal.SIGKILL
         with PassportStore(path, read_only=True) as store:
-            runs = store.passport("QA-1").runs
+            runs = store.read_passport("QA-1").runs
         assert len(runs) >= told, f"seed {SEED}"
         assert all(len(run.quantities) == 40 and run.covariance for run in runs)
         assert [run.number for run in runs] == list(range(1, len(runs) + 1))
@@ -153,41 +153,41 @@ def test_reading_makes_and_changes_nothing(tmp_path: Path) -> None:
         PassportStore(path, read_only=True)
     assert not path.exists()
     with PassportStore(path) as store:
-        store.put("QA-1", "quartz", make_run(1))
+        store.put_run("QA-1", "quartz", make_run(1))
     before = path.read_bytes()
     with PassportStore(path, read_only=True) as store, pytest.raises((BadInput, OutputError), match="readonly"):
-        store.put("QA-1", "quartz", make_run(2))
+        store.put_run("QA-1", "quartz", make_run(2))
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["p"]
 
 
 def put_many(store: PassportStore, count: int) -> None:
     for n in range(2, count):
-        store.put("QA-1", "quartz", make_run(n, count=40))
+        store.put_run("QA-1", "quartz", make_run(n, count=40))
 
 
 def test_a_full_disk_leaves_the_store_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "p"
     with PassportStore(path) as store:
-        store.put("QA-1", "quartz", make_run(1))
-        pages = store._db.value("PRAGMA page_count")
-        store._db.do(f"PRAGMA max_page_count = {pages}")
+        store.put_run("QA-1", "quartz", make_run(1))
+        pages = store._db.first_value("PRAGMA page_count")
+        store._db.execute_sql(f"PRAGMA max_page_count = {pages}")
         with pytest.raises(OutputError, match=r"full"):
             put_many(store, 50)
-        store._db.do("PRAGMA max_page_count = 1000000")
-        runs = store.passport("QA-1").runs
-        assert store.put("QA-1", "quartz", make_run(60)) == len(runs) + 1
+        store._db.execute_sql("PRAGMA max_page_count = 1000000")
+        runs = store.read_passport("QA-1").runs
+        assert store.put_run("QA-1", "quartz", make_run(60)) == len(runs) + 1
 
 
 @pytest.mark.parametrize("serial", ["", " QA", "QA\n1", "Q" * 65])
 def test_a_serial_number_is_short_and_printable(tmp_path: Path, serial: str) -> None:
     with PassportStore(tmp_path / "p") as store, pytest.raises(BadInput, match="serial number: expected"):
-        store.put(serial, "quartz", make_run(1))
+        store.put_run(serial, "quartz", make_run(1))
 
 
 def test_a_unit_keeps_its_type(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "p") as store:
-        store.put("QA-1", "quartz", make_run(1))
+        store.put_run("QA-1", "quartz", make_run(1))
         with pytest.raises(BadInput, match="QA-1: expected a unit of type quartz, got mems"):
-            store.put("QA-1", "mems", make_run(2))
-        assert len(store.passport("QA-1").runs) == 1
+            store.put_run("QA-1", "mems", make_run(2))
+        assert len(store.read_passport("QA-1").runs) == 1

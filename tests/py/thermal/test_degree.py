@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from psabench.thermal.degree import best_degree, conditioning, degree_rows
+from psabench.thermal.degree import best_degree, condition_numbers, degree_rows
 from quartz_units import HIGH_C, LOW_C, draw_unit
 
 SEED = 25
@@ -38,7 +38,7 @@ def test_residuals_by_degree_are_the_fact_sheets() -> None:
 
 
 def test_conditioning_is_the_fact_sheets() -> None:
-    found = conditioning(GRID_C, 6)
+    found = condition_numbers(GRID_C, 6)
     assert found["powers of °C"] == pytest.approx(1.7e11, rel=0.1)
     assert found["powers of K"] == pytest.approx(1.6e20, rel=0.5)  # beyond double precision: rounding makes it
     assert found["powers of scaled temperature"] == pytest.approx(99, rel=0.05)

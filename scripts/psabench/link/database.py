@@ -18,6 +18,7 @@ from psabench.errors import BadInput, expected, output_error
 from psabench.link.own import sqlite_error
 
 TIMEOUT_S = 60.0  # for another process that writes
+_TABLES = "SELECT count(*) FROM sqlite_schema"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,12 +42,12 @@ class Database(AbstractContextManager["Database"]):
         try:
             if not read_only:
                 path.parent.mkdir(parents=True, exist_ok=True)
-            where = f"{path.resolve().as_uri()}?mode={self._mode()}"
+            where = f"{path.resolve().as_uri()}?mode={self._open_mode()}"
             self._db = sqlite3.connect(where, uri=True, timeout=TIMEOUT_S, isolation_level=None)
         except (OSError, sqlite3.Error) as e:
             raise BadInput(expected(f"{kind.what} (SQLite)", e, path)) from e
         try:
-            self._prepare()
+            self._prepare_file()
         except BaseException:
             self._db.close()
             raise
@@ -57,58 +58,61 @@ class Database(AbstractContextManager["Database"]):
     def close(self) -> None:
         self._db.close()
 
-    def _mode(self) -> str:
+    def _open_mode(self) -> str:
         """How SQLite opens the file. To read it, it may have to undo what a writer that was killed had begun."""
         if not self.read_only:
             return "rwc"
         return "rw" if os.access(self.path, os.W_OK) else "ro"
 
-    def _prepare(self) -> None:
+    def _prepare_file(self) -> None:
         if self.read_only:
-            self.do("PRAGMA query_only = ON")
+            self.execute_sql("PRAGMA query_only = ON")
             self._check_kind(convert=False)
         else:
-            with self.transaction():
-                if self.value("PRAGMA application_id") == 0 and self.value("SELECT count(*) FROM sqlite_schema") == 0:
+            with self.whole_change():
+                if (
+                    self.first_value("PRAGMA application_id") == 0
+                    and self.first_value("SELECT count(*) FROM sqlite_schema") == 0
+                ):
                     self._carry_out(self.kind.schema)
-                    self.do(f"PRAGMA application_id = {self.kind.application}")
-                    self.do(f"PRAGMA user_version = {self.kind.format}")
+                    self.execute_sql(f"PRAGMA application_id = {self.kind.application}")
+                    self.execute_sql(f"PRAGMA user_version = {self.kind.format}")
                 self._check_kind(convert=True)
-        self.do("PRAGMA foreign_keys = ON")
+        self.execute_sql("PRAGMA foreign_keys = ON")
 
     def _check_kind(self, *, convert: bool) -> None:
         k = self.kind
-        if self.value("PRAGMA application_id") != k.application:
+        if self.first_value("PRAGMA application_id") != k.application:
             raise BadInput(expected(k.what, "an SQLite file of another program", self.path))
-        found = int(self.value("PRAGMA user_version"))
+        found = int(self.first_value("PRAGMA user_version"))
         while convert and found in k.conversions:
             self._carry_out(k.conversions[found])
             found += 1
-            self.do(f"PRAGMA user_version = {found}")
+            self.execute_sql(f"PRAGMA user_version = {found}")
         if found != k.format:
             raise BadInput(expected(f"{k.what} of format {k.format}", f"format {found}", self.path))
 
     def _carry_out(self, statements: str) -> None:
         for statement in statements.split(";\n"):
-            self.do(statement)
+            self.execute_sql(statement)
 
     @contextmanager
-    def transaction(self) -> Iterator[None]:
+    def whole_change(self) -> Iterator[None]:
         """All of a block, or nothing; takes the right to write at once, so that it cannot be rejected later."""
-        self.do("BEGIN IMMEDIATE")
+        self.execute_sql("BEGIN IMMEDIATE")
         try:
             yield
         except BaseException:
             if self._db.in_transaction:  # a full disk ends it by itself; report that error
-                self.do("ROLLBACK")
+                self.execute_sql("ROLLBACK")
             raise
-        self.do("COMMIT")
+        self.execute_sql("COMMIT")
 
-    def value(self, sql: str, *values: Any) -> Any:
+    def first_value(self, sql: str, *values: Any) -> Any:
         """The first column of the first row."""
-        return self.do(sql, *values).fetchone()[0]
+        return self.execute_sql(sql, *values).fetchone()[0]
 
-    def do(self, sql: str, *values: Any) -> sqlite3.Cursor:
+    def execute_sql(self, sql: str, *values: Any) -> sqlite3.Cursor:
         """Carry out one statement."""
         try:
             return self._db.execute(sql, values)
