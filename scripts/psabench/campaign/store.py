@@ -108,11 +108,8 @@ class Store(AbstractContextManager["Store"]):
         self.path = path
         self._db = Database(path, KIND)
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        self._db.close()
+    def __exit__(self, *error: object) -> None:
+        self._db.__exit__(*error)
 
     # ---- what there is
 

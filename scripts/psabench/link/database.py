@@ -53,9 +53,6 @@ class Database(AbstractContextManager["Database"]):
             raise
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
         self._db.close()
 
     def _open_mode(self) -> str:

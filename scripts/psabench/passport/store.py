@@ -130,8 +130,8 @@ class PassportStore(AbstractContextManager["PassportStore"]):
         self.path = path
         self._db = Database(path, KIND, read_only=read_only)
 
-    def __exit__(self, *_: object) -> None:
-        self._db.close()
+    def __exit__(self, *error: object) -> None:
+        self._db.__exit__(*error)
 
     # ---- what there is
 

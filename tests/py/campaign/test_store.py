@@ -155,7 +155,8 @@ def _foreign(path: Path) -> None:
 
 
 def _newer(path: Path) -> None:
-    Store(path).close()
+    with Store(path):
+        pass
     with sqlite3.connect(path) as db:
         db.execute(f"PRAGMA user_version = {KIND.format + 1}")
 
