@@ -1,5 +1,6 @@
 #include "base/draws.h"
 
+#include "base/lanes.h"
 #include "base/rng.h"
 
 #include <stdbool.h>
@@ -49,14 +50,37 @@ double draws_gauss(const struct draws *d, int64_t n)
     return rng_normal(draws_u64(d, n));
 }
 
+/* Blocks from number `block` on, the same arithmetic with either instruction for the product. The keys of the rounds are those of
+ * all blocks. */
+LANES_BODY void row_of_blocks(const struct draws *d, uint64_t block, unsigned blocks, uint64_t *out)
+{
+    const uint64_t key[ROUNDS] = {
+        d->key,           d->key + WEYL, d->key + 2 * WEYL, d->key + 3 * WEYL, d->key + 4 * WEYL, d->key + 5 * WEYL,
+        d->key + 6 * WEYL};
+    const uint64_t counter = d->high;
+    for (unsigned i = 0; i < blocks; i++, out += 2) {
+        uint64_t low = block + i, high = counter;
+#pragma GCC unroll 7
+        for (unsigned r = 0; r < ROUNDS; r++) {
+            const product p = (product)low * MULTIPLIER;
+            low = (uint64_t)(p >> 64) ^ key[r] ^ high;
+            high = (uint64_t)p;
+        }
+        out[0] = low;
+        out[1] = high;
+    }
+}
+
+LANES_BMI2 static void row_of_blocks_bmi2(const struct draws *d, uint64_t block, unsigned blocks, uint64_t *out)
+{
+    row_of_blocks(d, block, blocks, out);
+}
+
 void draws_row(const struct draws *d, int64_t first, unsigned n, uint64_t *out)
 {
-    unsigned i = 0;
-    if (n > 0 && (first & 1)) out[i++] = draws_u64(d, first);
-    for (; i + 1 < n; i += 2) {
-        const struct draws_pair p = block_at(d, (uint64_t)(first + i) >> 1);
-        out[i] = p.even;
-        out[i + 1] = p.odd;
-    }
-    if (i < n) out[i] = draws_u64(d, first + i);
+    const unsigned odd = n > 0 && (first & 1);
+    if (odd) out[0] = draws_u64(d, first);
+    if (lanes_bmi2()) row_of_blocks_bmi2(d, (uint64_t)(first + odd) >> 1, (n - odd) / 2, out + odd);
+    else row_of_blocks(d, (uint64_t)(first + odd) >> 1, (n - odd) / 2, out + odd);
+    if ((n - odd) & 1) out[n - 1] = draws_u64(d, first + n - 1);
 }

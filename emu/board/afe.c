@@ -1,6 +1,7 @@
 #include "board/afe.h"
 
 #include "base/detmath.h"
+#include "base/lanes.h"
 #include "base/sched.h"
 
 #include <assert.h>
@@ -103,12 +104,22 @@ static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_
 
 /* ---- a row */
 
-/* Signals to volts behind the buffer. Copies, which no store into the row can change. */
-static void load_row(const struct afe *a, double *row, unsigned n)
+/* Signals to volts behind the buffer. */
+LANES_BODY void load_row(const struct afe *a, double *row, unsigned n)
 {
     const double load = a->scale.load, offset_v = a->cfg.buffer_offset_v, drift_v = a->scale.drift_v;
     const double limit_v = a->cfg.clip_v;
-    for (unsigned i = 0; i < n; i++) row[i] = clip_v(row[i] * load + offset_v + drift_v, limit_v);
+    const lanes_f64 max_v = LANES_ALL(limit_v), min_v = LANES_ALL(-limit_v);
+    unsigned i = 0;
+    for (; i + LANES <= n; i += LANES) {
+        lanes_f64 v;
+        LANES_LOAD(v, row + i);
+        v = v * load + offset_v + drift_v;
+        v = LANES_PICK(v > max_v, max_v, v);
+        v = LANES_PICK(v < min_v, min_v, v);
+        LANES_STORE(row + i, v);
+    }
+    for (; i < n; i++) row[i] = clip_v(row[i] * load + offset_v + drift_v, limit_v);
 }
 
 /* The same with the faults that are before it. */
@@ -128,25 +139,53 @@ static void add_noise(const struct afe *a, double *row, const struct looks *at)
     for (unsigned i = 0; i < at->n; i++) row[i] += rms_v * draws_gauss(&a->noise, at->t_ns[i]);
 }
 
-/* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). At power-on it has long been
- * settled. */
-static void filter_row(struct afe *a, double *row, const struct looks *at)
+/* Whether all steps to and between n instants are those for which `keep` holds. A row of looks mostly is. */
+LANES_BODY bool same_steps(int64_t known_ns, int64_t last_ns, const int64_t *t_ns, unsigned n)
 {
-    const double divider = a->scale.divider;
-    double state_v = a->t_ns < 0 ? row[0] / divider : a->state_v;
-    double keep = a->keep;
-    int64_t last_ns = a->t_ns < 0 ? at->t_ns[0] : a->t_ns, known_ns = a->dt_ns;
+    const int64_t least_ns = known_ns - SAME_DT_NS, most_ns = known_ns + SAME_DT_NS;
+    const lanes_i64 least = LANES_ALL(least_ns), most = LANES_ALL(most_ns);
+    lanes_i64 other = {0};
+    if (least_ns <= 0 || !same_step(known_ns, t_ns[0] - last_ns)) return false;
+    unsigned i = 1;
+    for (; i + LANES <= n; i += LANES) {
+        lanes_i64 at, before;
+        LANES_LOAD(at, t_ns + i);
+        LANES_LOAD(before, t_ns + i - 1);
+        other |= (at - before < least) | (at - before > most);
+    }
+    for (; i < n; i++) other[0] |= !same_step(known_ns, t_ns[i] - t_ns[i - 1]);
+    return !(other[0] | other[1] | other[2] | other[3]);
+}
+
+LANES_BODY void divide_row(double *row, double by, unsigned n)
+{
+    unsigned i = 0;
+    for (; i + LANES <= n; i += LANES) {
+        lanes_f64 v;
+        LANES_LOAD(v, row + i);
+        v /= by;
+        LANES_STORE(row + i, v);
+    }
+    for (; i < n; i++) row[i] /= by;
+}
+
+static inline double pass_pole(double state_v, double v, double keep)
+{
+    const double off_v = (state_v - v) * keep;
+    return fabs(off_v) < GONE_V ? v : v + off_v;
+}
+
+/* One pole, exact for an input that is held over the step: s <- x + (s - x) exp(-2 pi f dt). At power-on it has long been
+ * settled. row: behind the divider. */
+static void filter_any(struct afe *a, double *row, const struct looks *at)
+{
+    double state_v = a->t_ns < 0 ? row[0] : a->state_v;
+    int64_t last_ns = a->t_ns < 0 ? at->t_ns[0] : a->t_ns;
     for (unsigned i = 0; i < at->n; i++) {
         const int64_t dt_ns = at->t_ns[i] - last_ns;
         if (dt_ns > 0) {
-            const double v = row[i] / divider;
-            if (!same_step(known_ns, dt_ns)) {
-                set_step(a, dt_ns);
-                known_ns = dt_ns;
-                keep = a->keep;
-            }
-            const double off_v = (state_v - v) * keep;
-            state_v = fabs(off_v) < GONE_V ? v : v + off_v;
+            if (!same_step(a->dt_ns, dt_ns)) set_step(a, dt_ns);
+            state_v = pass_pole(state_v, row[i], a->keep);
             last_ns = at->t_ns[i];
         }
         row[i] = state_v;
@@ -155,13 +194,41 @@ static void filter_row(struct afe *a, double *row, const struct looks *at)
     a->t_ns = last_ns;
 }
 
+static void filter_even(struct afe *a, double *row, const struct looks *at)
+{
+    const double keep = a->keep;
+    double state_v = a->state_v;
+#pragma GCC unroll 4
+    for (unsigned i = 0; i < at->n; i++) row[i] = state_v = pass_pole(state_v, row[i], keep);
+    a->state_v = state_v;
+    a->t_ns = at->t_ns[at->n - 1];
+}
+
+LANES_BODY void filter_row(struct afe *a, double *row, const struct looks *at)
+{
+    divide_row(row, a->scale.divider, at->n);
+    if (a->t_ns >= 0 && same_steps(a->dt_ns, a->t_ns, at->t_ns, at->n)) filter_even(a, row, at);
+    else filter_any(a, row, at);
+}
+
+LANES_BODY void pass_row(struct afe *a, double *row, const struct looks *at)
+{
+    if (a->faults) faulty_row(a, row, at);
+    else load_row(a, row, at->n);
+    if (a->cfg.noise_v_rthz > 0.0) add_noise(a, row, at);
+    filter_row(a, row, at);
+}
+
+LANES_AVX2 static void pass_row_avx2(struct afe *a, double *row, const struct looks *at)
+{
+    pass_row(a, row, at);
+}
+
 void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const struct looks *at)
 {
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
-    if (a->faults) faulty_row(a, signal_to_v, at);
-    else load_row(a, signal_to_v, at->n);
-    if (a->cfg.noise_v_rthz > 0.0) add_noise(a, signal_to_v, at);
-    filter_row(a, signal_to_v, at);
+    if (lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
+    else pass_row(a, signal_to_v, at);
     for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] /= apply_faults(a, 0.0, at->t_ns[i]).reference;
 }
 

@@ -1,6 +1,7 @@
 #include "chip/ads1282/internal.h"
 
 #include "base/bits.h"
+#include "chip/ads1282/input.h"
 
 #include <math.h>
 #include <string.h>
@@ -14,7 +15,6 @@
 #define SINC_LAG          4 /* a word of the sinc needs five blocks */
 #define MCLK_TCLK         4 /* a clock of the modulator */
 
-#define FS_LSB  (INT64_C(1) << ADS1282_BLOCK_LOG2)
 #define DRAW_SD 37837.227475000000 /* of the sum of four uniform 16-bit numbers: sqrt((2^32 - 1) / 3) */
 
 unsigned ads1282_sinc_ratio(const struct ads1282 *a)
@@ -50,26 +50,9 @@ static bool at_modulator_rate(const struct ads1282 *a)
 
 /* ---- Input ---- */
 
-/* Volts, as a number of full scale 2^34, to the modulator, which saturates. Rounds to nearest without a call into libm. */
-static int64_t saturate_lsb(double x)
-{
-    const double max = ADS1282_SATURATION * (double)FS_LSB;
-    if (!(x < max)) x = max; /* not a number saturates too */
-    if (x < -max) x = -max;
-    return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
-}
-
 static int64_t saturate_input(struct ads1282 *a, double x)
 {
-    return a->last_lsb = saturate_lsb(x);
-}
-
-/* Zero mean, unit rms after division by DRAW_SD. Four uniforms are enough: the chain averages more than 50 blocks, which
- * leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
-static inline double sum_draw(uint64_t u)
-{
-    const uint64_t pairs = (u & UINT64_C(0x0000FFFF0000FFFF)) + (u >> 16 & UINT64_C(0x0000FFFF0000FFFF));
-    return (double)(int32_t)((pairs & 0xFFFFFFFF) + (pairs >> 32)) - 131070.0;
+    return a->last_lsb = ads1282_saturate_lsb(x);
 }
 
 static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
@@ -105,7 +88,7 @@ static int64_t noisy_input(struct ads1282 *a)
 {
     double x = input_v(a) * a->lsb_per_v;
     const struct draws noise = step_draws(a);
-    if (a->noise_lsb > 0.0) x += a->noise_lsb * sum_draw(draws_u64(&noise, draw_number(a, a->next.k)));
+    if (a->noise_lsb > 0.0) x += a->noise_lsb * ads1282_sum_draw(draws_u64(&noise, draw_number(a, a->next.k)));
     return saturate_input(a, x);
 }
 
@@ -122,17 +105,11 @@ static void next_sample(struct ads1282 *a)
 static void modulate_block(struct ads1282 *a, int64_t edge, const double *vin_v, unsigned n, int64_t *lsb)
 {
     uint64_t u[ADS1282_BLOCKS];
-    const double lsb_per_v = a->lsb_per_v, noise_lsb = a->noise_lsb;
-    const bool noisy = noise_lsb > 0.0;
+    const bool noisy = a->noise_lsb > 0.0;
     const struct draws noise = step_draws(a);
-    int64_t last = a->last_lsb;
     if (noisy) draws_row(&noise, draw_number(a, edge), n, u);
-    for (unsigned i = 0; i < n; i++) {
-        double x = vin_v[i] * lsb_per_v;
-        if (noisy) x += noise_lsb * sum_draw(u[i]);
-        lsb[i] = last = saturate_lsb(x);
-    }
-    a->last_lsb = last;
+    ads1282_input_row((struct ads1282_scale){a->lsb_per_v, a->noise_lsb}, vin_v, noisy ? u : NULL, n, lsb);
+    a->last_lsb = lsb[n - 1];
 }
 
 /* n instants from next on; the one after them. */

@@ -56,72 +56,105 @@ void ads1282_mod_start(const struct ads1282_mod *m, struct ads1282_cic *c)
     c->integrator[1] = (uint64_t)-last;
 }
 
-/* What a clock adds by its bits: 1 for M0 = -1 and 2 for M1 = -1; from ONE_BIT on M0 alone. No branch could be foretold. */
-#define ONE ADS1282_MOD_ONE
-enum { ONE_BIT = 4 };
-static const struct {
-    int64_t second0[4];                   /* to an integrator of the loops: -3 m0 - m1 */
-    int64_t early[6], late0[6], late1[6]; /* to those of the sinc: M0, 3 M0, 9 M1 */
-} add = {{-12 * ONE, -6 * ONE, 6 * ONE, 12 * ONE}, {1, -1, 1, -1, 1, -1}, {3, -3, 3, -3, 0, 0}, {9, 9, -9, -9, 0, 0}};
+/* Signs of the clocks of a run and before it, bit 0 the newest: set where the bit is -1. */
+struct signs {
+    uint64_t m0, m1;
+};
 
-/* -feedback of a positive bit, or of a negative one. By mask, and added last: the next clock waits for
- * it, and for a table it would wait longer. */
-static inline int64_t feed_back(uint64_t negative, int64_t feedback)
+static struct signs recall_signs(const struct ads1282_mod *m)
 {
-    return (int64_t)(-negative & (uint64_t)(2 * feedback)) - feedback;
+    return (struct signs){~m->m0 & 0x1F, ~m->m1 & 0x1F};
 }
 
-/* As ads1282_mod_step(). */
-static void run_loops(struct ads1282_mod *m, const int64_t *x, unsigned n, uint8_t *bits)
+static void keep_signs(struct ads1282_mod *m, const struct signs *s)
 {
-    int64_t f0 = m->first[0], f1 = m->first[1], s0 = m->second[0], s1 = m->second[1];
+    m->m0 = ~s->m0 & 0x1F;
+    m->m1 = ~s->m1 & 0x1F;
+}
+
+/* As ads1282_mod_step(), modulo 2^64. No branch could be foretold: a negative bit is a mask, and what both signs feed back is in
+ * constants. */
+static struct signs run_loops(struct ads1282_mod *m, const int64_t *x, unsigned n, struct signs s)
+{
+    const uint64_t one = (uint64_t)ADS1282_MOD_ONE;
+    uint64_t f0 = (uint64_t)m->first[0], f1 = (uint64_t)m->first[1];
+    uint64_t s0 = (uint64_t)m->second[0], s1 = (uint64_t)m->second[1];
 #pragma GCC unroll 4
     for (unsigned i = 0; i < n; i++) {
-        const uint64_t b0 = (uint64_t)(DAMPING * f0 + f1) >> 63, b1 = (uint64_t)s1 >> 63;
-        bits[i] = (uint8_t)(b0 + 2 * b1);
-        s1 += s0;
-        s1 += feed_back(b1, 18 * ONE);
-        s0 += f1 + add.second0[b0 + 2 * b1];
+        const uint64_t sum = DAMPING * f0 + f1;
+        const uint64_t all0 = -(sum >> 63), all1 = -(s1 >> 63), back0 = all0 & 2 * one, back1 = all1 & 18 * one;
+        s.m0 = 2 * s.m0 - all0;
+        s.m1 = 2 * s.m1 - all1;
+        s1 += s0 - 18 * one + 2 * back1;
+        s0 += f1 - 12 * one + 3 * back0 + back1;
         f1 += f0;
-        f0 += x[i];
-        f0 += feed_back(b0, ONE);
+        f0 += (uint64_t)x[i] - one + back0;
     }
-    m->first[0] = f0, m->first[1] = f1, m->second[0] = s0, m->second[1] = s1;
+    const uint64_t first[2] = {f0, f1}, second[2] = {s0, s1};
+    memcpy(m->first, first, sizeof first); /* two's complement, whatever the compiler makes of a cast */
+    memcpy(m->second, second, sizeof second);
+    return s;
 }
 
-/* bits[-4] is the oldest that counts. */
-static void integrate_bits(struct ads1282_cic *c, unsigned n, const uint8_t *bits)
-{
-    uint64_t i0 = c->integrator[0], i1 = c->integrator[1], i2 = c->integrator[2], i3 = c->integrator[3],
-             i4 = c->integrator[4];
-#pragma GCC unroll 4
-    for (const uint8_t *b = bits; b < bits + n; b++) {
-        i0 += (uint64_t)add.early[b[-4]];
-        i1 += i0;
-        i2 += i1 + (uint64_t)add.late0[b[-2]] + (uint64_t)add.late1[b[0]];
-        i3 += i2;
-        i4 += i3;
+/* ---- Eight clocks of the integrators at once ---- */
+
+/* What signs of eight clocks, bit 0 the newest, add to an integrator and to the four behind it: a clock j ago counts once in the
+ * first, and (j + k over k) times in the one k behind. */
+#define SIGN(p, j) ((p) >> (j)&1 ? -1 : 1)
+#define WEIGH(p, a, b, c, d, e, f, g, h)                                                                               \
+    (SIGN(p, 0) * (a) + SIGN(p, 1) * (b) + SIGN(p, 2) * (c) + SIGN(p, 3) * (d) + SIGN(p, 4) * (e) + SIGN(p, 5) * (f) + \
+     SIGN(p, 6) * (g) + SIGN(p, 7) * (h))
+#define ROW(p)                                                                                                         \
+    {                                                                                                                  \
+        WEIGH(p, 1, 1, 1, 1, 1, 1, 1, 1), WEIGH(p, 1, 2, 3, 4, 5, 6, 7, 8), WEIGH(p, 1, 3, 6, 10, 15, 21, 28, 36),     \
+            WEIGH(p, 1, 4, 10, 20, 35, 56, 84, 120), WEIGH(p, 1, 5, 15, 35, 70, 126, 210, 330)                         \
     }
-    const uint64_t sum[5] = {i0, i1, i2, i3, i4};
-    memcpy(c->integrator, sum, sizeof sum);
+#define ROWS_4(p)  ROW(p), ROW((p) + 1), ROW((p) + 2), ROW((p) + 3)
+#define ROWS_16(p) ROWS_4(p), ROWS_4((p) + 4), ROWS_4((p) + 8), ROWS_4((p) + 12)
+#define ROWS_64(p) ROWS_16(p), ROWS_16((p) + 16), ROWS_16((p) + 32), ROWS_16((p) + 48)
+
+static const int64_t added[256][5] = {ROWS_64(0), ROWS_64(64), ROWS_64(128), ROWS_64(192)};
+
+/* M0 into the first integrator, u into the third; signs whose bit 0 is the newest of the eight clocks. */
+static inline void integrate_eight(uint64_t i[5], struct signs s, bool one_bit)
+{
+    const int64_t *early = added[s.m0 >> 4 & 0xFF], *late0 = added[s.m0 >> 2 & 0xFF], *late1 = added[s.m1 & 0xFF];
+    const uint64_t i0 = i[0], i1 = i[1], i2 = i[2], i3 = i[3];
+    const uint64_t late = one_bit ? 0 : 3;
+    i[0] = i0 + (uint64_t)early[0];
+    i[1] += 8 * i0 + (uint64_t)early[1];
+    i[2] += 8 * i1 + 36 * i0 + (uint64_t)early[2] + late * (uint64_t)(late0[0] + 3 * late1[0]);
+    i[3] += 8 * i2 + 36 * i1 + 120 * i0 + (uint64_t)early[3] + late * (uint64_t)(late0[1] + 3 * late1[1]);
+    i[4] += 8 * i3 + 36 * i2 + 120 * i1 + 330 * i0 + (uint64_t)early[4] + late * (uint64_t)(late0[2] + 3 * late1[2]);
+}
+
+/* The same of the newest clock alone. */
+static void integrate_one(uint64_t i[5], struct signs s, bool one_bit)
+{
+    const uint64_t late = one_bit ? 0 : 3 * (1 - 2 * (s.m0 >> 2 & 1)) + 9 * (1 - 2 * (s.m1 & 1));
+    i[0] += 1 - 2 * (s.m0 >> 4 & 1);
+    i[1] += i[0];
+    i[2] += i[1] + late;
+    i[3] += i[2];
+    i[4] += i[3];
+}
+
+/* The n newest clocks. */
+static void integrate_bits(struct ads1282_cic *c, unsigned n, struct signs s, bool one_bit)
+{
+    uint64_t i[5];
+    memcpy(i, c->integrator, sizeof i);
     c->n += n;
-}
-
-/* Those of the last clocks, in the place before the next. */
-static uint8_t *recall_bits(const struct ads1282_mod *m, unsigned kind, uint8_t bits[ADS1282_MOD_DELAY])
-{
-    for (unsigned i = 0; i < ADS1282_MOD_DELAY; i++)
-        bits[ADS1282_MOD_DELAY - 1 - i] = (uint8_t)(kind | !(m->m0 >> i & 1));
-    return bits + ADS1282_MOD_DELAY;
+    for (; n >= 8; n -= 8) integrate_eight(i, (struct signs){s.m0 >> (n - 8), s.m1 >> (n - 8)}, one_bit);
+    while (n-- > 0) integrate_one(i, (struct signs){s.m0 >> n, s.m1 >> n}, one_bit);
+    memcpy(c->integrator, i, sizeof i);
 }
 
 void ads1282_mod_run(struct ads1282_mod *m, struct ads1282_cic *c, const int64_t *x, unsigned n)
 {
-    uint8_t room[ADS1282_MOD_DELAY + ADS1282_MOD_RUN];
-    uint8_t *bits = recall_bits(m, 0, room);
-    run_loops(m, x, n, bits);
-    integrate_bits(c, n, bits);
-    for (unsigned i = n < 5 ? 0 : n - 5; i < n; i++) push_bits(m, !(bits[i] & 1), !(bits[i] & 2));
+    const struct signs s = run_loops(m, x, n, recall_signs(m));
+    integrate_bits(c, n, s, false);
+    keep_signs(m, &s);
 }
 
 void ads1282_mod_take(struct ads1282_mod *m, uint8_t bits)
@@ -131,10 +164,11 @@ void ads1282_mod_take(struct ads1282_mod *m, uint8_t bits)
 
 void ads1282_mod_play(struct ads1282_mod *m, struct ads1282_cic *c, const uint8_t *bits, unsigned n, bool one_bit)
 {
-    uint8_t room[ADS1282_MOD_DELAY + ADS1282_MOD_RUN];
-    const unsigned kind = one_bit ? ONE_BIT : 0, used = one_bit ? 1 : 3;
-    uint8_t *negative = recall_bits(m, kind, room);
-    for (unsigned i = 0; i < n; i++) negative[i] = (uint8_t)(kind | (~bits[i] & used));
-    integrate_bits(c, n, negative);
-    for (unsigned i = n < 5 ? 0 : n - 5; i < n; i++) ads1282_mod_take(m, bits[i]);
+    struct signs s = recall_signs(m);
+    for (unsigned i = 0; i < n; i++) {
+        s.m0 = s.m0 << 1 | !(bits[i] & 1);
+        s.m1 = s.m1 << 1 | !(bits[i] & 2);
+    }
+    integrate_bits(c, n, s, one_bit);
+    keep_signs(m, &s);
 }

@@ -1,0 +1,3 @@
+#include "base/lanes.h"
+
+bool lanes_plain;
