@@ -76,6 +76,7 @@ static void fall_asleep(struct psa2 *b, int64_t t_ns)
     b->lazy.sleep = PSA2_ASLEEP;
     b->lazy.span_ns = span_ns(b, t_ns);
     b->lazy.temp_ns = 0;
+    psa2_cycle_begin(b);
     b->base.sched->asleep++;
 }
 
@@ -87,10 +88,21 @@ static int64_t earlier_ns(int64_t at_ns, const struct sched_ev *e)
 /* What the board does next but for reading accelerometers. */
 static int64_t next_own_ns(const struct psa2 *b)
 {
-    int64_t at_ns = b->timeout.due_ns;
-    at_ns = earlier_ns(at_ns, &b->temp.timeout);
+    int64_t at_ns = earlier_ns(SCHED_NEVER, &b->temp.timeout);
     at_ns = earlier_ns(at_ns, &b->tadc.ready_ev);
     return earlier_ns(at_ns, &b->tadc.cal_ev);
+}
+
+/* The timeout of data-ready, where frames have been skipped beyond it: each time it would have found that a data-ready came
+ * before, and waited on from that. drd_a: of the last frame before those that were skipped. */
+static void pass_timeouts(struct psa2 *b, struct clk_pos drd_a)
+{
+    int64_t due_ns = b->timeout.due_ns;
+    while (due_ns <= b->drd_a_ns) {
+        drd_a = clk_on_to(drd_a, &b->adc[0].period_step, due_ns - 1);
+        due_ns = psa2_timeout_ns(b, drd_a.t_ns);
+    }
+    if (due_ns != b->timeout.due_ns) sched_at(b->base.sched, &b->timeout, due_ns);
 }
 
 /* All frames that are over before an instant. */
@@ -98,12 +110,14 @@ static void skip_frames(struct psa2 *b, int64_t before_ns)
 {
     const struct ads1282 *x = &b->adc[0];
     const int64_t n = (before_ns - b->lazy.span_ns - b->drd_a_ns) / (b->period_ns + 1);
+    const struct clk_pos drd_a = x->ended;
     if (n <= 0) return;
     for (unsigned i = 0; i < 3; i++) ads1282_skip(&b->adc[i], (uint32_t)n);
     b->timeout_ns += x->ended.t_ns - b->drd_a_ns;
     b->drd_a_ns = x->ended.t_ns;
     b->seq += (uint32_t)n;
     b->counters.frames += (uint32_t)n;
+    pass_timeouts(b, drd_a);
 }
 
 /* ---- awake again ---- */

@@ -95,9 +95,14 @@ bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns)
     return !psa2_flowing(b, t_ns) || psa2_in_time(b, b->drd_a_ns, t_ns + span_ns) || !psa2_fits(b, span_ns);
 }
 
+int64_t psa2_timeout_ns(const struct psa2 *b, int64_t drd_a_ns)
+{
+    return drd_a_ns + PSA2_TIMEOUT_NS + ads1282_settle_ns(&b->adc[0]);
+}
+
 void psa2_arm_timeout(struct psa2 *b, int64_t t_ns)
 {
-    b->timeout_ns = t_ns + PSA2_TIMEOUT_NS + ads1282_settle_ns(&b->adc[0]);
+    b->timeout_ns = psa2_timeout_ns(b, t_ns);
     if (!b->timeout.queued || b->timeout.due_ns > b->timeout_ns) sched_at(b->base.sched, &b->timeout, b->timeout_ns);
 }
 

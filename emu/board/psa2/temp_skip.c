@@ -67,6 +67,44 @@ static bool next_run(struct scan *s, int64_t until_ns)
     return true;
 }
 
+/* What has been on the port is over by the reading before the next word: later conversions follow from where this one began. */
+static bool follows_from_start(const struct scan *s)
+{
+    const int64_t byte_ns = clk_on(s->past.first, &s->b->spi.byte).t_ns;
+    const int64_t over_ns = ns_later(byte_ns, ns_later(s->past.ready_ns[PSA2_ACCEL], s->past.ready_ns[PSA2_TEMP]));
+    return over_ns + 2 * s->b->period_ns + 2 < s->run.ready_ns;
+}
+
+/* As many conversions as are known to come; the last ones are left to be followed. */
+static uint32_t pass_known(struct scan *s, int64_t last_ns)
+{
+    const struct ads1256 *a = &s->b->tadc;
+    const int64_t until_ns = last_ns - ads1256_settle_ns(a) - 6 * s->b->period_ns;
+    int64_t start_tau = s->run.start_tau;
+    if (until_ns <= s->run.ready_ns || !follows_from_start(s)) return 0;
+    const uint32_t n = psa2_cycle_pass(&s->b->lazy.cycle, &start_tau, clk_count_at(&a->clkin, until_ns));
+    if (n > 0) s->run = ads1256_run_from(a, clk_edge_ns(&a->clkin, start_tau));
+    return n;
+}
+
+static void note_run(const struct scan *s, struct psa2_cycle *c)
+{
+    if (follows_from_start(s)) psa2_cycle_note(c, s->run.start_tau);
+    else psa2_cycle_break(c);
+}
+
+/* To the last conversion that begins by last_ns: how many were passed. */
+static uint32_t follow_runs(struct scan *s, struct psa2_cycle *c, int64_t last_ns)
+{
+    struct scan next = *s;
+    uint32_t n = 0;
+    const uint32_t known = pass_known(&next, last_ns);
+    psa2_cycle_break(c);
+    note_run(&next, c);
+    for (; next_run(&next, last_ns); n++, note_run(s, c)) *s = next;
+    return n > 0 ? known + n : 0;
+}
+
 /* From the begin of a conversion on: each channel once, and to the frame that has the last code. */
 static int64_t turn_ns(const struct psa2 *b)
 {
@@ -94,10 +132,9 @@ void psa2_temp_skip(struct psa2 *b, int64_t until_ns)
     const int64_t last_ns = ns_earlier(until_ns, ahead_ns) - turn;
     if (b->profile.temp_channels == 0 || last_ns <= b->tadc.ready_ev.due_ns) return;
     const struct burst write = burst_of(b, psa2_temp_write_mux(b, 0)), read = burst_of(b, psa2_temp_read_data(b));
-    struct scan s = {b, &write, &read, b->spi.past, b->adc[0].ended, .run = ads1256_run_now(&b->tadc)}, next = s;
+    struct scan s = {b, &write, &read, b->spi.past, b->adc[0].ended, .run = ads1256_run_now(&b->tadc)};
     if (!may_skip(b, &s)) return;
-    uint32_t n = 0;
-    for (; next_run(&next, last_ns); n++) s = next;
+    const uint32_t n = follow_runs(&s, &b->lazy.cycle, last_ns);
     if (n == 0) return;
     begin_run(b, n, &s);
     b->lazy.temp_ns = last_ns + turn;
