@@ -20,8 +20,8 @@ void psa2_pulse_stop(struct psa2 *b, int64_t t_ns);
 bool psa2_window(const struct psa2 *b, int64_t span_ns, int64_t t_ns);
 bool psa2_in_time(const struct psa2 *b, int64_t drd_a_ns, int64_t end_ns); /* before the next DRD_A, and its margin */
 bool psa2_fits(const struct psa2 *b, int64_t span_ns);                     /* a period is long enough for them */
-int64_t psa2_sync_t_ns(const struct psa2 *b, int64_t t_ns); /* a pulse on SYNC_T that is asked for now is over */
-bool psa2_flowing(const struct psa2 *b, int64_t t_ns);      /* DRD_A came within the last two periods */
+int64_t psa2_sync_t_ns(const struct psa2 *b, int64_t t_ns);      /* a pulse on SYNC_T that is asked for now is over */
+bool psa2_flowing(const struct psa2 *b, int64_t t_ns);           /* DRD_A came within the last two periods */
 int64_t psa2_timeout_ns(const struct psa2 *b, int64_t drd_a_ns); /* it is a fault if the next has not come by then */
 void psa2_arm_timeout(struct psa2 *b, int64_t t_ns);
 void psa2_pulse(struct psa2 *b, enum psa2_group group, void (*done)(struct psa2 *b, int64_t t_ns), int64_t t_ns);
@@ -55,14 +55,16 @@ uint8_t psa2_temp_mux(unsigned channel);
 double psa2_temp_v(const struct psa2 *b, double temp_degc); /* at the input of the converter */
 double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns);
 
-/* psa2/temp_cycle.c: where the scan repeats itself. start_tau: where a conversion begins, from which all later ones follow. */
-void psa2_cycle_begin(struct psa2 *b);                              /* nothing is known of it */
-void psa2_cycle_note(struct psa2_cycle *c, int64_t start_tau);      /* the next conversion in a row */
-void psa2_cycle_break(struct psa2_cycle *c);                        /* the next one noted begins a row */
-/* From a conversion to a later one that begins by until_tau: how many were passed; 0: none, or it is not of the cycle. */
-uint32_t psa2_cycle_pass(const struct psa2_cycle *c, int64_t *start_tau, int64_t until_tau);
+/* psa2/temp_cycle.c: where the scan repeats itself. */
+void psa2_cycle_begin(struct psa2 *b);                            /* nothing is known of it */
+void psa2_cycle_note(struct psa2_cycle *c, struct psa2_start at); /* the next conversion in a row */
+void psa2_cycle_break(struct psa2_cycle *c);                      /* the next one noted begins a row */
+/* From the conversion that begins at at->tau to the last that begins by until_ns: how many were passed. 0: none, or it is not
+ * of the cycle. */
+uint32_t psa2_cycle_pass(const struct psa2_cycle *c, struct psa2_start *at, int64_t until_ns);
 
 /* psa2/temp_skip.c */
+void psa2_temp_skip_init(struct psa2 *b);
 /* Conversions that no one looks at before until_ns, from where on codes are true. */
 void psa2_temp_skip(struct psa2 *b, int64_t until_ns);
 

@@ -199,6 +199,7 @@ void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)
 
 void psa2_lazy_stop(struct psa2 *b)
 {
+    sched_cancel(b->base.sched, &b->lazy.again);
     b->base.sched->asleep -= b->lazy.sleep != PSA2_AWAKE;
-    b->lazy = (struct psa2_lazy){.sleep = PSA2_AWAKE};
+    b->lazy = (struct psa2_lazy){.sleep = PSA2_AWAKE, .again = b->lazy.again};
 }

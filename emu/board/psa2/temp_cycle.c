@@ -54,49 +54,53 @@ void psa2_cycle_begin(struct psa2 *b)
 
 void psa2_cycle_break(struct psa2_cycle *c)
 {
-    if (c->span_tau == 0) c->n = 0;
+    if (c->span.tau == 0) c->n = 0;
 }
 
-/* From place i on. */
-static void close_cycle(struct psa2_cycle *c, unsigned i, int64_t span_tau)
+static void close_cycle(struct psa2_cycle *c, unsigned from, struct psa2_start next)
 {
-    const int64_t from_tau = c->off_tau[i];
-    c->n -= i;
-    c->first_tau += from_tau;
-    c->span_tau = span_tau;
-    for (unsigned k = 0; k < c->n; k++) c->off_tau[k] = c->off_tau[k + i] - from_tau;
+    c->span = (struct psa2_start){next.tau - c->at[from].tau, next.sync_ns - c->at[from].sync_ns};
+    c->n -= from;
+    for (unsigned i = 0; i < c->n; i++) c->at[i] = c->at[i + from];
 }
 
-void psa2_cycle_note(struct psa2_cycle *c, int64_t start_tau)
+/* One that was noted, whole units before; n: none. */
+static unsigned find_place(const struct psa2_cycle *c, int64_t start_tau, int64_t unit_tau)
 {
-    if (c->unit_tau == 0 || c->span_tau > 0 || c->n >= PSA2_CYCLE_MAX) return;
-    if (c->n == 0) c->first_tau = start_tau;
-    const int64_t off_tau = start_tau - c->first_tau;
-    for (unsigned i = 0; i < c->n; i++) {
-        const int64_t span_tau = off_tau - c->off_tau[i];
-        if (span_tau % c->unit_tau != 0) continue;
-        close_cycle(c, i, span_tau);
+    unsigned i = 0;
+    while (i < c->n && (start_tau - c->at[i].tau) % unit_tau != 0) i++;
+    return i;
+}
+
+void psa2_cycle_note(struct psa2_cycle *c, struct psa2_start at)
+{
+    if (c->unit_tau == 0 || c->span.tau > 0) return;
+    const unsigned i = find_place(c, at.tau, c->unit_tau);
+    if (i < c->n) {
+        close_cycle(c, i, at);
         return;
     }
-    c->off_tau[c->n++] = off_tau;
+    if (c->n == PSA2_CYCLE_MAX) c->n = 0; /* it may begin later */
+    c->at[c->n++] = at;
 }
 
-uint32_t psa2_cycle_pass(const struct psa2_cycle *c, int64_t *start_tau, int64_t until_tau)
+uint32_t psa2_cycle_pass(const struct psa2_cycle *c, struct psa2_start *at, int64_t until_ns)
 {
-    if (c->span_tau == 0 || until_tau <= *start_tau) return 0;
-    const int64_t off_tau = (*start_tau - c->first_tau) % c->span_tau;
-    unsigned i = 0;
-    while (i < c->n && c->off_tau[i] != off_tau) i++;
-    if (i == c->n) return 0;
-    const int64_t left_tau = until_tau - *start_tau, cycles = left_tau / c->span_tau;
-    const int64_t most_tau = off_tau + left_tau - cycles * c->span_tau; /* of the last cycle, which may reach into another */
-    unsigned k = i, turned = 0;
-    for (;;) {
-        const unsigned next = k + 1 < c->n ? k + 1 : 0;
-        if (c->off_tau[next] + (next == 0 || turned) * c->span_tau > most_tau) break;
-        turned |= next == 0;
-        k = next;
+    if (c->span.tau == 0) return 0;
+    const unsigned from = find_place(c, at->tau, c->span.tau);
+    if (from == c->n) return 0;
+    const int64_t before = (at->tau - c->at[from].tau) / c->span.tau; /* cycles */
+    const int64_t left_ns = until_ns - c->at[from].sync_ns - before * c->span.sync_ns;
+    if (left_ns < 0) return 0;
+    int64_t turns = before + left_ns / c->span.sync_ns;
+    unsigned i = from, passed = 0;
+    for (;; passed++) {
+        const bool wraps = i + 1 == c->n;
+        const unsigned next = wraps ? 0 : i + 1;
+        if (c->at[next].sync_ns + (turns + wraps) * c->span.sync_ns > until_ns) break;
+        turns += wraps;
+        i = next;
     }
-    *start_tau += cycles * c->span_tau + c->off_tau[k] + turned * c->span_tau - off_tau;
-    return (uint32_t)(cycles * c->n) + k + turned * c->n - i;
+    *at = (struct psa2_start){c->at[i].tau + turns * c->span.tau, c->at[i].sync_ns + turns * c->span.sync_ns};
+    return (uint32_t)(left_ns / c->span.sync_ns) * c->n + passed;
 }

@@ -75,21 +75,20 @@ static bool follows_from_start(const struct scan *s)
     return over_ns + 2 * s->b->period_ns + 2 < s->run.ready_ns;
 }
 
-/* As many conversions as are known to come; the last ones are left to be followed. */
-static uint32_t pass_known(struct scan *s, int64_t last_ns)
+static uint32_t pass_known(struct scan *s, const struct psa2_cycle *c, int64_t last_ns)
 {
     const struct ads1256 *a = &s->b->tadc;
-    const int64_t until_ns = last_ns - ads1256_settle_ns(a) - 6 * s->b->period_ns;
-    int64_t start_tau = s->run.start_tau;
-    if (until_ns <= s->run.ready_ns || !follows_from_start(s)) return 0;
-    const uint32_t n = psa2_cycle_pass(&s->b->lazy.cycle, &start_tau, clk_count_at(&a->clkin, until_ns));
-    if (n > 0) s->run = ads1256_run_from(a, clk_edge_ns(&a->clkin, start_tau));
+    struct psa2_start at = {s->run.start_tau, 0};
+    const uint32_t n = follows_from_start(s) ? psa2_cycle_pass(c, &at, last_ns) : 0;
+    if (n == 0) return 0;
+    s->run = ads1256_run_from(a, clk_edge_ns(&a->clkin, at.tau));
+    s->sync_ns = at.sync_ns;
     return n;
 }
 
 static void note_run(const struct scan *s, struct psa2_cycle *c)
 {
-    if (follows_from_start(s)) psa2_cycle_note(c, s->run.start_tau);
+    if (follows_from_start(s)) psa2_cycle_note(c, (struct psa2_start){s->run.start_tau, s->sync_ns});
     else psa2_cycle_break(c);
 }
 
@@ -97,12 +96,11 @@ static void note_run(const struct scan *s, struct psa2_cycle *c)
 static uint32_t follow_runs(struct scan *s, struct psa2_cycle *c, int64_t last_ns)
 {
     struct scan next = *s;
-    uint32_t n = 0;
-    const uint32_t known = pass_known(&next, last_ns);
+    uint32_t n = pass_known(s, c, last_ns);
+    if (n > 0) return n;
     psa2_cycle_break(c);
-    note_run(&next, c);
     for (; next_run(&next, last_ns); n++, note_run(s, c)) *s = next;
-    return n > 0 ? known + n : 0;
+    return n;
 }
 
 /* From the begin of a conversion on: each channel once, and to the frame that has the last code. */
@@ -117,13 +115,25 @@ static bool may_skip(const struct psa2 *b, const struct scan *s)
            ads1256_may_skip(&b->tadc, 0.0, psa2_temp_v(b, BOARD_WARMEST_DEGC)); /* 0: no sensor there */
 }
 
-/* n conversions have passed, and another has begun. */
+/* n conversions have passed, and another has begun. Before its word comes, more may be skipped. */
 static void begin_run(struct psa2 *b, uint32_t n, const struct scan *s)
 {
     struct psa2_temp *m = &b->temp;
     m->channel = (uint8_t)((m->channel + n) % b->profile.temp_channels);
     ads1256_skip(&b->tadc, n, psa2_temp_mux(m->channel), &s->run);
     psa2_temp_await(b, s->sync_ns);
+    sched_at(b->base.sched, &b->lazy.again, s->sync_ns);
+}
+
+static void skip_again(void *ctx, int64_t t_ns)
+{
+    (void)t_ns;
+    psa2_lazy_sleep(ctx);
+}
+
+void psa2_temp_skip_init(struct psa2 *b)
+{
+    sched_ev_inner(&b->lazy.again, skip_again, b);
 }
 
 void psa2_temp_skip(struct psa2 *b, int64_t until_ns)

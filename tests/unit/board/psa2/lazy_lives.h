@@ -14,6 +14,7 @@
 
 #define ACTS_MAX 12u
 #define LIFE_NS  INT64_C(2000000000)
+#define LONG_NS  INT64_C(8000000000) /* asleep for so long that its temperature scan repeats itself */
 
 /* ---- one life ---- */
 
@@ -31,6 +32,7 @@ struct life {
     struct sensor_fault sensor;
     struct psa2_request request;
     bool faulty, asked, listens;
+    int64_t end_ns;
     void (*accel)(void *ctx, unsigned axis, const struct looks *at, double *out); /* the unit's own */
     uint64_t samples;                                                             /* that the converters have taken */
     struct rng r;
@@ -321,24 +323,25 @@ static void run_to_look(struct life *l, int64_t to_ns)
         sched_run_until(&l->s, to_ns);
         return;
     }
-    sched_run_towards(&l->s, to_ns, LIFE_NS);
+    sched_run_towards(&l->s, to_ns, l->end_ns);
     sched_settle(&l->s);
 }
 
 /* A life with the state after each stretch; returns how many. The eager one looks when the lazy one has. */
-static unsigned live(uint64_t seed, bool eager, char state[][SHA256_HEX], int64_t at_ns[])
+static unsigned live(uint64_t seed, int64_t end_ns, bool eager, char state[][SHA256_HEX], int64_t at_ns[])
 {
     struct life *l = &life;
     begin(l, seed, eager);
-    const unsigned n = 1 + choose(l, ACTS_MAX);
+    l->end_ns = end_ns;
+    const unsigned n = 1 + choose(l, end_ns > LIFE_NS ? 2 : ACTS_MAX);
     for (unsigned i = 0; i < n; i++) {
-        const int64_t left_ns = LIFE_NS - l->s.now_ns;
+        const int64_t left_ns = end_ns - l->s.now_ns;
         const double share = i + 1 == n ? 1.0 : uniform(l, 0.0, 2.0 / (n - i));
         const int64_t to_ns = l->s.now_ns + (int64_t)(share * (double)left_ns);
         if (eager) {
             (void)choose(l, 3);
             sched_run_until(&l->s, at_ns[i]);
-        } else run_to_look(l, to_ns < LIFE_NS ? to_ns : LIFE_NS);
+        } else run_to_look(l, to_ns < end_ns ? to_ns : end_ns);
         at_ns[i] = l->s.now_ns;
         take_state(l, state[i]);
         acts[choose(l, COUNT(acts))](l);
@@ -354,13 +357,13 @@ static inline unsigned life_count(unsigned standard)
 }
 
 /* Both lives; whether the lazy one has left samples out. */
-static bool compare_lives(uint64_t seed)
+static bool compare_lives(uint64_t seed, int64_t end_ns)
 {
     char eager[ACTS_MAX][SHA256_HEX], lazy[ACTS_MAX][SHA256_HEX];
     int64_t at_ns[ACTS_MAX];
-    const unsigned n = live(seed, false, lazy, at_ns);
+    const unsigned n = live(seed, end_ns, false, lazy, at_ns);
     const uint64_t taken = life.samples;
-    live(seed, true, eager, at_ns);
+    live(seed, end_ns, true, eager, at_ns);
     for (unsigned i = 0; i < n; i++)
         if (memcmp(eager[i], lazy[i], SHA256_HEX) != 0)
             fail_msg("TEST_SEED=%llu LAZY_RUNS=1: look %u of %u differs", (unsigned long long)seed, i + 1, n);
@@ -368,12 +371,12 @@ static bool compare_lives(uint64_t seed)
 }
 
 /* At least one life in ten has to have slept: else the comparison says little. */
-static inline void live_lives(unsigned standard)
+static inline void live_lives(unsigned standard, int64_t end_ns)
 {
     const unsigned runs = life_count(standard);
     const uint64_t seed = rig_seed(2026);
     unsigned slept = 0;
-    for (unsigned run = 0; run < runs; run++) slept += compare_lives(seed + run);
+    for (unsigned run = 0; run < runs; run++) slept += compare_lives(seed + run, end_ns);
     print_message("%u lives, of which %u slept\n", runs, slept);
     if (runs >= 10) assert_true(slept >= runs / 10);
 }
