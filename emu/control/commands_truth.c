@@ -141,6 +141,7 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
     if (!k->cfg.present) cJSON_AddItemToObject(to, "temp_degc", cJSON_CreateDoubleArray(u->cfg.temp_degc, UNIT_TEMPS));
     cJSON *volts = cJSON_AddArrayToObject(to, "sensor_v");
     cJSON *amperes = cJSON_AddArrayToObject(to, "sensor_a");
+    cJSON *moved = cJSON_AddArrayToObject(to, "zero_moved_v");
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         const double out = unit_sensor_out(u, i, t_ns);
         const enum unit_sensor sensor = u->cfg.axis[i].sensor;
@@ -148,6 +149,7 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
             sensor == UNIT_QUARTZ || (sensor == UNIT_RECORDED && u->cfg.board.afe[i].input == AFE_CURRENT);
         cJSON_AddItemToArray(volts, cJSON_CreateNumber(current ? 0.0 : out));
         cJSON_AddItemToArray(amperes, cJSON_CreateNumber(current ? out : 0.0));
+        cJSON_AddItemToArray(moved, cJSON_CreateNumber(unit_zero_moved_v(u, i, t_ns)));
     }
 }
 

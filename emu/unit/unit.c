@@ -363,3 +363,8 @@ double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
     if (is_quartz(u, axis)) return quartz_true_a(&u->quartz[axis], a_mps2);
     return mems_true_v(&u->mems[axis], a_mps2, t_ns);
 }
+
+double unit_zero_moved_v(const struct unit *u, unsigned axis, int64_t t_ns)
+{
+    return u->cfg.axis[axis].sensor == UNIT_MEMS ? mems_zero_moved_v(&u->mems[axis], t_ns) : 0.0;
+}

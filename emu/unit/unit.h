@@ -95,4 +95,7 @@ void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless with
 /* What the sensor of a channel would give without noise: volts, or amperes if it is a quartz. Truth. */
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns);
 
+/* How far the zero of a MEMS has moved since t = 0, volts; 0 of other sensors. Truth. */
+double unit_zero_moved_v(const struct unit *u, unsigned axis, int64_t t_ns);
+
 #endif

@@ -73,6 +73,12 @@ double mems_true_v(const struct mems *m, const double a_mps2[3], int64_t t_ns)
     return limited_v(&m->cfg, still_v(&m->cfg, a_mps2) + drift_v(&m->cfg, t_ns) + warm_v(m, a_mps2));
 }
 
+double mems_zero_moved_v(const struct mems *m, int64_t t_ns)
+{
+    struct noise slow = m->slow;
+    return drift_v(&m->cfg, t_ns) + noise_slow_u(&slow, t_ns);
+}
+
 static void model_row_v(const struct mems *m, const double *a_mps2, unsigned felt, const struct looks *at,
                         double *out_v)
 {

@@ -70,6 +70,9 @@ void mems_init(struct mems *m, const struct mems_cfg *cfg, struct draws noise, s
 /* The model at the temperature of the element, within the limits of the output: what it would give without noise. */
 double mems_true_v(const struct mems *m, const double a_mps2[3], int64_t t_ns);
 
+/* How far drift and slow noise have moved the zero by t_ns from u0, volts; later draws are those that come without this look. */
+double mems_zero_moved_v(const struct mems *m, int64_t t_ns);
+
 /* Output voltage at a row of looks; a_mps2 holds three numbers a look, or, if `felt` is 1, three for all. Slow noise goes
  * on with time: no look is earlier than the last one by more than its step. */
 void mems_out_row_v(struct mems *m, const double *a_mps2, unsigned felt, const struct looks *at, double *out_v);

@@ -29,6 +29,7 @@ from psabench.procedures.registry import PROCEDURES, Procedure
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
+from psabench.procedures.zero_watch import ZeroWatch
 from psabench.report import calibration as report
 from psabench.report.grading import Section
 from psabench.report.nominal import Nominal, nominal_dict, nominal_of_dict, nominal_of_scenario, read_passport
@@ -100,10 +101,13 @@ def measure_section(procedure: Procedure, condition: Condition, options: RunOpti
             setup |= {"nominal": nominal_dict(_nominal(options, params.axis))}
             on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
         recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
-        result = procedure.run(on_head, params, Watch(progress=progress, record=recorder))
+        zero = ZeroWatch(recorder, lambda: wired.t_s, lambda: _zero_moved_v(bench, params.axis))
+        watched = zero if bench.truth_path else recorder
+        result = procedure.run(on_head, params, Watch(progress=progress, record=watched))
         truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
+    moved_v = zero.moved_v(result.readings) if truth else ()
     result = expand_result(result, procedure, params, accuracy, _step_v(average))
-    return Section(label=condition.label, result=result, truth=truth)
+    return Section(label=condition.label, result=result, truth=truth, zero_moved_v=moved_v)
 
 
 def _accuracy(known: Mapping[str, float], options: RunOptions) -> BenchAccuracy:
@@ -176,6 +180,10 @@ def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
     first = next(iter(truth["units"].values()))
     sensor = first["axes"][axis]
     return {k: float(v) for k, v in sensor.items() if isinstance(v, int | float)}
+
+
+def _zero_moved_v(bench: Bench, axis: str) -> float:
+    return float(bench.truth_state()["unit"]["zero_moved_v"]["xyz".index(axis)])
 
 
 def _facts(options: RunOptions) -> dict[str, str]:

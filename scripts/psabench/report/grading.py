@@ -26,6 +26,7 @@ class Section:
     label: str
     result: ProcedureResult
     truth: Mapping[str, float] | None = None  # the sensor's hidden parameters
+    zero_moved_v: tuple[float, ...] = ()  # from u0_v, at each reading; (): by drift_v_per_s alone
 
     @property
     def title(self) -> str:
@@ -85,11 +86,13 @@ _UPRIGHT, _SIDE = (Face.DIRECT, Face.REVERSED), (Face.SIDE, Face.SIDE_REVERSED)
 
 
 def _sensor_when(section: Section, faces: Collection[Face]) -> Sensor:
-    """The sensor at the mean time of the readings on these faces: its zero drifts."""
+    """The sensor with its zero as it was, on average, in the readings on these faces: it drifts and wanders."""
     assert section.truth is not None
-    sensor, t_s = sensor_of(section.truth), [r.t_s for r in section.result.readings if r.face in faces]
-    drift_v = float(section.truth.get("drift_v_per_s", 0.0)) * sum(t_s) / max(len(t_s), 1)
-    return replace(sensor, u0_v=sensor.u0_v + drift_v)
+    sensor, readings = sensor_of(section.truth), section.result.readings
+    drift_vps = float(section.truth.get("drift_v_per_s", 0.0))
+    moved_v = section.zero_moved_v or tuple(drift_vps * r.t_s for r in readings)
+    of_faces = [v for v, r in zip(moved_v, readings, strict=True) if r.face in faces]
+    return replace(sensor, u0_v=sensor.u0_v + math.fsum(of_faces) / max(len(of_faces), 1))
 
 
 def _graded(e: Estimate, truth: float | None) -> Graded:

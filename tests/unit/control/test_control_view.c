@@ -25,6 +25,7 @@ static void the_true_state_is_told_on_the_truth_port(void **state)
     assert_string_equal(cJSON_GetObjectItem(unit, "name")->valuestring, "a");
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(unit, "w_radps")), 3);
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(unit, "sensor_v")), 3);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(unit, "zero_moved_v")), 3);
     cJSON_Delete(j);
     assert_says("{\"cmd\":\"truth.state\"}", "unknown command"); /* not on this port */
 }

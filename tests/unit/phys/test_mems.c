@@ -110,7 +110,29 @@ static void no_look_changes_what_another_sees(void **state)
             if (out_v(&one, a, t_ns[i], 31250) != v[i] || out_v(&often, a, t_ns[i], 31250) != v[i])
                 fail_msg("row %u, look %u", k, i);
             (void)out_v(&often, a, t_ns[i] + 11, 100);
+            (void)mems_zero_moved_v(&often, t_ns[i] + 40000000);
         }
+    }
+}
+
+/* Drift, walk and flicker are what the output has more than without them. */
+static void the_zero_moves_as_the_output_does(void **state)
+{
+    (void)state;
+    const struct mems_g still = {.u0_v = 2.5, .kx_v_per_g = 1.0};
+    struct mems_g g = still;
+    g.drift_v_per_s = 1e-3;
+    g.walk_v_rts = 1e-3;
+    g.bias_instability_v = 1e-4;
+    const struct mems_cfg cfg = mems_cfg_si(&g, G), none = mems_cfg_si(&still, G);
+    struct mems m, fixed;
+    const double a[3] = {1.0, 2.0, 3.0};
+    mems_init(&m, &cfg, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
+    mems_init(&fixed, &none, draws_of(1, 1, "mems.x"), draws_of(1, 1, "mems.slow.x"));
+    for (int64_t t_ns = 0; t_ns < 20000000000; t_ns += 1234567890) {
+        const double moved_v = mems_zero_moved_v(&m, t_ns);
+        near(out_v(&m, a, t_ns, 0) - out_v(&fixed, a, t_ns, 0), moved_v, 1e-12);
+        if (t_ns > 0 && fabs(moved_v - 1e-3 * (double)t_ns / 1e9) < 1e-6) fail_msg("no slow noise in %g", moved_v);
     }
 }
 
@@ -164,6 +186,7 @@ int main(void)
         cmocka_unit_test(a_second_look_at_one_instant_sees_the_same),
         cmocka_unit_test(noise_of_a_pull_follows_its_interval),
         cmocka_unit_test(no_look_changes_what_another_sees),
+        cmocka_unit_test(the_zero_moves_as_the_output_does),
         cmocka_unit_test(reading_noise_is_what_the_wire_shows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
