@@ -27,7 +27,7 @@ The table is the one of docs/procedures/gyrocompass.md.
 
 def doubts_of_runs(reading: str, latitude_deg: float, first: int, runs: int) -> Counter[str]:
     """Doubts of runs `first` and on, each with a generator of its own: by check, and by "runs" how many had one."""
-    from test_gyrocompass_doubts import article_s_instrument, run
+    from test_gyrocompass_doubts import article_s_instrument, run  # type: ignore[import-untyped]
 
     found: Counter[str] = Counter()
     for k in range(first, first + runs):
@@ -61,7 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             parts = pool.map(work, firsts, [min(CHUNK, args.runs - first) for first in firsts])
             found = sum(parts, Counter[str]())
             share = found.pop("runs", 0) / args.runs
-            print(f"{args.reading} {latitude_deg:+.0f} deg: {100.0 * share:.2f} % of {args.runs}", dict(found), flush=True)
+            print(
+                f"{args.reading} {latitude_deg:+.0f} deg: {100.0 * share:.2f} % of {args.runs}", dict(found), flush=True
+            )
     return 0
 
 

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import yaml
 from psabench.places import proto_file
-from psabench.procedures import gyro_run, run
+from psabench.procedures import comparison, gyro_run, heading_hold, run
+from psabench.procedures.compare_converters import CompareParams
+from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.run_table import CONDITIONS
 from psabench.report import grading, gyro_grading
+from psabench.report.gyro_grading import GyroSection
 
 from tests.coverage.passports import PASSPORTS
 from tests.coverage.table import Run
 
 CALIBRATION = CONDITIONS["realistic"]
 REALISATIONS = {"fourier": 2, "reversal": 2}  # of 5: two fifths of the time, wider intervals, the same budget
+HOLD_HOURS = 0.5
 
 
 def passport_of(seed: int) -> str:
@@ -50,22 +57,59 @@ def run_calibrations(seed: int, folder: Path) -> Iterator[tuple[str, tuple[float
                 yield f"{name} {g.estimate.name}", (g.z, g.en)
 
 
-def run_gyrocompass(reading: str, seed: int, folder: Path) -> Iterator[tuple[str, tuple[float, float]]]:
-    """North and drifts of a platform drawn by the seed."""
-    options = gyro_run.GyroOptions(procedure="gyrocompass", out=folder, seed=seed, params={"reading": reading})
+def gyro_scenario(seed: int) -> dict[str, object]:
+    """The scenario `gyrocompass` on another vehicle, its constant errors anywhere within the passport's limits."""
+    rng = np.random.default_rng([20080924, seed])
+    p = GyrocompassParams()
+    scenario: dict[str, Any] = yaml.safe_load(proto_file("scenarios/gyrocompass.yaml").read_text(encoding="utf-8"))
+    level = scenario["units"][0]
+    level["on"] = level.pop(True)  # YAML 1.1 reads the key `on` as true
+    anywhere = {"angle_zero_arcmin": p.angle_zero_arcmin, "level_tilt_arcmin": p.level_zero_arcmin}
+    anywhere["torquer_scale"] = p.torquer_scale
+    drawn = {name: limit * rng.uniform(-1.0, 1.0, 2) for name, limit in anywhere.items()}
+    scenario["platform"] |= {name: x.tolist() for name, x in drawn.items()}
+    scenario["platform"]["angle_zero_arcmin"] = float(drawn["angle_zero_arcmin"][0])
+    scenario["platform"]["drift_degph"] = rng.uniform(-30.0, 30.0, 2).tolist()
+    pitch_deg, roll_deg = rng.uniform(-5.0, 5.0, 2).tolist()
+    scenario["vehicle"] = {"heading_deg": float(rng.uniform(0.0, 360.0)), "pitch_deg": pitch_deg, "roll_deg": roll_deg}
+    return scenario
+
+
+def run_platform(procedure: str, reading: str, seed: int, folder: Path) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Heading, drifts and attitude of a platform drawn by the seed, and the heading that it kept."""
+    path = folder / "scenario.yaml"
+    path.write_text(yaml.safe_dump(gyro_scenario(seed)), encoding="utf-8")
+    params: dict[str, object] = {"reading": reading}
+    if procedure == heading_hold.NAME:
+        params |= {"hours": HOLD_HOURS, "look_s": HOLD_HOURS * 3600.0}
+    options = gyro_run.GyroOptions(procedure=procedure, out=folder, scenario=path, seed=seed, params=params)
     for section in gyro_run.run(options, Silent()):
-        for g in gyro_grading.grade(section):
-            if g.error is not None:
-                yield (
-                    f"gyrocompass {reading} {g.estimate.name}",
-                    (g.error / g.estimate.sd, g.error / g.estimate.ci_half),
-                )
+        yield from _graded_platform(f"gyrocompass {reading}", section)
+
+
+def _graded_platform(title: str, s: GyroSection) -> Iterator[tuple[str, tuple[float, float]]]:
+    for g in gyro_grading.grade(s):
+        if g.z is not None and g.en is not None:
+            yield f"{title} {g.estimate.name}", (g.z, g.en)
+    if s.hold:
+        error_rad, end = math.radians(gyro_grading.hold_errors_deg(s)[-1]), s.hold.held[-1]
+        yield f"{title} held {HOLD_HOURS:g} h", (error_rad / end.sd_rad, error_rad / end.u_rad)
+
+
+def run_comparison(seed: int, folder: Path) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Velocity of each axis of each generation after one motion."""
+    c = comparison.compare(folder, CompareParams(), Silent(), seed=seed)
+    for g in c.graded:
+        for axis, end, u in zip(comparison.AXES, g.end_mps, g.u_mps, strict=True):
+            en = float(end / u)
+            yield f"compare {g.figures.track.name} {axis}", (comparison.COVERAGE_K * en, en)
 
 
 STUDIES: Mapping[str, Callable[[int, Path], Iterator[tuple[str, tuple[float, float]]]]] = {
     "calibrations": run_calibrations,
-    "gyrocompass-article": lambda seed, folder: run_gyrocompass("article", seed, folder),
-    "gyrocompass-improved": lambda seed, folder: run_gyrocompass("improved", seed, folder),
+    "gyrocompass-article": lambda seed, folder: run_platform("gyrocompass", "article", seed, folder),
+    "gyrocompass-improved": lambda seed, folder: run_platform(heading_hold.NAME, "improved", seed, folder),
+    "compare": run_comparison,
 }
 
 

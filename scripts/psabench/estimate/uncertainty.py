@@ -21,6 +21,7 @@ class Component:
     name: str
     u: float  # standard uncertainty that it gives the estimate, in the estimate's unit
     dof: float = math.inf  # degrees of freedom; inf: type B, known without readings
+    rectangular: bool = False  # known by limits alone: u is their half width over the root of 3 (GUM 4.3.7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +50,11 @@ class Correlation:
     def between(self, a: str, b: str) -> float:
         """Raises ValueError for a name that is not in `names`."""
         return float(self.matrix[self.names.index(a), self.names.index(b)])
+
+
+def within_limit(name: str, limit: float) -> Component:
+    """Of an error that is anywhere within +- limit, in the estimate's unit."""
+    return Component(name=name, u=limit / math.sqrt(3.0), rectangular=True)
 
 
 def t_quantile(dof: float, confidence: float = CONFIDENCE) -> float:

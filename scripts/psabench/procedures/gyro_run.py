@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from psabench.procedures.wire_platform import WirePlatform
 from psabench.report.gyro_grading import GyroSection, HeldTruth
 
 SCENARIO = "gyrocompass"
+ARTICLE_SCENARIOS = (SCENARIO, "gyrocompass_ideal")  # of the article's platform, with its errors and without
 WINDOW_POINTS = 200  # of a truth over a window
 
 
@@ -62,10 +63,13 @@ def run(options: GyroOptions, progress: Progress) -> list[GyroSection]:
         raise BadInput(expected("one reading (--reading article or improved)", "several", "--record"))
     holds = options.procedure == heading_hold.NAME
     hold_params = made_params(HoldParams, options.procedure, options.params) if holds else None
-    if options.replay:
-        return [_replay_reading(hold_params, options, progress)]
     options.out.mkdir(parents=True, exist_ok=True)
-    return [_one(name, hold_params, options, progress) for name in readings.readings]
+    if options.replay:
+        sections = [_replay_reading(hold_params, options, progress)]
+    else:
+        sections = [_one(name, hold_params, options, progress) for name in readings.readings]
+    article = facts(options)["bench"] in ARTICLE_SCENARIOS
+    return [replace(s, article=article) for s in sections]
 
 
 def facts(options: GyroOptions) -> dict[str, str]:
@@ -131,7 +135,6 @@ def _replay_reading(hold_params: HoldParams | None, options: GyroOptions, progre
     refuse_beside_replay(given | {"--real-time": options.real_time or None})
     bench = RecordedBench(options.replay)
     check_procedure(options.replay, bench.setup, options.procedure)
-    options.out.mkdir(parents=True, exist_ok=True)
     site = {k: float(v) for k, v in dict(bench.setup.get("site", {})).items()}
     label = str(bench.setup.get("reading"))
     section = _measure_reading(bench, label, site, hold_params, options, progress, _Truth(bench), lambda _: None)

@@ -6,15 +6,15 @@ the errata and what the article's figures are worth: docs/procedures/gyrocompass
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from psabench.budget.gum import expand_estimate
 from psabench.errors import LinkError
-from psabench.estimate.uncertainty import Estimate
+from psabench.estimate.uncertainty import Component, Estimate, within_limit
 from psabench.native import nav
 from psabench.native.nav import ARCMIN, DEGPH
-from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, heading_allowance_rad, notes_of, quality_limit
+from psabench.procedures.gyrocompass_doubts import Evidence, doubts_of, level_heading_rad, notes_of, quality_limit
 from psabench.procedures.gyrocompass_fit import (
     Fit,
     Row,
@@ -30,7 +30,7 @@ from psabench.procedures.gyrocompass_params import NAME, GyrocompassParams
 from psabench.procedures.gyrocompass_windows import good_calibration, sorted_out
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import PlatformBench, Window
-from psabench.procedures.result import DEG, Z95, estimate_named
+from psabench.procedures.result import DEG, estimate_named
 
 LEVEL_LIMIT_S = 60.0  # timeout for levelling
 
@@ -140,41 +140,30 @@ def _evidence(f: Fit, planned: int, drift2: WindowMean) -> Evidence:
 
 
 def _estimates(e: Evidence) -> tuple[Estimate, ...]:
-    """Angles as they are in the run, drifts as means over its windows."""
+    """Angles as they are in the run, drifts as means over its windows; each with its budget.
+
+    The zero of the angle sensor turns pitch into roll; that of gamma is fitted, and that of beta enters as its square.
+    """
     f, c, attitude = e.fit, e.fit.compass, e.fit.attitude
-    pitch_sd_rad, roll_sd_rad, _ = attitude_sd_rad(f)
+    pitch, roll = attitude.pitch_rad, attitude.roll_rad
+    pitch_sd, roll_sd, _ = attitude_sd_rad(f)
+    zero = f.params.angle_zero_arcmin * ARCMIN
+    level = within_limit("level zero", level_heading_rad(f.params, attitude))
+    angle, to_pitch, to_roll = (within_limit("angle zero", zero * abs(by)) for by in (1.0, roll, pitch))
+    drift1, drift2 = e.drift1, e.drift2
     return (
-        _estimate("heading_deg", "ψ", "deg", f.heading_rad * DEG, c.alpha1_sd_rad * DEG),
-        _estimate("alpha1_deg", "α_1", "deg", c.alpha1_rad * DEG, c.platform_sd_rad * DEG),
-        _estimate("drift1_degph", "ω_d1", "deg/h", e.drift1.radps / DEGPH, e.drift1.sd_radps / DEGPH),
-        _estimate("drift2_degph", "ω_d2", "deg/h", e.drift2.radps / DEGPH, e.drift2.sd_radps / DEGPH),
-        _estimate("pitch_deg", "ϑ", "deg", attitude.pitch_rad * DEG, pitch_sd_rad * DEG),
-        _estimate("roll_deg", "γ", "deg", attitude.roll_rad * DEG, roll_sd_rad * DEG),
+        _estimate("heading_deg", "ψ", f.heading_rad, c.alpha1_sd_rad, (angle, level)),
+        _estimate("alpha1_deg", "α_1", c.alpha1_rad, c.platform_sd_rad, (level,)),
+        _estimate("drift1_degph", "ω_d1", drift1.radps, drift1.sd_radps, drift1.constant),
+        _estimate("drift2_degph", "ω_d2", drift2.radps, drift2.sd_radps, drift2.constant),
+        _estimate("pitch_deg", "ϑ", pitch, pitch_sd, (to_pitch,)),
+        _estimate("roll_deg", "γ", roll, roll_sd, (to_roll,)),
     )
 
 
-def _estimate(name: str, symbol: str, unit: str, value: float, sd: float) -> Estimate:
-    """The interval of an angle is a whole turn at most."""
-    ci_half = min(Z95 * sd, 180.0) if unit == "deg" else Z95 * sd
-    return Estimate(name=name, symbol=symbol, unit=unit, value=value, sd=sd, ci_half=ci_half)
-
-
-def allowance(result: GyrocompassResult) -> dict[str, float]:
-    """What the constant errors of the instrument may add to each estimate, in its unit: no window sees them."""
-    p, c = result.params, result.compass
-    level_rad, latitude_rad = p.level_zero_arcmin * ARCMIN, p.latitude_sd_arcmin * ARCMIN
-    heading_rad = heading_allowance_rad(p, result.attitude)
-    drift1_radps = abs(p.wz_radps) * level_rad + p.torquer_scale * abs(c.drift1_radps)
-    # the zero of gamma is fitted, that of beta enters as its square; the gimbal's zero turns pitch into roll
-    tilt_rad = level_rad**2 + p.angle_zero_arcmin * ARCMIN * math.hypot(
-        result.attitude.pitch_rad, result.attitude.roll_rad
-    )
-    drift2_radps = p.we_radps * (math.sqrt(2.0) * level_rad + latitude_rad) + p.torquer_scale * abs(result.drift2.radps)
-    return {
-        "heading_deg": heading_rad * DEG,
-        "alpha1_deg": (heading_rad - p.angle_zero_arcmin * ARCMIN) * DEG,
-        "drift1_degph": drift1_radps / DEGPH,
-        "drift2_degph": drift2_radps / DEGPH,
-        "pitch_deg": tilt_rad * DEG,
-        "roll_deg": tilt_rad * DEG,
-    }
+def _estimate(name: str, symbol: str, value: float, sd: float, constant: Sequence[Component]) -> Estimate:
+    """In deg or deg/h, from radians or rad/s. The interval of an angle is a whole turn at most."""
+    unit, scale = ("deg/h", 1.0 / DEGPH) if name.endswith("_degph") else ("deg", DEG)
+    e = Estimate(name=name, symbol=symbol, unit=unit, value=value * scale, sd=sd * scale, ci_half=0.0)
+    e = expand_estimate(e, [replace(part, u=part.u * scale) for part in constant])
+    return replace(e, ci_half=min(e.ci_half, 180.0)) if unit == "deg" else e

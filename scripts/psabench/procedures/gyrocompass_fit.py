@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psabench.estimate.angles import wrapped
+from psabench.estimate.uncertainty import Component, within_limit
 from psabench.native import nav
 from psabench.native.nav import ARCMIN
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
@@ -242,6 +243,7 @@ class WindowMean:
     t_mid_s: Floats  # (n,) of the windows
     length_s: Floats  # (n,)
     share: Floats  # (n,) of each in the mean, 1 in all
+    constant: tuple[Component, ...] = ()  # errors that no window sees, rad/s: beside sd_radps
 
 
 def drift1_of(f: Fit, s: Sensitivity) -> WindowMean:
@@ -255,12 +257,22 @@ def drift1_of(f: Fit, s: Sensitivity) -> WindowMean:
     missed = float(np.mean([r.residual_radps for r in f.rows])) if _is_weighted(f) else 0.0
     other = by_rate - share
     variance = float(other @ drift_covariance(f) @ other + by_rate @ error_covariance(f) @ by_rate)
+    p, torque_radps = f.params, float(by_rate @ [w.u1_radps.mean() for w in f.windows])
     return WindowMean(
         radps=f.compass.drift1_radps + missed,
         sd_radps=math.sqrt(variance),
         t_mid_s=np.array([r.position.t_mid_s for r in f.rows]),
         length_s=np.array([r.position.window_s for r in f.rows]),
         share=share,
+        constant=_constant_errors(p, level_radps=p.wz_radps, torque_radps=torque_radps),
+    )
+
+
+def _constant_errors(p: GyrocompassParams, *, level_radps: float, torque_radps: float) -> tuple[Component, ...]:
+    """Of a drift: level_radps is what a radian of a level sensor's zero makes, torque_radps what the torquer turns."""
+    return (
+        within_limit("level zero", p.level_zero_arcmin * ARCMIN * abs(level_radps)),
+        within_limit("torquer scale", p.torquer_scale * abs(torque_radps)),
     )
 
 
@@ -292,17 +304,21 @@ def drift2_of(f: Fit, calibration: Sequence[Window]) -> WindowMean:
     ]
     length_s = np.array([w.length_s for w in windows])
     share = length_s / length_s.sum()
+    sd_radps, beta_radps = _earth_part_errors(f, windows, alpha_rad, share)
+    torque_radps = float(share @ [w.u2_radps.mean() for w in windows])
     return WindowMean(
         radps=float(share @ found),
-        sd_radps=_earth_part_sd(f, windows, alpha_rad, share),
+        sd_radps=sd_radps,
         t_mid_s=np.array([w.t_mid_s for w in windows]),
         length_s=length_s,
         share=share,
+        constant=_constant_errors(p, level_radps=beta_radps, torque_radps=torque_radps),
     )
 
 
-def _earth_part_sd(f: Fit, windows: Sequence[Window], alpha_rad: Floats, share: Floats) -> float:
-    """Standard deviation of what is taken off u2 for the Earth, Wz cos b cos g + We (sin a sin g - cos a cos g sin b).
+def _earth_part_errors(f: Fit, windows: Sequence[Window], alpha_rad: Floats, share: Floats) -> tuple[float, float]:
+    """Of what is taken off u2 for the Earth, Wz cos b cos g + We (sin a sin g - cos a cos g sin b): its standard
+    deviation, rad/s, and what a radian of a constant error of beta makes of it.
 
     Level sensors and angles are new in each window; heading, latitude and gamma's constant error, which is fitted to
     the first windows, are one for all.
@@ -324,7 +340,7 @@ def _earth_part_sd(f: Fit, windows: Sequence[Window], alpha_rad: Floats, share: 
         by_alpha.sum() * f.compass.alpha1_sd_rad,
         by_latitude.sum() * f.noise.latitude_sd_rad,
     ]
-    return float(np.linalg.norm(parts))
+    return float(np.linalg.norm(parts)), float(by_beta.sum())
 
 
 # ---- the random drift

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from psabench.budget.gum import combined_u, expanded_u
 from psabench.errors import LinkError, expected
 from psabench.estimate.angles import wrapped
+from psabench.estimate.uncertainty import Component
 from psabench.native import nav
 from psabench.native.nav import EARTH_RADIUS_M, LATITUDE_LIMIT_RAD
 from psabench.procedures.gyrocompass import GyrocompassResult
@@ -19,7 +21,7 @@ from psabench.procedures.gyrocompass_fit import drift_variance
 from psabench.procedures.gyrocompass_params import noise_of
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.platform_bench import Compensation, Look, PlatformBench
-from psabench.procedures.result import Z95, option
+from psabench.procedures.result import option
 
 NAME = "heading-hold"
 
@@ -69,13 +71,18 @@ class Held:
 
     t_s: float  # since navigation began
     heading_rad: float
-    sd_rad: float  # that is to be expected of it
+    budget: tuple[Component, ...]  # of what it is off by, rad
     faults: tuple[str, ...]
 
     @property
-    def half95_rad(self) -> float:
-        """Half width of its 95 % interval: half a turn at most."""
-        return min(Z95 * self.sd_rad, math.pi)
+    def sd_rad(self) -> float:
+        """Combined standard uncertainty."""
+        return combined_u(self.budget)
+
+    @property
+    def u_rad(self) -> float:
+        """Expanded uncertainty: half a turn at most."""
+        return min(expanded_u(self.budget), math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,14 +188,16 @@ def _held(look: Look, azimuth_rad: float, begun_s: float, start: GyrocompassResu
     return Held(
         t_s=t_s,
         heading_rad=nav.heading(azimuth_rad, look.encoder_rad, pitch_rad=pitch, roll_rad=roll),
-        sd_rad=hold_sd_rad(start, t_s),
+        budget=hold_budget(start, t_s),
         faults=look.faults,
     )
 
 
-def hold_sd_rad(start: GyrocompassResult, t_s: float) -> float:
-    """What is to be expected of a heading t_s after navigation began, rad: heading and drift as they were found."""
-    return math.hypot(math.radians(start.get("heading_deg").sd), _turn_sd_rad(start, t_s))
+def hold_budget(start: GyrocompassResult, t_s: float) -> tuple[Component, ...]:
+    """Of a heading t_s after navigation began, rad: heading and drift as they were found, and the drift afterwards."""
+    heading = (replace(c, u=math.radians(c.u)) for c in start.get("heading_deg").budget)
+    constant = (replace(c, name=f"{c.name} in ω_d2", u=c.u * t_s) for c in start.drift2.constant)
+    return (*heading, Component(name="drift", u=_turn_sd_rad(start, t_s)), *constant)
 
 
 def _turn_sd_rad(start: GyrocompassResult, t_s: float) -> float:

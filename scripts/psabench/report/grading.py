@@ -45,15 +45,15 @@ class Graded:
     @property
     def z(self) -> float | None:
         """Error in standard uncertainties. None: no truth."""
-        return None if self.error is None else _ratio_of(self.error, self.estimate.sd)
+        return None if self.error is None else ratio_of(self.error, self.estimate.sd)
 
     @property
     def en(self) -> float | None:
         """Normalised error, ISO 13528 9.6: error over U, for the truth is exact. None: no truth."""
-        return None if self.error is None else _ratio_of(self.error, self.estimate.ci_half)
+        return None if self.error is None else ratio_of(self.error, self.estimate.ci_half)
 
 
-def _ratio_of(error: float, u: float) -> float:
+def ratio_of(error: float, u: float) -> float:
     """Of an error to an uncertainty; without uncertainty any error is infinitely many of them."""
     return error / u if u > 0.0 else math.copysign(math.inf, error) if error else 0.0
 
@@ -137,14 +137,14 @@ def result_dict(section: Section) -> dict[str, object]:
         "readings": len(r.readings),
         "duration_s": r.duration_s,
         "residual_rms_v": r.residual_rms_v,
-        "drift": None if r.drift is None else _estimate_dict(r.drift),
+        "drift": None if r.drift is None else estimate_dict(r.drift),
         "estimates": [
             {
-                **_estimate_dict(g.estimate),
+                **estimate_dict(g.estimate),
                 "truth": g.truth,
                 "error": g.error,
-                "z": _finite_or_none(g.z),
-                "en": _finite_or_none(g.en),
+                "z": finite_or_none(g.z),
+                "en": finite_or_none(g.en),
                 "within_limits": g.within,
             }
             for g in grade(section)
@@ -155,18 +155,18 @@ def result_dict(section: Section) -> dict[str, object]:
     }
 
 
-def _estimate_dict(e: Estimate) -> dict[str, object]:
+def estimate_dict(e: Estimate) -> dict[str, object]:
     return {
         **numbers_of(e),
         "expanded_u": e.ci_half,
-        "dof": _finite_or_none(e.dof),
+        "dof": finite_or_none(e.dof),
         "budget": {c.name: c.u for c in e.budget},
         "identifiable": e.identifiable,
         "reason": e.reason,
     }
 
 
-def _finite_or_none(x: float | None) -> float | None:
+def finite_or_none(x: float | None) -> float | None:
     """JSON has no infinity."""
     return x if x is not None and math.isfinite(x) else None
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from psabench.budget.gum import COVERAGE
 from psabench.estimate.angles import wrapped_deg
 from psabench.estimate.uncertainty import Estimate
 from psabench.native.nav import DEGPH
-from psabench.procedures.gyrocompass import GyrocompassResult, allowance
+from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.heading_hold import HoldResult
 from psabench.procedures.result import DEG, LIMIT_CI
-from psabench.report.grading import aligned, numbers_of, with_ci
+from psabench.report.grading import aligned, as_ratio, estimate_dict, finite_or_none, ratio_of, with_ci
 
 # What the article says that its simulation reaches, and what a hold may be off by.
 CLAIMS: Mapping[str, tuple[float, str]] = {"heading_deg": (0.1, "deg"), "drift1_degph": (0.05, "deg/h")}
@@ -37,6 +38,7 @@ class GyroSection:
     truth: Mapping[str, float] | None = None  # by name of the estimate
     hold: HoldResult | None = None
     hold_truth: HeldTruth | None = None
+    article: bool = False  # of the article's platform: its claims are beside what was found
 
     @property
     def title(self) -> str:
@@ -52,27 +54,39 @@ class GradedEstimate:
     estimate: Estimate
     truth: float | None
     error: float | None
-    limit: float  # that |error| may reach: intervals, and the constant errors that no window sees
     claim: str  # of the article, "": none
+
+    @property
+    def limit(self) -> float:
+        """That |error| may reach."""
+        return LIMIT_CI * self.estimate.ci_half
 
     @property
     def within(self) -> bool | None:
         return None if self.error is None else abs(self.error) <= self.limit
 
+    @property
+    def z(self) -> float | None:
+        """Error in standard uncertainties. None: no truth."""
+        return None if self.error is None else ratio_of(self.error, self.estimate.sd)
+
+    @property
+    def en(self) -> float | None:
+        """Normalised error. None: no truth."""
+        return None if self.error is None else ratio_of(self.error, self.estimate.ci_half)
+
 
 def grade(s: GyroSection) -> tuple[GradedEstimate, ...]:
     """Every estimate beside the truth, when there is one."""
-    may = allowance(s.result)
     rows = []
     for e in s.result.estimates:
         truth = None if s.truth is None else s.truth.get(e.name)
         error = None if truth is None else e.value - truth
         if error is not None and e.unit == "deg":
             error = wrapped_deg(error)
-        bound, unit = CLAIMS.get(e.name, (0.0, ""))
+        bound, unit = CLAIMS.get(e.name, (0.0, "")) if s.article else (0.0, "")
         claim = f"within {bound:g} {unit}" if unit else ""
-        limit = LIMIT_CI * e.ci_half + may.get(e.name, 0.0)
-        rows.append(GradedEstimate(estimate=e, truth=truth, error=error, limit=limit, claim=claim))
+        rows.append(GradedEstimate(estimate=e, truth=truth, error=error, claim=claim))
     return tuple(rows)
 
 
@@ -85,13 +99,8 @@ def hold_errors_deg(s: GyroSection) -> tuple[float, ...]:
 
 
 def hold_limits_deg(s: GyroSection) -> tuple[float, ...]:
-    """What |error| may be at each look: what is to be expected, with the constant errors of heading and drift."""
-    if s.hold is None:
-        return ()
-    may = allowance(s.result)
-    return tuple(
-        LIMIT_CI * h.half95_rad * DEG + may["heading_deg"] + may["drift2_degph"] * h.t_s / 3600.0 for h in s.hold.held
-    )
+    """What |error| may be at each look."""
+    return tuple(LIMIT_CI * h.u_rad * DEG for h in s.hold.held) if s.hold else ()
 
 
 def hold_within(s: GyroSection) -> bool | None:
@@ -111,19 +120,22 @@ def within_limits(sections: Sequence[GyroSection]) -> bool:
 
 
 def verdict(sections: Sequence[GyroSection]) -> str:
-    """A sentence or two on all that was compared."""
+    """What was compared with what, and how it came out."""
     compared = [g for s in sections for g in grade(s) if g.within is not None]
     out = sum(g.within is False for g in compared) + sum(hold_within(s) is False for s in sections)
+    beyond, by_chance = sum(abs(g.en or 0.0) > 1.0 for g in compared), (1.0 - COVERAGE) * len(compared)
     if any(doubts(s) for s in sections):
         return "The heading is not to be trusted: see the doubts."
     if not compared:
         return "No truth given: the numbers stand alone."
     held = " and the heading that was kept" if any(s.hold for s in sections) else ""
     if not out:
-        return f"All {len(compared)} numbers{held} lie within their limits of the truth."
-    return (
-        f"{out} of {len(compared) + sum(hold_within(s) is not None for s in sections)} comparisons are out of limits."
-    )
+        return (
+            f"All {len(compared)} numbers{held} are within {LIMIT_CI:g} U of the truth, {beyond} of the numbers beyond U "
+            f"(expected: {by_chance:.1f})."
+        )
+    both = len(compared) + sum(hold_within(s) is not None for s in sections)
+    return f"{out} of {both} comparisons are not within {LIMIT_CI:g} U of the truth."
 
 
 # ---- text
@@ -131,13 +143,16 @@ def verdict(sections: Sequence[GyroSection]) -> str:
 
 def table(s: GyroSection) -> list[tuple[str, ...]]:
     """Rows for console and page, the head first."""
-    rows: list[tuple[str, ...]] = [("", "found", "+- 95 %", "unit", "truth", "error", "limit", "the article", "")]
+    claims = ("the article",) if s.article else ()
+    rows: list[tuple[str, ...]] = [("", "found", "U", "unit", "truth", "error", "z", "En", *claims, "")]
     for g in grade(s):
         value, ci = with_ci(g.estimate.value, g.estimate.ci_half, most=4)
         truth = "" if g.truth is None else f"{g.truth:.4f}"
         error = "" if g.error is None else f"{g.error:+.4f}"
         mark = "OUT OF LIMITS" if g.within is False else ""
-        rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, f"{g.limit:.2g}", g.claim, mark))
+        ratios = as_ratio(g.z, 1), as_ratio(g.en, 2)
+        claim = (g.claim,) if s.article else ()
+        rows.append((g.estimate.name, value, ci, g.estimate.unit, truth, error, *ratios, *claim, mark))
     return rows
 
 
@@ -145,16 +160,15 @@ def hold_table(s: GyroSection) -> list[tuple[str, ...]]:
     """The same of a hold; [] without one. At most nine looks of it."""
     if s.hold is None:
         return []
-    errors, limits = hold_errors_deg(s), hold_limits_deg(s)
-    rows: list[tuple[str, ...]] = [("", "heading", "+- 95 %", "unit", "error", "limit")]
+    errors = hold_errors_deg(s)
+    rows: list[tuple[str, ...]] = [("", "heading", "U", "unit", "error", "En")]
     n = len(s.hold.held)
     for k in sorted({round(i * (n - 1) / 8) for i in range(9)}):
         h = s.hold.held[k]
         error = f"{errors[k]:+.4f}" if errors else ""
-        ci = f"{h.half95_rad * DEG:.3f}"
-        rows.append(
-            (f"after {h.t_s / 3600.0:.2f} h", f"{h.heading_rad * DEG:.4f}", ci, "deg", error, f"{limits[k]:.2g}")
-        )
+        u_deg = h.u_rad * DEG
+        en = as_ratio(ratio_of(errors[k], u_deg), 2) if errors else ""
+        rows.append((f"after {h.t_s / 3600.0:.2f} h", f"{h.heading_rad * DEG:.4f}", f"{u_deg:.3f}", "deg", error, en))
     return rows
 
 
@@ -164,10 +178,13 @@ def hold_summary(s: GyroSection) -> str:
     if not errors or s.hold is None:
         return ""
     worst, hours = max(abs(e) for e in errors), s.hold.held[-1].t_s / 3600.0
+    found = f"largest error {worst:.3f} deg in {hours:.2g} h"
+    if not s.article:
+        return found
     met = "met" if worst <= HOLD_CLAIM_DEG else "not met"
     return (
-        f"largest error {worst:.3f} deg in {hours:.2g} h; the article has {HOLD_CLAIM_DEG:g} in 4 h "
-        f"({HOLD_CLAIM_ABSTRACT_DEG:g} in its abstract): {met} by this run"
+        f"{found}; the article has {HOLD_CLAIM_DEG:g} in 4 h ({HOLD_CLAIM_ABSTRACT_DEG:g} in its abstract): "
+        f"{met} by this run"
     )
 
 
@@ -197,9 +214,11 @@ def result_dict(s: GyroSection) -> dict[str, object]:
         "duration_s": r.duration_s,
         "estimates": [
             {
-                **numbers_of(g.estimate),
+                **estimate_dict(g.estimate),
                 "truth": g.truth,
                 "error": g.error,
+                "z": finite_or_none(g.z),
+                "en": finite_or_none(g.en),
                 "limit": g.limit,
                 "within_limits": g.within,
                 "article": g.claim,
@@ -238,6 +257,7 @@ def _hold_dict(s: GyroSection) -> dict[str, object] | None:
         "t_s": [h.t_s for h in s.hold.held],
         "heading_deg": [h.heading_rad * DEG for h in s.hold.held],
         "sd_deg": [h.sd_rad * DEG for h in s.hold.held],
+        "expanded_u_deg": [h.u_rad * DEG for h in s.hold.held],
         "error_deg": list(errors) if errors else None,
         "limit_deg": list(hold_limits_deg(s)),
         "within_limits": hold_within(s),

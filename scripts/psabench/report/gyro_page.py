@@ -23,8 +23,8 @@ CAPTIONS = {
     "rates": "Levelling rate of each position against the azimuth angle α of the platform: the Earth's horizontal rate "
     "as a sine about the drift. The line is the fit. Below: what the rates miss it by.",
     "course": "The same in time: the line is what the fit expects in each window.",
-    "hold": "Heading less the truth while it is kept by the gyroscope. Shaded: 95 % of what is to be expected; dashed: "
-    "the article's 0.3°.",
+    "hold": "Heading less the truth while it is kept by the gyroscope. Shaded: U.",
+    "claim": " Dashed: the article's 0.3°.",
 }
 
 
@@ -44,7 +44,7 @@ def html_page(sections: Sequence[GyroSection], facts: Mapping[str, str]) -> str:
     body = [
         verdict_line(grading.verdict(sections), grading.within_limits(sections)),
         *(_section(s, f"g{k}") for k, s in enumerate(sections)),
-        _method(),
+        _method(any(s.article for s in sections)),
     ]
     return whole_page(TITLE, facts, body)
 
@@ -68,10 +68,11 @@ def _section(s: GyroSection, ident: str) -> str:
 def _hold(s: GyroSection, ident: str) -> str:
     if s.hold is None:
         return ""
+    caption = CAPTIONS["hold"] + (CAPTIONS["claim"] if s.article else "")
     return (
         f"<h2>Hold: {s.hold.drift2_radps / DEGPH:.3f} deg/h compensated in azimuth</h2>"
         f"<p>{escape(grading.hold_summary(s))}</p>{table(grading.hold_table(s))}"
-        f"{_figure(hold_figure(s), ident + 'hold', CAPTIONS['hold'])}"
+        f"{_figure(hold_figure(s), ident + 'hold', caption)}"
     )
 
 
@@ -91,15 +92,19 @@ def _figure(picture: Figure, ident: str, caption: str) -> str:
     return figure(plots.svg(picture, ident), escape(caption))
 
 
-def _method() -> str:
+def _method(article: bool) -> str:
+    claims = (
+        " The article's figures are of one simulated run; what they are worth, and under which reading they hold, is "
+        "on the page of the procedure."
+    )
     return section(
         "How to read this",
         "<p>ψ: heading. α<sub>1</sub>: azimuth angle of the platform in the first position. ω<sub>d1</sub>, "
         "ω<sub>d2</sub>: drift about the levelled and the azimuth axis. ϑ: pitch. γ: roll.</p>"
-        "<p>limit: two half widths of the 95 % interval and the "
-        "constant errors that no window sees (level sensors, zero of the angle sensor, scale of the torquers). "
-        "Intervals count the random drift of the passport as a Gauss-Markov process. The article's figures are of one "
-        "simulated run; what they are worth, and under which reading they hold, is on the page of the procedure.</p>",
+        "<p>U: expanded uncertainty, 95.45 %. It counts the random drift of the passport as a Gauss-Markov process, "
+        "and the limits of the constant errors that no window sees: level sensors, zero of the angle sensor, scale of "
+        f"the torquers. E<sub>n</sub>: error/U; out of limits is what misses the truth by more than 2 U."
+        f"{claims if article else ''}</p>",
         kind="method",
     )
 
@@ -154,11 +159,11 @@ def hold_figure(s: GyroSection) -> Figure:
     """Error of the heading in time, with what is to be expected of it."""
     assert s.hold is not None
     hours = np.array([h.t_s / 3600.0 for h in s.hold.held])
-    band = np.array([h.half95_rad * DEG for h in s.hold.held])
+    band = np.array([h.u_rad * DEG for h in s.hold.held])
     errors = np.array(grading.hold_errors_deg(s) or np.full(len(hours), np.nan))
     with plots.drawing(3.0) as (picture, ax):
         ax.fill_between(hours, -band, band, color=plots.MUTED, alpha=0.18, lw=0)
-        for sign in (-1.0, 1.0):
+        for sign in (-1.0, 1.0) if s.article else ():
             ax.axhline(sign * grading.HOLD_CLAIM_DEG, color=plots.SERIES[1], lw=0.9, ls="--")
         ax.plot(hours, errors, color=plots.SERIES[0], lw=1.4)
         ax.set_xlabel("time, h")

@@ -11,13 +11,14 @@ from fake_bench import FakeBench, seeded
 from psabench.budget import gum
 from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.budget.influences import expand_result
-from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile
+from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
 from psabench.procedures.fourier import FourierParams
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams
 from psabench.procedures.turns import TurnsParams
 from psabench.report.grading import Section, grade
+from scipy import stats
 
 from tests.coverage.table import Run, chance_band, pooled_share, rows_of
 
@@ -65,6 +66,24 @@ def test_the_interval_is_k_times_u_with_k_of_the_degrees_of_freedom() -> None:
     many = gum.expand_estimate(estimate("a_v", "a", "V", 1.0, 0.0, 12), [Component(name="b", u=4.0)])
     assert math.isinf(many.dof)
     assert many.ci_half == pytest.approx(8.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(("sd", "limit"), [(1.0, 0.1), (1.0, 1.0), (1.0, 5.0), (0.2, 3.0)])
+def test_an_interval_with_a_limit_in_it_is_that_of_the_convolution(sd: float, limit: float) -> None:
+    """k = 2 of the combined standard uncertainty would contain all of a number that a rectangle dominates."""
+    each = [Component(name="noise", u=sd), within_limit("zero", limit)]
+    half = gum.expanded_u(each)
+    x = np.linspace(-limit, limit, 20001)
+    inside = float(np.mean(stats.norm.cdf((half - x) / sd) - stats.norm.cdf((-half - x) / sd)))
+    assert inside == pytest.approx(gum.COVERAGE, abs=1e-4)
+
+
+def test_limits_alone_and_nothing_at_all() -> None:
+    """Two equal rectangles make a triangle."""
+    triangle = gum.expanded_u([within_limit("a", 1.0), within_limit("b", 1.0)])
+    assert triangle == pytest.approx(2.0 * (1.0 - math.sqrt(1.0 - gum.COVERAGE)), rel=0.01)
+    assert gum.expanded_u([within_limit("a", 1.0)]) == pytest.approx(gum.COVERAGE, rel=0.01)
+    assert gum.expanded_u([Component(name="noise", u=0.0), within_limit("a", 0.0)]) == 0.0
 
 
 def test_each_influence_reaches_the_estimates_that_it_moves_by_what_paper_says() -> None:

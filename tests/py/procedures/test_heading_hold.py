@@ -189,7 +189,12 @@ def section(bench: FakePlatform, error_deg: float = 0.0, hold_error_deg: float =
     }
     headings = tuple(bench.heading_deg - hold_error_deg * h.t_s / 14400.0 for h in r.held)
     return GyroSection(
-        label="improved", result=r.start, truth=truth, hold=r, hold_truth=HeldTruth(heading_deg=headings)
+        label="improved",
+        result=r.start,
+        truth=truth,
+        hold=r,
+        hold_truth=HeldTruth(heading_deg=headings),
+        article=True,
     )
 
 
@@ -198,11 +203,21 @@ def test_within_limits_and_out_of_them() -> None:
     assert gyro_grading.within_limits([good])
     assert "All 5 numbers and the heading that was kept" in gyro_grading.verdict([good])
     assert not gyro_grading.within_limits([off])
-    assert gyro_grading.verdict([off, good]).startswith("1 of 12 comparisons are out of limits")
+    assert gyro_grading.verdict([off, good]).startswith("1 of 12 comparisons are not within 2 U of the truth")
     assert not gyro_grading.within_limits([lost])
     assert "OUT OF LIMITS" in gyro_grading.console_table(off)
     assert "met by this run" in gyro_grading.hold_summary(good)
     assert "not met by this run" in gyro_grading.hold_summary(lost)
+
+
+def test_the_article_s_claims_are_beside_its_own_platform_alone() -> None:
+    """What a user's platform is found to be has nothing to do with one simulated run of an article."""
+    its = section(FakePlatform(), 0.0, 0.2)
+    yours = replace(its, article=False)
+    for shown in (gyro_grading.console_table, lambda s: gyro_page.html_page([s], {})):
+        assert "article" in shown(its)
+        assert "article" not in shown(yours)
+    assert "largest error 0.2" in gyro_grading.hold_summary(yours)
 
 
 def test_a_doubt_is_out_of_limits_whatever_the_truth_says() -> None:

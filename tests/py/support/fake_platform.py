@@ -47,7 +47,8 @@ class FakePlatform:
     bias_beta_arcmin: float = 0.0  # measured less true
     bias_gamma_arcmin: float = 0.0
     scale1: float = 0.0  # error of the levelling torquer
-    scale2: float = 0.0  # of the azimuth torquer, in turns
+    scale2: float = 0.0  # of the azimuth torquer
+    angle_zero_arcmin: float = 0.0  # the angle sensor shows so much more
     noise_arcmin: float = 0.0  # of beta in each step; levelling follows it
     left_beta_arcmin: float = 0.0  # what each turn leaves of beta when it ends
     left_gimbal_arcmin: float = 0.0  # and of the gimbal angle
@@ -124,7 +125,7 @@ class FakePlatform:
             beta_n, gamma_n = beta + bias_beta * ARCMIN, gamma + bias_gamma * ARCMIN
             s = u1 + wz * math.cos(beta_n) * math.sin(gamma_n)
             beta = -s / self._m1 - bias_beta * ARCMIN
-        return s, u1, float(w[2]) + drift2, beta, gamma
+        return s, u1, (float(w[2]) + drift2) / (1.0 + self.scale2), beta, gamma
 
     def _mean(self, drift_degph: Callable[[float], float], length_s: float) -> float:
         """Of a drift over the window about this instant, deg/h."""
@@ -148,7 +149,8 @@ class FakePlatform:
             self.heading_deg += self.vehicle_turns_deg.get(k, 0.0)
             self.pitch_deg += self.vehicle_tilts_deg.get(k, 0.0)
             self._set = math.radians(angle_deg)
-            self._q = self._set - self.set_sd_arcmin * ARCMIN * self.rng.standard_normal()
+            off_arcmin = self.set_sd_arcmin * self.rng.standard_normal() + self.angle_zero_arcmin
+            self._q = self._set - off_arcmin * ARCMIN
             self.t_s += abs(math.degrees(self._set - before)) / table.slew_dps + table.settle_s
             windows.append(self._window(k, table.window_s))
             done(windows[-1])
@@ -166,7 +168,7 @@ class FakePlatform:
         shift_arcmin = self.level_sd_arcmin * self.rng.standard_normal(2)  # of the level sensors, in this setting
         s, u1, u2, _, gamma = self.settled(self._q, length_s, shift_arcmin)
         read = self.read_sd_arcmin * ARCMIN * self.rng.standard_normal()
-        encoder = self._q + read if self.stuck_deg is None else math.radians(self.stuck_deg)
+        encoder = self._shown_rad() + (read if self.stuck_deg is None else 0.0)
         at_s = STEP_S * np.arange(n, dtype=np.float64)
         swing = self.left_gimbal_arcmin * ARCMIN * np.exp(-self._m2 * (self._settle_s + at_s))
         rate = s + self._m2 * swing * math.sin(gamma)  # levelling takes a turn about the vertical for a rate
@@ -218,9 +220,15 @@ class FakePlatform:
 
     def look(self) -> Look:
         self._drift_to_now()
-        encoder = self._q if self.stuck_deg is None else math.radians(self.stuck_deg)
+        encoder = self._shown_rad()
         azimuth = self._comp.azimuth_rad if self._comp else 0.0
         return Look(t_s=self.t_s, encoder_rad=encoder, heading_rad=(encoder - azimuth) % (2.0 * math.pi))
+
+    def _shown_rad(self) -> float:
+        """Of the angle sensor, without what is new in each setting."""
+        if self.stuck_deg is not None:
+            return math.radians(self.stuck_deg)
+        return self._q + self.angle_zero_arcmin * ARCMIN
 
     def wait(self, dwell_s: float) -> None:
         self.t_s += dwell_s
