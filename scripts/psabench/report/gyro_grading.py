@@ -131,8 +131,8 @@ def verdict(sections: Sequence[GyroSection]) -> str:
     held = " and the heading that was kept" if any(s.hold for s in sections) else ""
     if not out:
         return (
-            f"All {len(compared)} numbers{held} are within {LIMIT_CI:g} U of the truth, {beyond} of the numbers beyond U "
-            f"(expected: {by_chance:.1f})."
+            f"All {len(compared)} numbers{held} are within {LIMIT_CI:g} U of the truth, {beyond} of the numbers are "
+            f"beyond U (expected: {by_chance:.1f})."
         )
     both = len(compared) + sum(hold_within(s) is not None for s in sections)
     return f"{out} of {both} comparisons are not within {LIMIT_CI:g} U of the truth."
