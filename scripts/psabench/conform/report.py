@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +18,7 @@ from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.link.own import replace_file
 from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
+from psabench.report.provenance import KEY
 
 FORMAT = 1  # of conform.json
 ORDER = tuple(Verdict)
@@ -133,7 +136,8 @@ def unseen(run: Run) -> dict[str, int]:
 def write(folder: Path, run: Run) -> Path:
     """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises as write_report."""
     page = write_report(folder, as_dict(run), html_page(run, folder), "conform.json")
-    replace_file(folder / "junit.xml", junit(run))
+    told = json.loads((folder / "conform.json").read_text(encoding="utf-8"))
+    replace_file(folder / "junit.xml", junit(run, told[KEY]))
     return page
 
 
@@ -174,20 +178,31 @@ def _result_counts(run: Run) -> dict[str, Any]:
     return {"result": c.result.value, "judged": c.judged, "needed": c.needed, "of": len(c.verdicts), **counts}
 
 
-def junit(run: Run) -> str:
-    """As CI servers read it, a case for each requirement: one that was not judged is skipped, with its reason."""
+def junit(run: Run, origin: Mapping[str, Any]) -> str:
+    """As CI servers read it, a case for each requirement: one that was not judged is skipped, with its reason.
+
+    origin: the provenance of conform.json, for the properties.
+    """
     c = run.coverage()
     suite = ET.Element("testsuite", name=f"conform {run.suite}: {run.subject}", tests=str(len(c.verdicts)))
     kinds = Counter(_JUNIT[v] for v in c.verdicts.values() if v in _JUNIT)
     plurals = {"failure": "failures", "error": "errors", "skipped": "skipped"}
     suite.attrib |= {plural: str(kinds[kind]) for kind, plural in plurals.items()}
     properties = ET.SubElement(suite, "properties")
-    for name, value in {**_result_counts(run), **run.facts}.items():
+    for name, value in {**_result_counts(run), **run.facts, **_origin_properties(origin)}.items():
         ET.SubElement(properties, "property", name=name, value=str(value))
     for i, verdict in c.verdicts.items():
         _add_case(suite, run, i, verdict)
     ET.indent(suite)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(suite, encoding="unicode") + "\n"
+
+
+def _origin_properties(origin: Mapping[str, Any]) -> dict[str, str]:
+    """Who computed it, when, from what; a list of words as a shell takes it, what is not known left out."""
+    plain = {k: shlex.join(map(str, v)) if k == "command" and v else v for k, v in origin.items()}
+    digests = {f"scenario {s['name']} sha256": s["sha256"] for s in origin.get("scenarios", []) if "sha256" in s}
+    known = {k: v for k, v in plain.items() if isinstance(v, str | int | float)} | digests
+    return {f"{KEY}.{name}": str(value) for name, value in known.items()}
 
 
 def _add_case(suite: ET.Element, run: Run, i: str, verdict: Verdict) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import made_recordings as make
 import pytest
@@ -14,6 +15,7 @@ from psabench.conform.coverage import Goal, Least, Result
 from psabench.conform.profile import variant
 from psabench.conform.selection import requirements_of
 from psabench.conform.verdict import Outcome, Verdict
+from psabench.report import provenance
 from whole_runs import check_counts
 
 ROWS = [r for r in requirements_of(variant("psa2", "article")) if not r.unobservable][:20]
@@ -67,6 +69,16 @@ def test_what_a_run_may_say(verdicts: str, goal: Goal, result: Result, status: i
     check_counts(tmp_path, run)
     colour = {Result.CONFORMS: "good", Result.VIOLATED: "bad"}.get(result, "plain")
     assert f"<p class='verdict {colour}'>" in (tmp_path / "report.html").read_text()
+
+
+def test_junit_says_who_computed_it_and_from_what(tmp_path: Path) -> None:
+    with provenance.command_run(["conform", "device", "--out", "a b"]):
+        provenance.note_bench("converters", 7)
+        report.write(tmp_path, run_of("p" * 20, Goal()))
+    check_counts(tmp_path, run_of("p" * 20, Goal()))
+    found = {p.get("name"): p.get("value") for p in ET.parse(tmp_path / "junit.xml").getroot().iter("property")}
+    assert (found["provenance.command"], found["provenance.seed"]) == ("conform device --out 'a b'", "7")
+    assert {"provenance.begun", "provenance.duration_s", "provenance.python"} <= found.keys()
 
 
 def test_an_interrupted_run_says_so_first() -> None:

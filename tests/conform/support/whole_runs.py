@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 from collections.abc import Sequence
 from html import escape
@@ -63,6 +64,11 @@ def check_counts(folder: Path, run: report.Run) -> None:
     assert int(suite.get("tests", "-1")) == len(run.rows)
     properties = {p.get("name"): p.get("value") for p in suite.iter("property")}
     assert (properties["result"], properties["judged"]) == (c.result.value, str(c.judged))
+    for name in ("psabench", "revision", "begun", "seed"):
+        want = told["provenance"][name]
+        assert properties.get(f"provenance.{name}") == (None if want is None else str(want))
+    if told["provenance"]["command"]:
+        assert shlex.split(properties["provenance.command"]) == told["provenance"]["command"]
 
 
 def not_met(run: report.Run) -> list[str]:
