@@ -127,6 +127,24 @@ double chamber_element_degc(const struct chamber *c, const struct chamber_body *
     return element_after(b, &p, ramp ? t_s : t_s - c->duration_s);
 }
 
+/* Its element is as warm as this. */
+static void count_cycles(struct chamber_cycles *n, double element_degc)
+{
+    const double up_k = element_degc - CHAMBER_CYCLE_COLD_DEGC;
+    if (up_k <= 0.0) n->cold = true;
+    if (!n->cold) return;
+    n->part = fmax(n->part, up_k / (CHAMBER_CYCLE_HOT_DEGC - CHAMBER_CYCLE_COLD_DEGC));
+    if (n->part < 1.0) return;
+    *n = (struct chamber_cycles){.whole = n->whole + 1};
+}
+
+double chamber_body_cycles(const struct chamber *c, const struct chamber_body *b, int64_t t_ns)
+{
+    struct chamber_cycles n = b->cycles;
+    count_cycles(&n, chamber_element_degc(c, b, t_ns));
+    return n.whole + n.part;
+}
+
 static void look_ahead(const struct chamber *c, struct chamber_body *b)
 {
     const struct piece p = ramp_of(c, b);
@@ -144,6 +162,7 @@ void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s
         .next = c->bodies,
     };
     c->bodies = b;
+    count_cycles(&b->cycles, b->element_degc);
     look_ahead(c, b);
 }
 
@@ -157,6 +176,7 @@ static void plan_ramp(struct chamber *c, double set_degc, int64_t t_ns)
         const double case_degc = chamber_case_degc(c, b, t_ns);
         b->element_degc = chamber_element_degc(c, b, t_ns);
         b->case_degc = case_degc;
+        count_cycles(&b->cycles, b->element_degc);
     }
     const bool up = set_degc > air_degc;
     const double limit = up ? c->cfg.heating_max_k_per_min : c->cfg.cooling_max_k_per_min;

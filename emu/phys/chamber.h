@@ -6,7 +6,9 @@
  *   tau_case case' = air - case,   tau_element element' = case - element,
  *
  * both in closed form over the straight pieces of the air's course: temperatures are functions of time, independent of
- * how often they are read. A command updates every body in the chamber. Plain structs, one thread; commands in order of
+ * how often they are read. So is how many thermal cycles a body has had: an element that has been cold and then is hot, powered
+ * or not; on its way up, the part of a cycle. The few kelvin that an element overshoots after a command count for nothing.
+ * A command updates every body in the chamber. Plain structs, one thread; commands in order of
  * time; an instant before the latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_CHAMBER_H
 #define PSABENCH_PHYS_CHAMBER_H
@@ -28,11 +30,23 @@ struct chamber_cfg {
 
 enum chamber_result { CHAMBER_OK, CHAMBER_OUT_OF_RANGE };
 
+/* Ten kelvin inside the run-in of the article, -60 to +85 degC (E0): an element need not be soaked to the last kelvin. */
+#define CHAMBER_CYCLE_COLD_DEGC (-50.0)
+#define CHAMBER_CYCLE_HOT_DEGC  75.0
+
+/* Thermal cycles of an element. */
+struct chamber_cycles {
+    bool cold; /* it has been, since the last whole cycle */
+    unsigned whole;
+    double part; /* of the next one: how far up it has been */
+};
+
 /* Something in the chamber; embedded in its owner, not to be moved after chamber_put_in(). */
 struct chamber_body {
     double tau_case_s, tau_element_s;
     double case_degc, element_degc;         /* at the chamber's latest command */
     double case_end_degc, element_end_degc; /* at the end of its ramp */
+    struct chamber_cycles cycles;           /* up to the latest command */
     struct chamber_body *next;
 };
 
@@ -70,5 +84,8 @@ int64_t chamber_stable_ns(const struct chamber *c);               /* since or fr
 
 double chamber_case_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
 double chamber_element_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
+
+/* Thermal cycles since it was put in, with the part of the present one. */
+double chamber_body_cycles(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
 
 #endif

@@ -42,6 +42,7 @@ static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
     const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
     u->mems[axis].temp_degc = q->element_degc = element_degc;
     q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
+    if (c->cfg.present) q->cycles = chamber_body_cycles(c, &u->body, step * WARM_STEP_NS);
 }
 
 /* What the sensor of a channel measures at a row of instants, a = -f on its own axes: at rest the projections of gravity. The face
@@ -280,6 +281,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
     static const char *const slow_noise[UNIT_AXES] = {"mems.slow.x", "mems.slow.y", "mems.slow.z"};
     static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
+    static const char *const quartz_scatter[UNIT_AXES] = {"quartz.start.x", "quartz.start.y", "quartz.start.z"};
     u->cfg = *cfg;
     u->lab = lab;
     u->type = cfg->type;
@@ -293,7 +295,8 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         mems_init(&u->mems[i], &m, draws_of(cfg->board.seed, cfg->board.serial, noise[i]),
                   draws_of(cfg->board.seed, cfg->board.serial, slow_noise[i]));
         quartz_init(&u->quartz[i], &cfg->axis[i].quartz, lab->site.g_mps2,
-                    draws_of(cfg->board.seed, cfg->board.serial, quartz_noise[i]));
+                    draws_of(cfg->board.seed, cfg->board.serial, quartz_noise[i]),
+                    draws_of(cfg->board.seed, cfg->board.serial, quartz_scatter[i]));
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
         const struct det_pair alpha0 = det_sin_cos(alpha0_rad);
@@ -314,6 +317,7 @@ void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bu
 
 void unit_power_up(struct unit *u, int64_t t_ns)
 {
+    for (unsigned i = 0; i < UNIT_AXES; i++) quartz_start(&u->quartz[i]);
     u->type->power_up(u->board, t_ns);
     if (u->can) u->type->can->power_up(u->can, t_ns);
 }

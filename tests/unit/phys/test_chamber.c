@@ -133,6 +133,46 @@ static void temperatures_do_not_depend_on_how_often_the_course_is_cut(void **sta
     }
 }
 
+/* -60 and +85 degC and back to where it began, twice, soaked; then as far as +50 degC and back: 0.8 of the way to hot. */
+static void a_cycle_is_cold_then_hot_and_a_part_of_one_stays(void **state)
+{
+    (void)state;
+    static const struct {
+        double set_degc, after_s, cycles;
+    } rows[] = {
+        {85, 20000, 0}, /* hot without having been cold */
+        {-60, 20000, 0}, {85, 9600, 1},    {25, 9000, 1},     {-60, 20000, 1}, {85, 20000, 2},
+        {-60, 20000, 2}, {50, 20000, 2.8}, {-60, 20000, 2.8}, {0, 20000, 2.8}, {85, 20000, 3},
+    };
+    struct chamber c = up(180.0, 360.0);
+    struct chamber_body b;
+    chamber_put_in(&c, &b, 0, 0);
+    double t_s = 0.0, was = 0.0;
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        assert_int_equal(chamber_set(&c, rows[i].set_degc, ns(t_s)), CHAMBER_OK);
+        for (double past_s = 600.0; past_s < rows[i].after_s; past_s += 60.0) { /* a look is nothing to the body */
+            const double now = chamber_body_cycles(&c, &b, ns(t_s + past_s));
+            assert_true(now >= was);
+            was = now;
+        }
+        t_s += rows[i].after_s;
+        near(chamber_body_cycles(&c, &b, ns(t_s)), rows[i].cycles, 1e-3);
+    }
+}
+
+/* In the air of the article's run-in, but too fast for the element: it never gets cold. */
+static void air_alone_makes_no_cycle(void **state)
+{
+    (void)state;
+    struct chamber c = up(180.0, 3600.0);
+    struct chamber_body b;
+    chamber_put_in(&c, &b, 0, 0);
+    assert_int_equal(chamber_set(&c, -60.0, 0), CHAMBER_OK);
+    assert_int_equal(chamber_set(&c, 85.0, ns(5200)), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(5200)), -60.0, 1e-9);
+    near(chamber_body_cycles(&c, &b, ns(1e6)), 0.0, 0.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -143,6 +183,8 @@ int main(void)
         cmocka_unit_test(lags_answer_a_step),
         cmocka_unit_test(without_lags_the_body_is_as_warm_as_the_air),
         cmocka_unit_test(temperatures_do_not_depend_on_how_often_the_course_is_cut),
+        cmocka_unit_test(a_cycle_is_cold_then_hot_and_a_part_of_one_stays),
+        cmocka_unit_test(air_alone_makes_no_cycle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

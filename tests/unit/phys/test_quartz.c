@@ -7,7 +7,8 @@
 
 #include <math.h>
 
-#define G 9.81
+#define G      9.81
+#define ARCSEC 4.84813681109536e-6
 
 static void near(double got, double want, double tol)
 {
@@ -17,7 +18,7 @@ static void near(double got, double want, double tol)
 static struct quartz up(const struct quartz_g *cfg)
 {
     struct quartz q;
-    quartz_init(&q, cfg, G, draws_of(1, 1, "quartz.x"));
+    quartz_init(&q, cfg, G, draws_of(1, 1, "quartz.x"), draws_of(1, 1, "quartz.start.x"));
     return q;
 }
 
@@ -53,6 +54,22 @@ static void each_term_of_the_model(void **state)
          -40,
          -300e-9},
         {{.scale_a_per_g = 1e-3, .curve_ug = 300, .curve_centre_degc = 10, .curve_width_k = 50}, {0, 0, 0}, 10, 0},
+        {{.scale_a_per_g = 1e-3, .scale_curve_ppm = 200, .curve_centre_degc = 10, .curve_width_k = 50},
+         {-1, 0, 0},
+         60,
+         -1.0002e-3},
+        {{.scale_a_per_g = 1e-3, .base_slope_arcsec_per_k = 0.5}, {0, 1, 0}, 70, 20e-3 * ARCSEC},
+        {{.scale_a_per_g = 1e-3, .base_curve_arcsec = 4, .curve_centre_degc = 10, .curve_width_k = 50},
+         {0, 1, 0},
+         -40,
+         -4e-3 * ARCSEC},
+        {{.scale_a_per_g = 1e-3, .glue_ug = 80, .glue_keep = 0.5, .cycles = 2}, {0, 0, 0}, 85, 20e-9},
+        {{.scale_a_per_g = 1e-3, .glue_ppm = 80, .glue_keep = 0.5}, {1, 0, 0}, -60, 1.00008e-3},
+        {{.scale_a_per_g = 1e-3, .glue_arcsec = 8, .glue_keep = 0.5, .cycles = 3}, {0, -1, 0}, 30, -1e-3 * ARCSEC},
+        {{.scale_a_per_g = 1e-3, .position_urad = 3, .hinge_ug_per_urad = 48}, {0, 0, 1}, 30, 144e-9},
+        {{.scale_a_per_g = 1e-3, .position_urad = 3}, {0, 1, 0}, 30, 3e-9},
+        {{.scale_a_per_g = 1e-3, .pendulous_ug_per_g2 = 188}, {2, 0, 1}, 30, 2e-3},
+        {{.scale_a_per_g = 1e-3, .pendulous_ug_per_g2 = 188}, {2, 1, 0}, 30, 2e-3 / (1 - 188e-6)},
     };
     for (size_t i = 0; i < COUNT(rows); i++) {
         struct quartz q = up(&rows[i].cfg);
@@ -148,6 +165,93 @@ static void noise_of_a_look_follows_its_interval(void **state)
     }
 }
 
+/* Each thermal cycle leaves a half, whoever counts it: the scenario or the chamber. */
+static void cycles_relax_the_glue(void **state)
+{
+    (void)state;
+    struct quartz q =
+        up(&(struct quartz_g){.scale_a_per_g = 1e-3, .glue_ug = 80, .glue_ppm = 40, .glue_keep = 0.5, .cycles = 1});
+    const double at_g[3] = {G, 0, 0};
+    for (int n = 0; n < 8; n++) {
+        q.cycles = 0.5 * n;
+        const double left = pow(0.5, 1.0 + 0.5 * n);
+        near(quartz_true_a(&q, at_g), 1e-3 * (1.0 + 40e-6 * left) * (1.0 + 80e-6 * left), 1e-16);
+        near(out_a(&q, at_g, (n + 1) * 1000, 1000), quartz_true_a(&q, at_g), 0.0);
+    }
+}
+
+/* Zero, scale and base of 4000 starts: normal, of the given rms, independent; the same start is the same. */
+static void each_start_scatters_by_itself(void **state)
+{
+    (void)state;
+    enum { N = 4000 };
+    const struct quartz_g cfg = {.scale_a_per_g = 1e-3, .start_ug = 12.6, .start_ppm = 18.7, .start_arcsec = 1.64};
+    struct quartz q = up(&cfg), again = up(&cfg);
+    double sum2[3] = {0}, cross[3] = {0};
+    for (int n = 0; n < N; n++) {
+        const double still[3] = {0}, x[3] = {G, 0, 0}, y[3] = {0, G, 0};
+        const double zero = quartz_true_a(&q, still);
+        const double v[3] = {zero / 1e-9 / 12.6, (quartz_true_a(&q, x) - zero - 1e-3) / 1e-9 / 18.7,
+                             (quartz_true_a(&q, y) - zero) / (1e-3 * ARCSEC) / 1.64};
+        assert_true(quartz_true_a(&again, x) == quartz_true_a(&q, x));
+        for (int k = 0; k < 3; k++) sum2[k] += v[k] * v[k];
+        for (int k = 0; k < 3; k++) cross[k] += v[k] * v[(k + 1) % 3];
+        quartz_start(&q);
+        quartz_start(&again);
+    }
+    for (int k = 0; k < 3; k++) near(sqrt(sum2[k] / N), 1.0, 4.0 / sqrt(2.0 * N));
+    for (int k = 0; k < 3; k++) near(cross[k] / N, 0.0, 4.0 / sqrt(N));
+    struct quartz_g older = cfg;
+    older.starts = N;
+    struct quartz later = up(&older);
+    assert_true(quartz_true_a(&later, (const double[3]){0}) == quartz_true_a(&q, (const double[3]){0}));
+}
+
+/* Two sines at 45 degrees: half the coupling times the squares, of the part of the deflection that is in phase. At the natural
+ * frequency that is none; above it has the other sign. */
+static void a_pendulum_rectifies_vibration_across(void **state)
+{
+    (void)state;
+    static const double pi2 = 6.283185307179586;
+    const struct {
+        double hz, in_phase; /* of 1 / (1 - r^2 + 2 z r i), r = f / 350 Hz, z = 0.7 */
+    } rows[] = {{35, 0.99 / (0.99 * 0.99 + 0.0196)}, {350, 0.0}, {700, -3.0 / (9.0 + 7.84)}};
+    for (size_t k = 0; k < COUNT(rows); k++) {
+        enum { PERIODS = 70 };
+        const int64_t step_ns = 1000;
+        struct quartz q = up(
+            &(struct quartz_g){.scale_a_per_g = 1e-3, .pendulous_ug_per_g2 = 188, .natural_hz = 350, .damping = 0.7});
+        const int64_t n = (int64_t)(PERIODS * 1e9 / rows[k].hz / (double)step_ns), from = n / 2;
+        double sum = 0.0;
+        for (int64_t i = 0; i < n; i++) {
+            const double a = 5.0 * G * sin(pi2 * rows[k].hz * 1e-9 * (double)(i * step_ns));
+            const double got = out_a(&q, (const double[3]){a, a, 0}, i * step_ns, step_ns);
+            if (i >= from) sum += got / 1e-3;
+        }
+        near(sum / (double)(n - from), 0.5 * 188e-6 * 25.0 * rows[k].in_phase, 188e-6 * 25.0 * 0.01);
+    }
+}
+
+/* Ratio and place of the extremes over -60 to +85 degC: both groups mirror each other (fig. 2). */
+static void the_two_groups_mirror_each_other(void **state)
+{
+    (void)state;
+    struct quartz_g a = quartz_default(), b;
+    a.curve_ug = 400.0;
+    a.zero_ug = 0.0;
+    b = a;
+    b.curve_ug = -a.curve_ug;
+    double hot = 0.0, cold = 0.0;
+    for (double t = -60.0; t <= 85.0; t += 0.5) {
+        const double y = quartz_settled_ug(&a, t);
+        near(quartz_settled_ug(&b, t), -y, 1e-12);
+        hot = fmax(hot, t > 30.0 ? y : 0.0);
+        cold = fmin(cold, t < 0.0 ? y : 0.0);
+    }
+    near(hot, 400.0, 1e-9); /* convex upward at 67 degC */
+    near(cold, -400.0, 1e-9);
+}
+
 static void keep_code(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 {
     (void)t_ns;
@@ -184,6 +288,32 @@ static void a_board_reads_its_current(void **state)
          3.4e-5); /* 2e-4: the FIR filter's own gain is 1.00017 */
 }
 
+/* A unit that the chamber cycles, powered or not, and that is switched on again. */
+static void a_unit_counts_its_cycles_and_starts(void **state)
+{
+    (void)state;
+    static struct unit u;
+    static struct lab lab;
+    struct sched s;
+    sched_init(&s);
+    struct lab_cfg laboratory = lab_default();
+    laboratory.chamber.present = true;
+    lab_init(&lab, &laboratory, 1);
+    struct unit_cfg cfg = unit_default("u");
+    cfg.board.afe[0] = afe_nominal(AFE_CURRENT);
+    cfg.axis[0].sensor = UNIT_QUARTZ;
+    cfg.axis[0].quartz = (struct quartz_g){.scale_a_per_g = 1e-3, .glue_ug = 800, .glue_keep = 0.25};
+    unit_init(&u, &cfg, &lab, &s);
+    const int64_t hour_ns = 3600 * NS_PER_S;
+    const double before_a = unit_sensor_out(&u, 0, 0);
+    assert_int_equal(chamber_set(&lab.chamber, -60.0, 0), CHAMBER_OK);
+    assert_int_equal(chamber_set(&lab.chamber, 85.0, 4 * hour_ns), CHAMBER_OK);
+    near(before_a - unit_sensor_out(&u, 0, 8 * hour_ns), 600e-9, 1e-15);
+    assert_int_equal(u.quartz[0].starts, 0);
+    unit_power_up(&u, 8 * hour_ns);
+    assert_int_equal(u.quartz[0].starts, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -192,8 +322,13 @@ int main(void)
         cmocka_unit_test(the_play_makes_a_loop),
         cmocka_unit_test(a_step_is_answered_as_an_oscillator_does),
         cmocka_unit_test(a_board_reads_its_current),
+        cmocka_unit_test(a_unit_counts_its_cycles_and_starts),
         cmocka_unit_test(two_pasts_become_one),
         cmocka_unit_test(noise_of_a_look_follows_its_interval),
+        cmocka_unit_test(cycles_relax_the_glue),
+        cmocka_unit_test(each_start_scatters_by_itself),
+        cmocka_unit_test(a_pendulum_rectifies_vibration_across),
+        cmocka_unit_test(the_two_groups_mirror_each_other),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -219,7 +219,7 @@ static void digest(char hex[SHA256_HEX])
     sha256_hex(&s, hex);
 }
 
-#define KEYS 15u /* chains, white and slow noise of MEMS, quartz, and a source of the board's */
+#define KEYS 18u /* chains, white and slow noise of MEMS, noise and scatter of quartz, and a source of the board's */
 
 static void noise_keys(const struct board_type *t, uint32_t serial, uint64_t key[KEYS])
 {
@@ -232,6 +232,7 @@ static void noise_keys(const struct board_type *t, uint32_t serial, uint64_t key
         key[6 + i] = w.u.mems[i].slow.draws.key;
         key[9 + i] = w.u.quartz[i].noise.key;
         key[12 + i] = board_draws(w.u.board, source[i]).key;
+        key[15 + i] = w.u.quartz[i].scatter.key;
     }
 }
 
