@@ -34,7 +34,7 @@ static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
     cJSON_AddStringToObject(to, "sensor", names[sensor]);
     if (sensor == UNIT_MEMS) yaml_dump(&scenario_mems_fields, &u->cfg.axis[i].mems, to);
     if (sensor == UNIT_MEMS) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
-    if (sensor == UNIT_QUARTZ) add_section(&scenario_quartz_fields, &u->cfg.axis[i].quartz, "quartz", to);
+    if (sensor == UNIT_QUARTZ) add_section(&scenario_quartz_fields, &u->quartz[i].cfg, "quartz", to);
     if (sensor == UNIT_QUARTZ) add_real(to, "sensor_a", unit_sensor_out(u, i, t_ns));
     const bool current = u->cfg.board.afe[i].input == AFE_CURRENT;
     if (sensor == UNIT_RECORDED) add_real(to, current ? "sensor_a" : "sensor_v", unit_sensor_out(u, i, t_ns));
@@ -126,6 +126,23 @@ static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
     cJSON_AddItemToObject(vehicle, "accel_l_mps2", cJSON_CreateDoubleArray(v.accel_l_mps2, 3));
 }
 
+/* Of the quartz sensors whose pendulum is known: what their phase-sensitive amplifiers have before them. */
+static void add_pickoffs(const struct unit *u, cJSON *to)
+{
+    static const char *const axis[] = {"x", "y", "z"};
+    struct pickoff p;
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        if (u->cfg.axis[i].sensor != UNIT_QUARTZ || !quartz_pickoff(&u->quartz[i], &p)) continue;
+        cJSON *all = cJSON_GetObjectItem(to, "pickoff");
+        cJSON *j = cJSON_AddObjectToObject(all ? all : cJSON_AddObjectToObject(to, "pickoff"), axis[i]);
+        add_real(j, "angle_urad", p.angle_rad * 1e6);
+        cJSON_AddItemToObject(j, "gap_m", cJSON_CreateDoubleArray(p.gap_m, 2));
+        add_real(j, "delta_m", p.delta_m);
+        add_real(j, "pickoff_v", p.volt_v);
+        add_real(j, "amplifier_a", p.current_a);
+    }
+}
+
 /* At the unit's origin, in the axes of its case. */
 static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
 {
@@ -151,6 +168,7 @@ static void add_unit_state(struct unit *u, cJSON *to, int64_t t_ns)
         cJSON_AddItemToArray(amperes, cJSON_CreateNumber(current ? out : 0.0));
         cJSON_AddItemToArray(moved, cJSON_CreateNumber(unit_zero_moved_v(u, i, t_ns)));
     }
+    add_pickoffs(u, to);
 }
 
 static enum control_outcome do_state(const struct control_call *call)

@@ -303,7 +303,8 @@ static const struct {
     const char *end, *unit;
 } units[] = { /* the longer first */
     {"_ppm_per_k", "ppm/K"}, {"_k_per_min", "K/min"}, {"_v_per_g2", "V/g²"}, {"_v_per_g", "V/g"}, {"_v_per_k", "V/K"},
-    {"_ug_per_urad", "µg/µrad"}, {"_arcsec_per_k", "arcsec/K"}, {"_ug_per_g2", "µg/g²"}, {"_ug_per_k", "µg/K"},
+    {"_n_m_per_rad", "N m/rad"}, {"_v_per_rad", "V/rad"}, {"_n_m_per_a", "N m/A"}, {"_a_per_v", "A/V"}, {"_kg_m2", "kg m²"},
+    {"_n_m_s", "N m s"}, {"_kg", "kg"}, {"_ug_per_urad", "µg/µrad"}, {"_arcsec_per_k", "arcsec/K"}, {"_ug_per_g2", "µg/g²"}, {"_ug_per_k", "µg/K"},
     {"_a_per_g", "A/g"}, {"_a_rthz", "A/√Hz"}, {"_mrad", "mrad"}, {"_urad", "µrad"}, {"_ug", "µg"},
     {"_v_per_s", "V/s"}, {"_a_per_k", "A/K"}, {"_v_rthz", "V/√Hz"}, {"_v_rts", "V/√s"}, {"_arcsec_rms", "arcsec"},
     {"_arcsec", "arcsec"}, {"_mps2", "m/s²"}, {"_dps2", "°/s²"}, {"_dps", "°/s"}, {"_degc", "°C"}, {"_deg", "°"},

@@ -55,6 +55,22 @@ static const struct field series_rows[] = {
 };
 const struct fields scenario_series_fields = FIELDS(series_rows);
 
+static const struct field pendulum_rows[] = {
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = offsetof(struct pendulum, name), .min = (lo), .max = (hi), .what = (words)}
+    ROW(mass_kg,           1e-6, 1,   "m, mass of the pendulum"),
+    ROW(arm_m,             1e-5, 0.1, "L, from the hinge to the centre of mass"),
+    ROW(inertia_kg_m2,     1e-12, 1e-2, "J, moment of inertia about the hinge"),
+    ROW(damping_n_m_s,     0, 1,      "C, damping moment for a rate of 1 rad/s"),
+    ROW(hinge_n_m_per_rad, 0, 1,      "stiffness of the hinge, beside the electrical spring"),
+    ROW(pickoff_v_per_rad, 1, 1e6,    "K_DU, sensitivity of the capacitive pickoff"),
+    ROW(amplifier_a_per_v, 1e-7, 1,   "K_U, gain of the phase-sensitive amplifier"),
+    ROW(torquer_n_m_per_a, 1e-5, 10,  "K_DM, torquer constant"),
+    ROW(gap_m,             1e-7, 1e-2, "gap of the pickoff on either side; an electrode stops the pendulum"),
+    ROW(electrode_arm_m,   1e-5, 0.1, "from the hinge to the centre of the electrodes"),
+#undef ROW
+};
+const struct fields scenario_pendulum_fields = FIELDS(pendulum_rows);
+
 #define QUARTZ(m) offsetof(struct quartz_g, m)
 static const struct field quartz_rows[] = {
 #define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
@@ -90,6 +106,8 @@ static const struct field quartz_rows[] = {
     ROW(damping,            0, 0.999,   "damping ratio of the loop"),
     ROW(noise_a_rthz,       0, 1,       "white noise, one-sided density"),
     ROW(limit_a,            0, 10,      "largest current of either sign; 0: none"),
+    {.key = "pendulum", .type = FIELD_SECTION, .offset = QUARTZ(pendulum), .sub = &scenario_pendulum_fields, .present = QUARTZ(pendulum_given),
+     .what = "parts of the pendulum and its loop; they decide `scale_a_per_g`, `natural_hz`, `damping`, `pendulous_ug_per_g2` and `hinge_ug_per_urad`"},
 #undef ROW
 };
 const struct fields scenario_quartz_fields = FIELDS(quartz_rows);

@@ -33,6 +33,7 @@ static const struct chapter chapters[] = {
     {"units[]", "A unit, or `count` of them. The defaults are those of the first.", &scenario_unit_fields, IN(units)},
     {"units[].axes.x", "A channel; `y` and `z` have the same keys.", &scenario_axis_fields, IN(units)},
     {"units[].axes.x.quartz", "A quartz sensor with current output.", &scenario_quartz_fields, IN(units[0].cfg.axis[0].quartz)},
+    {"units[].axes.x.quartz.pendulum", "The pendulum: equations (1) to (5) of the [quartz article](instruments.md#the-quartz-accelerometer).", &scenario_pendulum_fields, IN(units[0].cfg.axis[0].quartz.pendulum)},
     {"units[].axes.x.signal", "A signal from a file: [recorded signals](recorded.md).", &scenario_series_fields, IN(units[0].series[0])},
     {"units[].axes.x.afe", "Its analog chain: [afe](boards/psa2.md).", &scenario_afe_fields, IN(units[0].cfg.board.afe)},
     {"timeline[]", "A command that the bench gives to itself, as an operator would on the control socket.", &scenario_event_fields, NO_DEFAULTS},

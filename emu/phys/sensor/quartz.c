@@ -22,14 +22,30 @@ struct quartz_g quartz_default(void)
         .gradient_ug_per_k = 1.0,
         .glue_keep = 0.5,
         .hinge_ug_per_urad = 48.0,
+        .pendulum = pendulum_default(),
         .natural_hz = 350.0,
         .damping = 0.7,
     };
 }
 
+/* A pendulum that is given decides what follows from it. */
+static struct quartz_g with_pendulum(const struct quartz_g *cfg, double g_mps2)
+{
+    struct quartz_g c = *cfg;
+    if (!cfg->pendulum_given) return c;
+    const struct pendulum_law law = pendulum_law(&cfg->pendulum, g_mps2);
+    c.scale_a_per_g = law.scale_a_per_g;
+    c.natural_hz = law.natural_hz;
+    c.damping = law.damping;
+    c.pendulous_ug_per_g2 = law.deflection_urad_per_g;
+    c.hinge_ug_per_urad = law.hinge_ug_per_urad;
+    c.limit_a = c.limit_a > 0.0 ? fmin(c.limit_a, law.stop_a) : law.stop_a;
+    return c;
+}
+
 void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct draws noise, struct draws scatter)
 {
-    *q = (struct quartz){.cfg = *cfg,
+    *q = (struct quartz){.cfg = with_pendulum(cfg, g_mps2),
                          .g_mps2 = g_mps2,
                          .case_degc = QUARTZ_REFERENCE_DEGC,
                          .element_degc = QUARTZ_REFERENCE_DEGC,
@@ -164,26 +180,10 @@ double quartz_true_a(const struct quartz *q, const double a_mps2[3])
     return limited_a(q, t.scale_a_per_g * balanced_g(q, &t, a_mps2));
 }
 
-/* The free oscillator over dt: e'' + 2 z w e' + w^2 e = 0 for the deviation e and r = e' / w; z below 1. */
 static void set_step(struct quartz *q, int64_t dt_ns)
 {
-    const double dt_s = (double)dt_ns / (double)NS_PER_S;
-    const double z = fmin(q->cfg.damping, 0.999);
-    const double wt = TURN_RAD * q->cfg.natural_hz * dt_s;
-    const double d = sqrt(1.0 - z * z);
     q->dt_ns = dt_ns;
-    if (z * wt > GONE) {
-        q->step[0][0] = q->step[0][1] = q->step[1][0] = q->step[1][1] = 0.0;
-        return;
-    }
-    const double keep = det_exp(-z * wt);
-    const double turns = d * wt / TURN_RAD;
-    const struct det_pair a = det_sin_cos(TURN_RAD * (turns - floor(turns)));
-    const double c = a.cos, s = a.sin;
-    q->step[0][0] = keep * (c + z / d * s);
-    q->step[0][1] = keep * s / d;
-    q->step[1][0] = -keep * s / d;
-    q->step[1][1] = keep * (c - z / d * s);
+    pendulum_step(q->cfg.natural_hz, q->cfg.damping, (double)dt_ns / (double)NS_PER_S, q->step);
 }
 
 /* What is less is gone: without it, two pasts could differ in the last bit of a loop at rest for good. */
@@ -219,6 +219,13 @@ static double quiet_a(struct quartz *q, const double a_mps2[3], int64_t t_ns)
     if (first) q->input_g = load; /* it has been at rest */
     if (q->cfg.natural_hz > 0.0) load = answer_g(q, input_g(q, a_mps2));
     return q->held_a = q->terms.scale_a_per_g * load;
+}
+
+bool quartz_pickoff(const struct quartz *q, struct pickoff *out)
+{
+    if (!q->cfg.pendulum_given) return false;
+    *out = pendulum_pickoff(&q->cfg.pendulum, limited_a(q, q->held_a));
+    return true;
 }
 
 void quartz_out_row_a(struct quartz *q, const double *a_mps2, unsigned felt, const struct looks *at, double *out_a)

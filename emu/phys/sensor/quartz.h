@@ -18,6 +18,7 @@
 
 #include "base/draws.h"
 #include "base/looks.h"
+#include "phys/sensor/pendulum.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -46,6 +47,8 @@ struct quartz_g {
     double natural_hz, damping; /* of the loop; 0 Hz: answers at once */
     double noise_a_rthz;        /* white, one-sided */
     double limit_a;             /* either sign; 0: none */
+    bool pendulum_given;        /* scale, loop, coupling, hinge and a limit follow from it */
+    struct pendulum pendulum;
 };
 
 /* What temperature, cycles and starts make of a unit, and for which of them it holds. */
@@ -56,7 +59,7 @@ struct quartz_terms {
 };
 
 struct quartz {
-    struct quartz_g cfg;
+    struct quartz_g cfg; /* with what follows from its pendulum */
     double g_mps2;
     double case_degc, element_degc; /* its owner keeps them up; the reference temperature from quartz_init() on */
     double cycles;                  /* thermal cycles since then, as chamber_body_cycles() counts them; its owner too */
@@ -90,5 +93,8 @@ double quartz_settled_ug(const struct quartz_g *cfg, double degc);
 /* Output current at a row of looks; a_mps2 holds three numbers a look, or, if `felt` is 1, three for all. No look is
  * earlier than the last call's; the same instant gives the same current. */
 void quartz_out_row_a(struct quartz *q, const double *a_mps2, unsigned felt, const struct looks *at, double *out_a);
+
+/* Its pickoff at the last look: truth. False: nothing is known of its pendulum. */
+bool quartz_pickoff(const struct quartz *q, struct pickoff *out);
 
 #endif
