@@ -1,6 +1,7 @@
 /* Commands of the truth port: hidden parameters and true state, for graders alone. */
 #include "control/commands.h"
 #include "control/describe.h"
+#include "phys/sensor/quartz_batch.h"
 #include "scenario/keys.h"
 
 /* ---- parameters: by the tables of the scenario's keys */
@@ -35,6 +36,7 @@ static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
     if (sensor == UNIT_MEMS) yaml_dump(&scenario_mems_fields, &u->cfg.axis[i].mems, to);
     if (sensor == UNIT_MEMS) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
     if (sensor == UNIT_QUARTZ) add_section(&scenario_quartz_fields, &u->quartz[i].cfg, "quartz", to);
+    if (sensor == UNIT_QUARTZ) cJSON_AddStringToObject(to, "group", quartz_group_name(quartz_group(&u->quartz[i].cfg)));
     if (sensor == UNIT_QUARTZ) add_real(to, "sensor_a", unit_sensor_out(u, i, t_ns));
     const bool current = u->cfg.board.afe[i].input == AFE_CURRENT;
     if (sensor == UNIT_RECORDED) add_real(to, current ? "sensor_a" : "sensor_v", unit_sensor_out(u, i, t_ns));

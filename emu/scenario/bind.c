@@ -28,6 +28,14 @@ static void draw_parameters(const struct fields *t, const void *deviation, void 
     }
 }
 
+/* A sensor of the batch, with the hinge of its own pendulum. */
+static void draw_quartz(const struct scenario *s, uint32_t serial, unsigned axis, struct unit_axis_cfg *c)
+{
+    c->quartz = quartz_with_pendulum(&c->quartz, s->lab.site.g_mps2);
+    (void)quartz_batch_draw(&s->spread.quartz, s->seed, serial, axis,
+                            &c->quartz); /* its ratios were tried at loading */
+}
+
 static void draw_unit(const struct scenario *s, struct scenario_unit *u)
 {
     static const char *const sensor[] = {"x", "y", "z"}, *const chain[] = {"x.afe", "y.afe", "z.afe"};
@@ -35,6 +43,7 @@ static void draw_unit(const struct scenario *s, struct scenario_unit *u)
         const uint32_t serial = u->cfg.board.serial;
         draw_parameters(&scenario_mems_fields, &s->spread.mems, &u->cfg.axis[i].mems, s, serial, sensor[i]);
         draw_parameters(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
+        if (s->spread.quartz_given && u->cfg.axis[i].sensor == UNIT_QUARTZ) draw_quartz(s, serial, i, &u->cfg.axis[i]);
     }
 }
 

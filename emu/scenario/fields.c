@@ -296,6 +296,14 @@ cJSON *yaml_json(struct yaml_file *f, const struct yaml_node *node)
     return json_node(f, node, 0, &items);
 }
 
+bool yaml_find_proto(struct yaml_file *f, const struct yaml_node *node, const char *key, const char *folder,
+                     const char *name, char path[FIND_PATH_MAX])
+{
+    char why[400];
+    if (find_proto(folder, name, f->path, path, why, sizeof why)) return true;
+    return yaml_file_fail(f, node, key, "%s", why);
+}
+
 /* ---- units of names */
 
 // clang-format off

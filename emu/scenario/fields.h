@@ -7,6 +7,7 @@
 #define PSABENCH_SCENARIO_FIELDS_H
 
 #include "board/field.h"
+#include "scenario/find.h"
 #include "scenario/yaml_file.h"
 
 #include <cjson/cJSON.h>
@@ -32,6 +33,10 @@ void yaml_dump(const struct fields *t, const void *section, cJSON *to);
 
 /* The row's value; NULL for one that has none of its own. */
 cJSON *yaml_dump_value(const struct field *d, const void *section);
+
+/* Path of proto/FOLDER/NAME.yaml as find_proto() has it, for a value in f; the error has its line. */
+bool yaml_find_proto(struct yaml_file *f, const struct yaml_node *node, const char *key, const char *folder,
+                     const char *name, char path[FIND_PATH_MAX]);
 
 /* A mapping or sequence as JSON, for arguments that somebody else checks: plain scalars that are numbers, true, false
  * or null become such. NULL, with the error in why, when it is deeper or longer than arguments may be. */

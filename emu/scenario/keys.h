@@ -17,6 +17,7 @@ extern const struct fields scenario_platform_fields;      /* of struct platform_
 extern const struct fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
 extern const struct fields scenario_sway_fields;          /* of struct vehicle_sway */
 extern const struct fields scenario_spread_fields;        /* of struct scenario_spread */
+extern const struct fields scenario_batch_fields;         /* of struct quartz_batch */
 extern const struct fields scenario_afe_fields;           /* of struct afe_cfg */
 extern const struct fields scenario_afe_numbers;          /* its numbers alone */
 extern const struct fields scenario_mems_fields;          /* of struct mems_g */
@@ -38,6 +39,9 @@ bool scenario_load_site(struct yaml_file *f, const struct yaml_node *node, void 
 void scenario_dump_site(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_table(struct yaml_file *f, const struct yaml_node *node, void *section);
 void scenario_dump_table(const struct field *d, const void *section, cJSON *to);
+bool scenario_load_batch(struct yaml_file *f, const struct yaml_node *node,
+                         void *section); /* of struct scenario_spread */
+void scenario_dump_batch(const struct field *d, const void *section, cJSON *to);
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section);
 
 struct site scenario_site(const struct scenario_site *s);

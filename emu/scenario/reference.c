@@ -30,6 +30,7 @@ static const struct chapter chapters[] = {
     {"vehicle", "What the platform is on.", &scenario_vehicle_fields, IN(lab.vehicle)},
     {"vehicle.sway", "Its pitch and roll about their means.", &scenario_sway_fields, IN(lab.vehicle.sway)},
     {"spread", "Standard deviations of the production spread, by the keys of a channel; a unit with `spread: true` draws its own.", &scenario_spread_fields, IN(spread)},
+    {"spread.quartz", "A batch of quartz sensors, and a file of proto/batches: [groups, glue, tolerances](instruments.md#a-batch).", &scenario_batch_fields, IN(spread.quartz)},
     {"units[]", "A unit, or `count` of them. The defaults are those of the first.", &scenario_unit_fields, IN(units)},
     {"units[].axes.x", "A channel; `y` and `z` have the same keys.", &scenario_axis_fields, IN(units)},
     {"units[].axes.x.quartz", "A quartz sensor with current output.", &scenario_quartz_fields, IN(units[0].cfg.axis[0].quartz)},

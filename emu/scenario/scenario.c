@@ -107,6 +107,7 @@ static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void 
 static const struct field spread_rows[] = {
     {.type = FIELD_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
     {.key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &scenario_afe_numbers, .what = "parameters of the analog chain"},
+    {.key = "quartz", .type = FIELD_CUSTOM, .load = scenario_load_batch, .dump = scenario_dump_batch, .what = "batch of the quartz sensors: a name of proto/batches, a path, or a mapping; their temperature, glue and position are drawn from it"},
 };
 const struct fields scenario_spread_fields = FIELDS(spread_rows);
 // clang-format on
@@ -239,6 +240,7 @@ void scenario_default(struct scenario *s, const char *path)
     s->bus_count = 1;
     s->bus[0] = (struct scenario_bus){.name = "can0", .cfg = {.bitrate_hz = 1000000, .data_bitrate_hz = 5000000}};
     s->lab = lab_default();
+    s->spread.quartz = quartz_batch_default();
     s->site.g_mps2 = s->lab.site.g_mps2;
     snprintf(s->path, sizeof s->path, "%s", path);
 }

@@ -17,6 +17,7 @@
 
 #include "base/can/can.h"
 #include "base/sha256.h"
+#include "phys/sensor/quartz_batch.h"
 #include "scenario/find.h"
 #include "unit/unit.h"
 
@@ -66,10 +67,12 @@ struct scenario_unit {
     bool spread;        /* parameters of its own, drawn from the production spread */
 };
 
-/* Standard deviations of what differs from unit to unit. */
+/* What differs from unit to unit: standard deviations, and a batch. */
 struct scenario_spread {
     struct mems_g mems;
     struct afe_cfg afe;
+    bool quartz_given;
+    struct quartz_batch quartz; /* of which the quartz sensors are */
 };
 
 /* A command that the bench gives to itself. */

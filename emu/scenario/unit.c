@@ -17,11 +17,10 @@
 /* What is wrong within the profile is reported with its line there, that it is another board's with the line here. */
 static bool find_profile(struct yaml_file *f, const struct yaml_node *node, const char *name, struct scenario_unit *u)
 {
-    char path[FIND_PATH_MAX], why[400];
+    char path[FIND_PATH_MAX];
     const struct board_type *type = u->board->type;
     const struct board_name *of;
-    if (!find_proto("profiles", name, f->path, path, why, sizeof why))
-        return yaml_file_fail(f, node, "profile", "%s", why);
+    if (!yaml_find_proto(f, node, "profile", "profiles", name, path)) return false;
     if (!profile_yaml_load(path, &of, &u->profile, f->why, f->cap)) return false;
     if (!board_name_takes(u->board, of)) {
         return yaml_file_fail(f, node, "profile", "expected a profile of %s (board: %s), got %s, one of %s (board: %s)",

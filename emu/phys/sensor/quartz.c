@@ -28,8 +28,7 @@ struct quartz_g quartz_default(void)
     };
 }
 
-/* A pendulum that is given decides what follows from it. */
-static struct quartz_g with_pendulum(const struct quartz_g *cfg, double g_mps2)
+struct quartz_g quartz_with_pendulum(const struct quartz_g *cfg, double g_mps2)
 {
     struct quartz_g c = *cfg;
     if (!cfg->pendulum_given) return c;
@@ -45,7 +44,7 @@ static struct quartz_g with_pendulum(const struct quartz_g *cfg, double g_mps2)
 
 void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct draws noise, struct draws scatter)
 {
-    *q = (struct quartz){.cfg = with_pendulum(cfg, g_mps2),
+    *q = (struct quartz){.cfg = quartz_with_pendulum(cfg, g_mps2),
                          .g_mps2 = g_mps2,
                          .case_degc = QUARTZ_REFERENCE_DEGC,
                          .element_degc = QUARTZ_REFERENCE_DEGC,

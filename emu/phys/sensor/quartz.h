@@ -78,6 +78,9 @@ struct quartz {
  * causes only the hinge's stiffness and the half that a cycle leaves have figures: the unit has been run in. */
 struct quartz_g quartz_default(void);
 
+/* With what follows from its pendulum, if that is given. */
+struct quartz_g quartz_with_pendulum(const struct quartz_g *cfg, double g_mps2);
+
 /* g is the site's: a scale per g means per this g. */
 void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, struct draws noise, struct draws scatter);
 

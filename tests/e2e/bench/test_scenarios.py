@@ -140,6 +140,32 @@ def test_realistic_is_another_unit_for_each_seed() -> None:
     assert all(kxx == 2e-4 and drift == 5e-9 for kxx, drift, _ in drawn)
 
 
+def test_quartz_chamber_has_three_of_a_batch_for_each_seed() -> None:
+    """What was drawn is on the truth port, and is what the board reads; a new start scatters it. At 25 degC, x down."""
+    load_ohm, passports = 937.5, []
+    for seed in (1, 1, 2):
+        with Bench.start("quartz_chamber", seed=seed) as b:
+            b.unit.wait_ready()
+            b.head.turn(270.0)
+            words_v = b.unit.stream(400).axis("x").mean()
+            x = next(iter(b.truth()["units"].values()))["axes"]["x"]
+            pickoff = b.truth_state()["unit"]["pickoff"]["x"]
+            passports.append(x["quartz"])
+            assert x["group"] in {"a", "b", "rest"}
+            assert words_v == pytest.approx(x["sensor_a"] * load_ohm, rel=GAIN, abs=OFFSET_V)
+            assert pickoff["amplifier_a"] == pytest.approx(x["sensor_a"], rel=1e-6)
+            assert pickoff["delta_m"] == pytest.approx(2 * 8e-3 * pickoff["angle_urad"] * 1e-6)
+            assert pickoff["gap_m"][0] - pickoff["gap_m"][1] == pytest.approx(pickoff["delta_m"])
+            b.supply.output(False)
+            b.wait(0.1)
+            b.supply.output(True)
+            b.unit.wait_ready()
+            again = next(iter(b.truth()["units"].values()))["axes"]["x"]
+            assert again["quartz"] == x["quartz"]
+            assert 0 < abs(again["sensor_a"] / x["sensor_a"] - 1) < 6 * 2**0.5 * (12.6 + 18.7) * 1e-6
+    assert passports[0] == passports[1] != passports[2]
+
+
 @pytest.mark.parametrize(("name", "hz", "low", "high"), [("stream", 1000, 0.0, 1.0), ("fast", 4000, 0.44, 0.54)])
 def test_stream_and_fast_send_their_rate_by_themselves(name: str, hz: int, low: float, high: float) -> None:
     with Bench.start(name) as b:

@@ -192,6 +192,19 @@ static const struct {
     {"supply: {volt_v: 16}\nunits: [{}]\n", "dir/s.yaml:1:18: supply.volt_v: expected up to 15 (volt_max_v), got 16"},
     {"spread: {u0_v: -1}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.u0_v: expected 0 to 20, got -1"},
     {"spread: {afe: {input: current}}\nunits: [{}]\n", "dir/s.yaml:1:16: spread.afe.input: unknown key"},
+    {"spread: {quartz: [1]}\nunits: [{}]\n",
+     "dir/s.yaml:1:18: spread.quartz: expected a name of proto/batches, a path, or a mapping"},
+    {"spread: {quartz: nope}\nunits: [{}]\n",
+     "dir/s.yaml:1:18: spread.quartz: nope: expected a path or a name from proto/batches: serial"},
+    {"spread: {quartz: {share_a: 0.7}}\nunits: [{}]\n",
+     "dir/s.yaml:1:18: spread.quartz.share_b: expected up to 1 with share_a, got 1.1"},
+    {"spread: {quartz: {curve_max_ug: 100}}\nunits: [{}]\n",
+     "dir/s.yaml:1:33: spread.quartz.curve_max_ug: expected curve_min_ug = 120 or more, got 100"},
+    {"spread: {quartz: {curve_min_ug: 1, curve_max_ug: 2}}\nunits: [{}]\n",
+     "dir/s.yaml:1:18: spread.quartz.ratio_max: expected curves and slopes that give ratios of 3 to 16, got none in "
+     "group"},
+    {"units: [{axes: {x: {quartz: {pendulum: {mass_kg: 0}}}}}]\n",
+     "dir/s.yaml:1:50: units.a.axes.x.quartz.pendulum.mass_kg: expected 1e-06 to 1, got 0"},
     {"timeline: [{at_s: 1}]\nunits: [{}]\n", "dir/s.yaml:1:12: timeline[0]: expected cmd, a command, got none"},
     {"timeline: [{at_s: -1, cmd: x}]\nunits: [{}]\n",
      "dir/s.yaml:1:19: timeline[0].at_s: expected 0 to 1000000, got -1"},
@@ -272,6 +285,45 @@ static void each_board_brings_its_defaults(void **state)
     assert_int_equal(s.units[2].cfg.node, 7);
 }
 
+/* By name or by its keys: of a unit that draws, its quartz sensors alone; what the batch does not say is the scenario's. */
+static void a_batch_gives_each_quartz_sensor_its_own_figures(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {"serial", "{share_a: 1, share_b: 0}"};
+    for (size_t i = 0; i < COUNT(texts); i++) {
+        char text[512];
+        snprintf(
+            text, sizeof text,
+            "seed: 5\nspread: {quartz: %s}\nunits:\n"
+            "- {spread: true, axes: {x: &q {sensor: quartz, afe: {input: current}, quartz: {play_k: 0.7}}, y: *q}}\n"
+            "- {axes: {x: *q}}\n",
+            texts[i]);
+        if (!parse(text)) fail_msg("%s", why);
+        scenario_bind(&s);
+        const struct quartz_g *x = &s.units[0].cfg.axis[0].quartz, *y = &s.units[0].cfg.axis[1].quartz;
+        assert_true(x->glue_ug != 0.0 && y->glue_ug != 0.0 && x->glue_ug != y->glue_ug);
+        assert_true(x->play_k == 0.7 && x->start_ug == 12.6);
+        assert_true(quartz_ratio(x) >= 3.0 && quartz_ratio(x) <= 16.0);
+        assert_true(i == 0 || (x->curve_ug > 0.0 && y->curve_ug > 0.0));
+        assert_true(s.units[0].cfg.axis[2].quartz.glue_ug == 0.0); /* no quartz there */
+        assert_true(s.units[1].cfg.axis[0].quartz.glue_ug == 0.0); /* it does not draw */
+    }
+}
+
+/* The hinge of a pendulum that is given makes the bias of the position that is drawn: at 30 degC the sum is the batch's. */
+static void a_batch_reckons_with_the_pendulum(void **state)
+{
+    (void)state;
+    if (!parse("spread: {quartz: {position_urad: 20}}\nunits: [{spread: true, axes: {x: {sensor: quartz, "
+               "afe: {input: current}, quartz: {pendulum: {hinge_n_m_per_rad: 6e-3}}}}}]\n"))
+        fail_msg("%s", why);
+    scenario_bind(&s);
+    const struct quartz_g *x = &s.units[0].cfg.axis[0].quartz;
+    const double zero_ug = fabs(quartz_settled_ug(x, 30.0));
+    assert_true(x->hinge_ug_per_urad > 95.0 && x->hinge_ug_per_urad < 96.0);
+    assert_true(zero_ug > 39.999 && zero_ug < 150.001);
+}
+
 static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 {
     (void)state;
@@ -288,9 +340,9 @@ static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 static void the_shipped_scenarios_and_profiles_load(void **state)
 {
     (void)state;
-    static const char *const scenarios[] = {"converters", "calibrate",     "quiet",         "stream", "fast",
-                                            "multi",      "brownout",      "chamber_sweep", "faults", "fleet64",
-                                            "fleet1000",  "six_positions", "table_rate"};
+    static const char *const scenarios[] = {"converters", "calibrate",     "quiet",         "stream",        "fast",
+                                            "multi",      "brownout",      "chamber_sweep", "faults",        "fleet64",
+                                            "fleet1000",  "six_positions", "table_rate",    "quartz_chamber"};
     static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16",  "lab32",
                                            "psa1",    "psd1",   "pmka",    "pik", "pik5", "pik6"};
     if (access("proto/scenarios", R_OK) != 0) skip();
@@ -354,7 +406,7 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     assert_string_equal(why, "nope: expected a path or a name from proto/scenarios: "
                              "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
                              "gyrocompass, gyrocompass_ideal, "
-                             "multi, quiet, realistic, six_positions, stream, table_rate");
+                             "multi, quartz_chamber, quiet, realistic, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
@@ -389,6 +441,8 @@ int main(void)
         cmocka_unit_test(a_question_in_words_is_no_key),
         cmocka_unit_test(the_order_of_keys_means_nothing),
         cmocka_unit_test(each_board_brings_its_defaults),
+        cmocka_unit_test(a_batch_gives_each_quartz_sensor_its_own_figures),
+        cmocka_unit_test(a_batch_reckons_with_the_pendulum),
         cmocka_unit_test(cut_off_anywhere_a_scenario_is_refused_or_sound),
         cmocka_unit_test(the_shipped_scenarios_and_profiles_load),
         cmocka_unit_test(more_than_1000_units_are_refused),
