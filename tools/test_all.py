@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """The steps of `make test` and `make test-all`, each one's output visible and kept in build/test/.
 
-Steps that keep all cores busy by themselves run one after the other; those of one process, two at a time. Of two, the
-earlier one is seen as it goes; the other one's output follows when that has ended, and grows in build/test/ meanwhile.
+Steps that keep all cores busy by themselves run one after the other; those of one process beside each other, one more
+than there are cores, for each waits at times. The earliest one is seen as it goes; another one's output follows when
+that has ended, and grows in build/test/ meanwhile.
 Goes on after a failure, closes with a table of times, the runners' own closing lines, the reasons of skips and a line
 of counts; exits 1 if anything failed.
 """
@@ -29,7 +30,8 @@ MAKE = ["make", "--no-print-directory", f"-j{os.cpu_count() or 1}"]
 STRICT = [*MAKE, "WERROR=1"]
 SANITIZED = "SAN=address,undefined"
 TIERS = ("test", "rest", "all")
-LANES = 2  # more would do: memory and the real time of some tests set the limit
+# A step waits a quarter of its time, for a peer or a timer: one more keeps the cores busy. At most 4: memory.
+LANES = min((os.cpu_count() or 1) + 1, 4)
 GRACE_S = 20.0  # for a step that is ended: pytest's fixtures end what they have started
 
 
@@ -59,11 +61,18 @@ STEPS: list[Step] = [
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
     Step("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200, tiers=REST),
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
-    # The long ones first, and what fits beside them last: both lanes end at about the same time.
+    # The long ones first, and what fits beside them last: all lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"], tiers=REST),
-    Step("Python tests and golden traces", [*MAKE, "pytest", TIER], 3600, beside=True, builds=["bench-bin"]),
-    Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
     Step("end to end on the host", [*MAKE, "e2e", TIER], 3600, beside=True, builds=["all"]),
+    Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
+    Step(
+        "Python tests and golden traces",
+        [*MAKE, "pytest", "PYTESTS=tests/py tests/golden", TIER],
+        3600,
+        beside=True,
+        builds=["bench-bin"],
+    ),
+    Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
     Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 1200, beside=True, builds=["all"]),
     Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
     Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"], tiers=REST),

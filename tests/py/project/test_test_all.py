@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -111,8 +112,9 @@ def test_the_last_line_and_the_status(
 def said(
     tool: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., tuple[int, list[str]]]:
-    """Runs steps beside each other, [name, code] each, and gives the status and what was printed."""
+    """Runs steps in two lanes, [name, code] each, and gives the status and what was printed."""
     monkeypatch.setattr(tool, "LOGS", tmp_path / "logs")
+    monkeypatch.setattr(tool, "LANES", 2)
 
     def run(*steps: tuple[str, str]) -> tuple[int, list[str]]:
         made = [tool.Step(name, [*SAY, code, str(tmp_path)], 60.0, beside=True) for name, code in steps]
@@ -251,6 +253,16 @@ def test_the_rest_is_what_make_test_leaves_out(tool: ModuleType) -> None:
         assert [w for w in whole if "TIER" not in w] == [w for w in part["all"][name] if "TIER" not in w]
 
 
+def test_the_steps_of_pytest_have_each_folder_once(tool: ModuleType) -> None:
+    """What `make pytest` runs, and the end-to-end tests, are what pytest collects by itself."""
+    root = PATH.parents[1]
+    words = [word for step in tool.STEPS for word in step.command if word.startswith("PYTESTS=")]
+    folders = sorted(folder for word in words for folder in word.removeprefix("PYTESTS=").split())
+    settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["pytest"]
+    assert folders == sorted(set(settings["ini_options"]["testpaths"]) - {"tests/e2e"})
+    assert "),tests/py tests/conform tests/golden)" in (root / "Makefile").read_text(encoding="utf-8")
+
+
 def test_the_rest_adds_to_the_total_what_ran_before(
     tool: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -281,6 +293,7 @@ say = [sys.executable, "-c"]
 stay = "import os, sys, time; print('at work', os.getpid(), flush=True); time.sleep(600)"
 stubborn = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); " + stay
 tool.GRACE_S = 0.5
+tool.LANES = 2
 tool.STEPS = [
     tool.Step("before", [*say, "print('= 2 passed in 1.0s =')"], 60.0),
     tool.Step("one", [*say, stay], 600.0, beside=True),
