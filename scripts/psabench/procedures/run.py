@@ -29,10 +29,10 @@ from psabench.procedures.registry import PROCEDURES, Procedure
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
-from psabench.procedures.zero_watch import ZeroWatch
 from psabench.report import calibration as report
 from psabench.report.grading import Section
 from psabench.report.nominal import Nominal, nominal_dict, nominal_of_dict, nominal_of_scenario, read_passport
+from psabench.report.zero_watch import ZeroWatch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

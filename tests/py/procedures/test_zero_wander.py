@@ -16,8 +16,8 @@ from psabench.procedures.head_bench import Reading, Watch
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, reversal
 from psabench.procedures.turns import TurnsParams, turns
-from psabench.procedures.zero_watch import ZeroWatch
 from psabench.report import grading
+from psabench.report.zero_watch import ZeroWatch
 from scipy import stats
 
 NOISE_V = 1e-3
