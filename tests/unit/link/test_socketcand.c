@@ -39,6 +39,8 @@ static const struct {
     {"< add 0 10000 123 1 11 ", SOCKETCAND_MODE, 0, {0}},
     {"< open ", SOCKETCAND_ARGS, 0, {0}},
     {"< open can0 now ", SOCKETCAND_ARGS, 0, {0}},
+    {"< open \x7F" "can0 ", SOCKETCAND_ARGS, 0, {0}},
+    {"< open can\x7F ", SOCKETCAND_ARGS, 0, {0}},
     {"< open a_name_of_thirty_two_characters__ ", SOCKETCAND_ARGS, 0, {0}},
     {"< rawmode please ", SOCKETCAND_ARGS, 0, {0}},
     {"< send ", SOCKETCAND_ARGS, 0, {0}},

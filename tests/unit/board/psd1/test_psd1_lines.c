@@ -194,8 +194,10 @@ static void coefficients_on_the_line(void **state)
     rig_watch(&rig, ALL & ~TRACE_BIT(PSD1_LINE_CLK));
     psd1_power_up(&rig.b, 0);
     rig_await(&rig, PSD1_COEF_A0);
-    const int64_t a0_ns = rig.b.due_ns, tfs_ns = rig.event_ns[PSD1_EV_UC];
-    rig_run(&rig, 100000);
+    const int64_t a0_ns = rig.b.due_ns, tfs_ns = rig.event_ns[PSD1_EV_UC], end_ns = a0_ns + 400 + 2 * 20800 + 20000;
+    rig_run(&rig, end_ns - rig.s.now_ns);
+    assert_false(rig.b.frame.active); /* who looks now sees no frame */
+    rig_run(&rig, 40000);
     trace_advance(&rig.b.base.trace, rig.s.now_ns);
     assert_true(has_edge(&rig, PSD1_LINE_SDAT, true, tfs_ns)); /* C20013h: its first bit with TFS */
     assert_true(has_edge(&rig, PSD1_LINE_SDAT, false, tfs_ns + 1900));
@@ -208,7 +210,7 @@ static void coefficients_on_the_line(void **state)
         assert_true(level_at(&rig, PSD1_LINE_SDAT, rf_ns + 700)); /* 800000h */
         assert_false(level_at(&rig, PSD1_LINE_SDAT, rf_ns + 1500));
     }
-    assert_true(has_edge(&rig, PSD1_LINE_A0, false, a0_ns + 400 + 2 * 20800 + 20000));
+    assert_true(has_edge(&rig, PSD1_LINE_A0, false, end_ns));
 }
 
 static void writes_show_the_hosts_data(void **state)
