@@ -6,6 +6,9 @@ from pathlib import Path
 
 from psabench.link.own import replace_file
 
+# Of docs/reference/mutants.md; FIDELITY.md has the same table.
+MUTATED = "<!-- unit tests: made by `make mutate`, do not edit -->", "<!-- end of unit tests -->"
+
 
 def marks(name: str) -> tuple[str, str]:
     """Lines that a page has around a part of that name."""
@@ -21,6 +24,16 @@ def spliced(text: str, between: tuple[str, str], body: str, page: str = "page") 
     if text.count(begin) != 1 or not closed:
         raise ValueError(f"{page}: expected one line {begin} and after it {end}, got none or several")
     return f"{head}{begin}\n{body}\n{end}{tail}"
+
+
+def part_of(page: Path, between: tuple[str, str]) -> str:
+    """What a page has between two marks, without blank lines at its ends. Raises ValueError where they are missing."""
+    begin, end = between
+    _, opened, rest = page.read_text(encoding="utf-8").partition(f"{begin}\n")
+    body, closed, _ = rest.partition(end)
+    if not opened or not closed:
+        raise ValueError(f"{page.name}: expected a line {begin} and after it {end}, got none")
+    return body.strip("\n")
 
 
 def write(page: Path, between: tuple[str, str], body: str) -> None:

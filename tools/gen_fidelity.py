@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import between
 import evidence
 import gen_docs
 from gen_requirements import suite_tests
@@ -43,6 +44,9 @@ tests* that says E2 has our word that a figure of the data sheet is met; one in 
 STALE = (
     """A group is stale when one of its files has changed, comments and blanks apart, since its tests last passed."""
 )
+TEETH = """Random mutants of the code, one wrong operator, constant, index or call each, judged by the unit tests nearest
+to them (`make mutate`; [mutants.md](docs/reference/mutants.md)). A mutant that changes nothing counts as not killed, so
+a rate is the least that the tests find; a sample is small, its interval says so."""
 STATEMENTS = ("E0", "E1", "E2", "E3", "E4")
 REACHED = ("E2", "E3", "E4", "E5")
 NOT_AGAIN = "not judged again"  # a recording, with the present sources
@@ -193,6 +197,11 @@ def claims(root: Path, ledger: evidence.Ledger) -> Iterator[Sequence[object]]:
         )
 
 
+def teeth_rows(root: Path) -> list[str]:
+    """The table that `make mutate` has written. Raises ValueError where there is none."""
+    return between.part_of(root / "docs/reference/mutants.md", between.MUTATED).splitlines()
+
+
 def section(title: str, text: str, body: Iterable[str]) -> list[str]:
     return [f"## {title}", "", *([text, ""] if text else []), *body, ""]
 
@@ -217,6 +226,7 @@ def page(root: Path) -> str:
         *section("Claims", "", table(["of", "claim", "rung", "carried by"], claims(root, ledger))),
         *section("Tests that stand higher than our own", "", table(["test", "rung", "why"], higher)),
         *section("Is the evidence of these sources?", STALE, table(groups, group_rows(root, ledger))),
+        *section("How many wrong lines the unit tests find", TEETH, teeth_rows(root)),
         *section("What is not modelled", "As the pages say it.", absences(root)),
     ]
     return "\n".join(lines).rstrip("\n") + "\n"

@@ -18,7 +18,6 @@ from tests.mutants.verdict import KILLED, WRONG, Result
 
 FORMAT = 1  # of mutants.json
 MARKS = "<!-- result: made by `make mutants`, do not edit -->", "<!-- end of result -->"
-MUTATED = "<!-- unit tests: made by `make mutate`, do not edit -->", "<!-- end of unit tests -->"
 
 
 def rate(results: Iterable[Result]) -> tuple[int, int]:

@@ -25,7 +25,7 @@ from tests.mutants.folder_tests import TESTS, C, FolderTests
 from tests.mutants.operators import places
 from tests.mutants.python_operators import python_places
 from tests.mutants.random_mutants import mutant_of
-from tests.mutants.report import MUTATED, interval, percent
+from tests.mutants.report import interval, percent
 from tests.mutants.suite import end_group
 from tests.mutants.tree import ROOT, BuildError, Tree
 
@@ -188,7 +188,7 @@ def judge_all(
 
 def write_page(known: Mapping[str, Verdict]) -> None:
     """The table of docs/reference/mutants.md."""
-    between.write(PAGE, MUTATED, "\n".join(["", *rate_table(list(known.values())), ""]))
+    between.write(PAGE, between.MUTATED, "\n".join(["", *rate_table(list(known.values())), ""]))
 
 
 def rate_table(verdicts: Sequence[Verdict]) -> Iterator[str]:

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from between import MUTATED
 
 from tests.mutants import unit_mutants as units
 from tests.mutants.declared import Mutant
 from tests.mutants.python_operators import python_places
-from tests.mutants.report import MUTATED
 from tests.mutants.unit_mutants import Verdict, changed_lines, draw_mutants, judge_all, rate_table
 
 ROOT = Path(__file__).resolve().parents[3]
