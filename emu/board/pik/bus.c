@@ -131,7 +131,7 @@ void pik_bus_cut(struct pik *b, int64_t t_ns)
 
 void pik_bus_init(struct pik *b)
 {
-    sched_ev(&b->cycle_end, cycle_end, b);
+    sched_ev_inner(&b->cycle_end, cycle_end, b);
 }
 
 BOARD_BUS(pik, PIK_REGISTERS);

@@ -79,7 +79,7 @@ void pik_init(struct pik *b, const struct pik_profile *p, const struct board_cfg
     set_clock(b, 0, 0);
     pik_warm(b, 25.0);
     for (unsigned i = 0; i < PIK_AXES; i++) b->channel[i].noise = board_draws(&b->base, noise[i]);
-    sched_ev(&b->look, look_at_inputs, b);
+    sched_ev_inner(&b->look, look_at_inputs, b);
     pik_lines_init(b);
     pik_latch_init(b);
     pik_bus_init(b);

@@ -96,6 +96,6 @@ void pik_period_range(const struct pik *b, unsigned *least, unsigned *most)
 
 void pik_latch_init(struct pik *b)
 {
-    sched_ev(&b->latch, latch_periodically, b);
-    sched_ev(&b->latch_end, latch_end, b);
+    sched_ev_inner(&b->latch, latch_periodically, b);
+    sched_ev_inner(&b->latch_end, latch_end, b);
 }

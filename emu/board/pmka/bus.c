@@ -204,7 +204,7 @@ static void strobe_ends(void *ctx, int64_t t_ns)
 
 void pmka_bus_init(struct pmka *b)
 {
-    sched_ev(&b->bus.end, strobe_ends, b);
+    sched_ev_inner(&b->bus.end, strobe_ends, b);
 }
 
 void pmka_bus_cut(struct pmka *b, int64_t t_ns)

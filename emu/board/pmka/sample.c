@@ -196,7 +196,7 @@ void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
 
 void pmka_sample_init(struct pmka *b)
 {
-    sched_ev(&b->conversion, conversion_begins, b);
+    sched_ev_inner(&b->conversion, conversion_begins, b);
     b->sampled_ns = INT64_MIN / 2; /* never */
-    for (unsigned i = 0; i < PMKA_INTS; i++) sched_ev(&b->channel[i].reset_end, reset_ended, b);
+    for (unsigned i = 0; i < PMKA_INTS; i++) sched_ev_inner(&b->channel[i].reset_end, reset_ended, b);
 }

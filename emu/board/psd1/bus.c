@@ -280,7 +280,7 @@ int64_t psd1_host_end(struct psd1 *b, int64_t t_ns)
 
 void psd1_bus_init(struct psd1 *b)
 {
-    sched_ev(&b->bus.ev, strobe_end, b);
+    sched_ev_inner(&b->bus.ev, strobe_end, b);
 }
 
 static void cut_cycle(struct board_cycle **of, int64_t t_ns)

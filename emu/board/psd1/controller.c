@@ -216,8 +216,8 @@ void psd1_init(struct psd1 *b, const struct psd1_profile *p, const struct board_
     board_init(&b->base, psd1_lines, PSD1_LINES, cfg, io, s);
     b->due_ns = SCHED_NEVER;
     b->dr = true;
-    sched_ev(&b->ev, step_event, b);
-    sched_ev(&b->timeout, on_dr_timeout, b);
+    sched_ev_inner(&b->ev, step_event, b);
+    sched_ev_inner(&b->timeout, on_dr_timeout, b);
     init_trace(b);
     init_adc(b);
     psd1_bus_init(b);

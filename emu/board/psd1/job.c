@@ -257,7 +257,7 @@ static void on_wait_timeout(void *ctx, int64_t t_ns)
 
 void psd1_job_init(struct psd1 *b)
 {
-    sched_ev(&b->job.ev, on_wait_timeout, b);
+    sched_ev_inner(&b->job.ev, on_wait_timeout, b);
 }
 
 void psd1_job_setup(struct psd1 *b)

@@ -10,7 +10,7 @@
 static void lazy_is_eager_to_the_byte(void **state)
 {
     (void)state;
-    live_lives(LIVES, LIFE_NS);
+    live_lives(LIVES, (struct kind){LIFE_NS, NULL});
 }
 
 int main(void)
