@@ -274,7 +274,7 @@ void sched_settle(struct sched *s)
 
 int64_t sched_look_ns(const struct sched *s)
 {
-    if (s->eager || s->until_ns < s->now_ns) return s->now_ns;
+    if (s->eager || s->any_time > 0 || s->until_ns < s->now_ns) return s->now_ns;
     int64_t look_ns = s->look_ns > s->until_ns ? s->look_ns : s->until_ns;
     for (const struct sched_ev *e = s->looks; e; e = e->look_next) {
         if (e->due_ns < look_ns) look_ns = e->due_ns;

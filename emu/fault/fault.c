@@ -87,9 +87,11 @@ static void on_event(void *ctx, unsigned event, int64_t t_ns)
     sched_at(f->engine->sched, &f->ev, t_ns + f->delay_ns);
 }
 
+/* What it will do may concern each unit, as a brown-out does: none sleeps meanwhile. */
 static void subscribe_events(struct fault *f)
 {
     f->state = FAULT_LISTENING;
+    f->engine->sched->any_time++;
     f->listener.fn = on_event;
     f->listener.ctx = f;
     unit_subscribe(f->engine->bench->unit[f->unit], &f->listener);
@@ -97,6 +99,7 @@ static void subscribe_events(struct fault *f)
 
 static void unsubscribe_events(struct fault *f)
 {
+    f->engine->sched->any_time--;
     unit_unsubscribe(f->engine->bench->unit[f->unit], &f->listener);
 }
 

@@ -116,6 +116,13 @@ static const struct board_controller_fault controller_faults[] = {
 };
 static const char *const capabilities[] = {"level", NULL};
 
+static const char *why_eager(struct board *board, int64_t t_ns)
+{
+    (void)board;
+    (void)t_ns;
+    return "its loops go on from step to step";
+}
+
 const struct board_type gyro_board = {
     BOARD_COMMON(gyro, GYRO),
     .title = "Gyro unit",
@@ -126,4 +133,5 @@ const struct board_type gyro_board = {
     .frame_line = GYRO_LINE_STEP,
     .pulse_line = GYRO_LINE_STEP,
     .platform = &platform,
+    .why_eager = why_eager,
 };

@@ -181,6 +181,13 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
+static const char *why_eager(struct board *board, int64_t t_ns)
+{
+    (void)board;
+    (void)t_ns;
+    return "its integrators hold the past";
+}
+
 const struct board_type pik_board = {
     BOARD_COMMON(pik, PIK),
     .title = "PIK",
@@ -195,5 +202,6 @@ const struct board_type pik_board = {
     .bus = &pik_bus,
     .observe = observe,
     .analog = true,
+    .why_eager = why_eager,
     .truth = truth,
 };

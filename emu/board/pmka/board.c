@@ -212,6 +212,13 @@ static const struct board_controller_fault controller_faults[] = {
 };
 static const char *const capabilities[] = {"temp_noise_scale", NULL};
 
+static const char *why_eager(struct board *board, int64_t t_ns)
+{
+    (void)board;
+    (void)t_ns;
+    return "its integrators hold the past";
+}
+
 const struct board_type pmka_board = {
     BOARD_COMMON(pmka, PMKA),
     .title = "PMKA",
@@ -228,5 +235,6 @@ const struct board_type pmka_board = {
     .bus = &pmka_bus,
     .set_faults = set_faults,
     .analog = true,
+    .why_eager = why_eager,
     .truth = truth,
 };

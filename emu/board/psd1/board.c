@@ -185,6 +185,14 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
+static const char *why_eager(struct board *board, int64_t t_ns)
+{
+    (void)board;
+    (void)t_ns;
+    return "its converters could sleep, but its reads of them are not passed over, and its gyros sum their angle step "
+           "by step";
+}
+
 const struct board_type psd1_board = {
     BOARD_COMMON(psd1, PSD1),
     .title = "PSD-1",
@@ -199,5 +207,6 @@ const struct board_type psd1_board = {
     .range_v = range_v,
     .bus = &psd1_bus,
     .analog = true,
+    .why_eager = why_eager,
     .truth = truth,
 };

@@ -42,7 +42,7 @@ def test_lazy_and_eager_go_on_to_the_same_bytes(tmp_path: Path) -> None:
 
 SENSOR = "{sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0}"
 LONE = f"axes: {{x: {SENSOR}, y: {SENSOR}, z: {SENSOR}}}"
-ALWAYS = "a board of this type always does"
+PSD1 = "its converters could sleep, but its reads of them are not passed over, and its gyros sum their angle step by step"
 UNITS = {
     "still": ("on: fixed", None),
     "arm": ("on: fixed, lever_arm_m: [0.1, 0, 0]", None),
@@ -50,8 +50,8 @@ UNITS = {
     "swing": ("on: head, lever_arm_m: [0.1, 0, 0]", "its mount accelerates it"),
     "slow": ("adc_chain: modulator", "a converter's filter has no finite memory"),
     "warm": ("profile: ungated", "bursts for the temperature converter reach the others"),
-    "psd": ("board: psd1", ALWAYS),
-    "pmka": ("board: pmka", ALWAYS),
+    "psd": ("board: psd1", PSD1),
+    "pmka": ("board: pmka", "its integrators hold the past"),
 }
 
 

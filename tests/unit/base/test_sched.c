@@ -371,6 +371,9 @@ static void check_look(void *ctx, int64_t t_ns)
         looks.far += e->queued == SCHED_FAR;
     }
     assert_int_equal(sched_look_ns(&looks.s), next_ns);
+    looks.s.any_time = 1;
+    assert_int_equal(sched_look_ns(&looks.s), t_ns);
+    looks.s.any_time = 0;
     for (unsigned n = 0; n < 5; n++) {
         struct sched_ev *e = &looks.ev[rng_u64(&looks.r) % LOOKERS];
         if (rng_u64(&looks.r) % 2) sched_cancel(&looks.s, e);

@@ -100,6 +100,21 @@ static void events_may_be_those_of_another_unit(void **state)
     assert_null(r.unit[1].observers);
 }
 
+/* What happens then, and to which unit, is not known before: none may sleep. */
+static void while_a_fault_listens_someone_may_look_at_any_time(void **state)
+{
+    (void)state;
+    const uint32_t id =
+        add("{'kind':'sensor.bias','point':'b.sensor.x','bias_v':1,'at_s':0.1,'after':'RES','unit':'a'}");
+    assert_int_equal(r.s.any_time, 0);
+    run_to(200 * MS);
+    assert_int_equal(r.s.any_time, 1);
+    psa2_reset(&r.unit[0].store.psa2, r.s.now_ns);
+    run_to(202 * MS);
+    assert_change(0, id, FAULT_ACTIVE, 200 * MS);
+    assert_int_equal(r.s.any_time, 0);
+}
+
 static void a_fault_that_waits_or_listens_can_be_cleared(void **state)
 {
     (void)state;
@@ -310,6 +325,7 @@ int main(void)
         TEST(a_fault_begins_with_the_event_it_waits_for),
         TEST(events_count_from_the_instant_on),
         TEST(events_may_be_those_of_another_unit),
+        TEST(while_a_fault_listens_someone_may_look_at_any_time),
         TEST(a_fault_that_waits_or_listens_can_be_cleared),
         TEST(places_are_used_again_but_not_those_of_living_faults),
         TEST(a_program_keeps_its_number_when_an_older_one_leaves),
