@@ -104,7 +104,12 @@ static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_
 
 /* ---- a row */
 
-/* Signals to volts behind the buffer. */
+/* Signal to volts behind the buffer. */
+static inline double loaded_v(const struct afe *a, double signal)
+{
+    return clip_v(signal * a->scale.load + a->cfg.buffer_offset_v + a->scale.drift_v, a->cfg.clip_v);
+}
+
 LANES_BODY void load_row(const struct afe *a, double *row, unsigned n)
 {
     const double load = a->scale.load, offset_v = a->cfg.buffer_offset_v, drift_v = a->scale.drift_v;
@@ -119,7 +124,7 @@ LANES_BODY void load_row(const struct afe *a, double *row, unsigned n)
         v = LANES_PICK(v < min_v, min_v, v);
         LANES_STORE(row + i, v);
     }
-    for (; i < n; i++) row[i] = clip_v(row[i] * load + offset_v + drift_v, limit_v);
+    for (; i < n; i++) row[i] = loaded_v(a, row[i]);
 }
 
 /* The same with the faults that are before it. */
@@ -127,9 +132,7 @@ static void faulty_row(const struct afe *a, double *row, const struct looks *at)
 {
     for (unsigned i = 0; i < at->n; i++) {
         const struct faulty f = apply_faults(a, row[i], at->t_ns[i]);
-        row[i] = f.signal;
-        load_row(a, &row[i], 1);
-        row[i] += f.ripple_v;
+        row[i] = loaded_v(a, f.signal) + f.ripple_v;
     }
 }
 
@@ -219,6 +222,16 @@ LANES_BODY void pass_row(struct afe *a, double *row, const struct looks *at)
     filter_row(a, row, at);
 }
 
+/* Too few for a vector. */
+static void pass_few(struct afe *a, double *row, const struct looks *at)
+{
+    if (a->faults) faulty_row(a, row, at);
+    for (unsigned i = 0; !a->faults && i < at->n; i++) row[i] = loaded_v(a, row[i]);
+    if (a->cfg.noise_v_rthz > 0.0) add_noise(a, row, at);
+    for (unsigned i = 0; i < at->n; i++) row[i] /= a->scale.divider;
+    filter_any(a, row, at);
+}
+
 LANES_AVX2 static void pass_row_avx2(struct afe *a, double *row, const struct looks *at)
 {
     pass_row(a, row, at);
@@ -227,7 +240,8 @@ LANES_AVX2 static void pass_row_avx2(struct afe *a, double *row, const struct lo
 void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const struct looks *at)
 {
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
-    if (lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
+    if (at->n < LANES) pass_few(a, signal_to_v, at);
+    else if (lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
     else pass_row(a, signal_to_v, at);
     for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] /= apply_faults(a, 0.0, at->t_ns[i]).reference;
 }
