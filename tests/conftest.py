@@ -1,9 +1,11 @@
-"""For all tests: their tier (--tier), Ctrl-C for the programs that they start, and a folder that everybody may enter.
+"""For all tests: their tier (--tier), Ctrl-C for the programs that they start, one thread for linear algebra, and a
+folder that everybody may enter.
 
 A runner in the background (`make test &` in a script, many CI runners) starts us with SIGINT ignored; programs would
 inherit that, and the tests that press Ctrl-C would wait without end.
 """
 
+import os
 import signal
 import time
 from pathlib import Path
@@ -15,6 +17,7 @@ import tiers
 PLACES = {"host", "vcan", "slc0", "soak"}  # a sample is taken of the cases of each place
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as psabench's commands have it; before any test loads numpy
 # An example takes as long as a busy machine makes it; pytest's time limit ends what hangs.
 hypothesis.settings.register_profile("psabench", deadline=None)
 hypothesis.settings.load_profile("psabench")

@@ -62,6 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not words:
         parser().print_help(sys.stderr)
         return BadInput.exit_status
+    # Before numpy is loaded. Matrices here have hundreds of rows at most: more threads spend the time on waiting for
+    # each other, and sums that are split by the number of cores are not everywhere the same to the last bit.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for library in ("can", "canopen"):  # what goes wrong there is raised as well, and told in one line
         logging.getLogger(library).setLevel(logging.CRITICAL)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: files are closed, the emulator ended

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import shlex
 import subprocess
@@ -400,3 +401,21 @@ def test_ctrl_c_says_what_is_kept(
     monkeypatch.setattr(cli, "parse", lambda words: args)
     assert cli.main(line.split()) == 130
     assert capsys.readouterr().err == f"psabench: interrupted{kept}\n"
+
+
+@pytest.mark.parametrize(("own", "kept"), [(None, "1"), ("2", "2")], ids=["as-is", "own-setting"])
+def test_a_command_computes_in_one_thread(own: str | None, kept: str) -> None:
+    """Set before numpy is loaded, which looks once; who wants more threads says so."""
+    program = (
+        "import os, sys\nfrom psabench.cli import main\nmain(['report', 'diff', '/nothing/a', '/nothing/b'])\n"
+        "assert 'numpy' not in sys.modules\nimport numpy\n"
+        "print(os.environ['OPENBLAS_NUM_THREADS'], len(os.listdir('/proc/self/task')))"
+    )
+    env = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    env |= {"OPENBLAS_NUM_THREADS": own} if own else {}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=env, stdout=subprocess.PIPE, text=True, check=True, timeout=60
+    )
+    setting, threads = done.stdout.split()
+    assert setting == kept
+    assert own or threads == "1"
