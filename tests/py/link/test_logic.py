@@ -23,6 +23,7 @@ from psabench.link.vcd import read_vcd
 
 ROOT = Path(__file__).resolve().parents[3]
 TIMEOUT_S = 60.0
+SIGROK_S = 240.0  # a minute's samples are 240 million: 15 s of CPU time, and as many more as a busy machine makes of it
 PINS = "P8_45 P8_46 P8_43 P8_44 P8_41 P8_42 P8_39 P8_40 P8_27 P8_29 P8_28 P8_30 P8_21 P8_20".split()
 FRAME = re.compile(r"X=(-?\d+) Y=(-?\d+) Z=(-?\d+) T=([0-9A-F]+)h")
 CAN = re.compile(r"\(\S+\) can0 (185|285)#(\w+)")
@@ -108,7 +109,7 @@ def sigrok(port: str, hz: int, samples: int, channels: dict[str, str], *more: st
         env={**os.environ, "SIGROKDECODE_DIR": str(ROOT / "decoders")},
         capture_output=True,
         text=True,
-        timeout=TIMEOUT_S,
+        timeout=SIGROK_S,
         check=False,
     )
 
