@@ -126,13 +126,14 @@ def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> l
 
 
 def c_tests(table: Table, tier: str, sanitizers: bool, root: Path = ROOT) -> list[Path]:
-    """C test programs of a choice of tiers."""
+    """C test programs of a choice of tiers, those that take long first: no core waits for the last one."""
 
     def in_make_test(path: Path) -> bool:
         row = table.row(path) or Row()
         return row.tier == "test" and (not sanitizers or row.sanitizers == "test")
 
     files = [path for path in files_of_tests(root) if path.suffix == ".c"]
+    files.sort(key=lambda path: (row := table.row(path) or Row()).tier == row.sanitizers == "test")
     return [path for path in files if tier == "all" or in_make_test(path) == (tier == "test")]
 
 
