@@ -40,6 +40,8 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_HOLD_S] = {"hold_s", CONTROL_REAL, true, "s", 0, 10, .what = "delay of the frame"},
     [FAULT_DROP_V] = {"drop_v", CONTROL_REAL, true, "V", 1e-3, 100, .what = "voltage drop"},
     [FAULT_DRIFT_DEGPH] = {"drift_degph", CONTROL_REAL, true, "deg/h", -1000, 1000, .what = "additional gyroscope drift", .least = 1e-3},
+    [FAULT_RATE_PART] = {"rate_part", CONTROL_REAL, true, NULL, 1e-6, 0.99, .what = "part of the chamber's ramp that the air makes; 1e-6: it sticks"},
+    [FAULT_READOUT_K] = {"readout_k", CONTROL_REAL, true, "K", -200, 200, .what = "error of the chamber's thermometer", .least = 0.1},
 };
 // clang-format on
 _Static_assert(FAULT_ARGS <= CONTROL_ARGS_MAX, "all values of a command fit");

@@ -47,6 +47,8 @@ enum fault_arg {
     FAULT_HOLD_S,
     FAULT_DROP_V,
     FAULT_DRIFT_DEGPH,
+    FAULT_RATE_PART,
+    FAULT_READOUT_K,
     FAULT_ARGS
 };
 

@@ -1,8 +1,11 @@
-/* Faults of the instruments: the supply; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
+/* Faults of the instruments: the supply; the chamber; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
  * angle sensor. */
 #include "fault/internal.h"
 
+#include <math.h>
 #include <stdio.h>
+
+#define RATE_PART_LEAST 1e-9 /* of several faults at once */
 
 /* ---- supply */
 
@@ -81,6 +84,22 @@ static void refresh_sensor(struct fault *f, int64_t t_ns)
     platform_stick(platform_of(f), count_active(f, FAULT_ID, &unused) > 0, t_ns);
 }
 
+/* ---- chamber */
+
+static void refresh_chamber(struct fault *f, int64_t t_ns)
+{
+    struct chamber *c = &f->engine->bench->lab->chamber;
+    double part = 1.0, misreading_k = 0.0;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        if (!fault_lasts_at(f, other)) continue;
+        if (fault_given(other, FAULT_RATE_PART)) part *= other->value[FAULT_RATE_PART];
+        if (fault_given(other, FAULT_READOUT_K)) misreading_k += other->value[FAULT_READOUT_K];
+    }
+    chamber_hinder(c, fmax(part, RATE_PART_LEAST), t_ns);
+    chamber_mislead(c, misreading_k);
+}
+
 // clang-format off
 static const struct fault_kind lab[] = {
     {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off; after the supply returns: boot-up message, set-up, frame numbers from 0",
@@ -92,6 +111,10 @@ static const struct fault_kind lab[] = {
      .places = FAULT_BIT(FAULT_AT_TORQUER), .need = FAULT_BIT(FAULT_DRIFT_DEGPH), .nonzero = FAULT_BIT(FAULT_DRIFT_DEGPH), .lift = refresh_drift},
     {"platform.encoder_stuck", "The angle sensor of the outer gimbal freezes at its last value.", "ENCODER is constant; during a turn the unit reports it (EMCY FF22h)",
      .places = FAULT_BIT(FAULT_AT_ENCODER), .lift = refresh_sensor},
+    {"chamber.slow", "The air of the chamber makes only rate_part of its ramp, as a worn compressor; with 1e-6 it sticks.", "the chamber's reading and the temperature codes are late at the set point, or never there; CHAMBER reports SETTLING longer than its ramp takes",
+     .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_RATE_PART), .lift = refresh_chamber},
+    {"chamber.readout", "The thermometer of the chamber reads readout_k too much.", "the chamber's reading differs from the temperature codes by readout_k; at rest it is off its set point",
+     .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_READOUT_K), .nonzero = FAULT_BIT(FAULT_READOUT_K), .lift = refresh_chamber},
 };
 // clang-format on
 const struct fault_table fault_lab = {lab, sizeof lab / sizeof *lab};

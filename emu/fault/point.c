@@ -20,6 +20,7 @@ static const struct {
     [FAULT_AT_SUPPLY] = {"supply", "the power supply"},
     [FAULT_AT_TORQUER] = {"platform.level|azimuth", "an axis of the platform"},
     [FAULT_AT_ENCODER] = {"platform.encoder", "the angle sensor of the platform"},
+    [FAULT_AT_CHAMBER] = {"chamber", "the thermal chamber"},
 };
 
 const char *fault_place_any(enum fault_place place)
@@ -124,6 +125,21 @@ static bool point_of_platform(const struct control_bench *b, unsigned n, struct 
     return true;
 }
 
+static bool point_of_chamber(struct fault_point *p, char *name)
+{
+    *p = (struct fault_point){.place = FAULT_AT_CHAMBER};
+    snprintf(name, FAULT_POINT_MAX, "chamber");
+    return true;
+}
+
+/* The n-th of the instruments that not every bench has. */
+static bool point_of_instrument(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
+{
+    const bool chamber = b->lab && b->lab->chamber.cfg.present;
+    if (chamber && n == 0) return point_of_chamber(p, name);
+    return point_of_platform(b, n - chamber, p, name);
+}
+
 /* The n-th of those that are not a unit's; false past the last. */
 static bool bench_point(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
 {
@@ -142,7 +158,7 @@ static bool bench_point(const struct control_bench *b, unsigned n, struct fault_
         snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.connection);
         return true;
     }
-    return n == programs ? point_of_supply(p, name) : point_of_platform(b, n - programs - 1, p, name);
+    return n == programs ? point_of_supply(p, name) : point_of_instrument(b, n - programs - 1, p, name);
 }
 
 bool fault_point_next(const struct control_bench *b, struct fault_points *at, struct fault_point *p,

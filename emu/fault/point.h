@@ -18,6 +18,7 @@ enum fault_place {
     FAULT_AT_SUPPLY,     /* supply */
     FAULT_AT_TORQUER,    /* platform.level, platform.azimuth: by enum platform_axis */
     FAULT_AT_ENCODER,    /* platform.encoder */
+    FAULT_AT_CHAMBER,    /* chamber */
     FAULT_PLACES
 };
 

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #define S_PER_MIN 60.0
+#define NEVER_S   1e9   /* a chamber that sticks is there no sooner */
 #define GONE      700.0 /* time constants after which nothing is left in double precision */
 
 struct chamber_cfg chamber_default(void)
@@ -81,12 +82,13 @@ double chamber_air_degc(const struct chamber *c, int64_t t_ns)
 
 double chamber_shown_degc(const struct chamber *c, int64_t t_ns)
 {
-    return det_quantise(chamber_air_degc(c, t_ns) + c->cfg.readout_offset_k, c->cfg.readout_resolution_k);
+    return det_quantise(chamber_air_degc(c, t_ns) + (c->cfg.readout_offset_k + c->misreading_k),
+                        c->cfg.readout_resolution_k);
 }
 
 int64_t chamber_stable_ns(const struct chamber *c)
 {
-    return c->from_ns + (int64_t)ceil(c->duration_s * (double)NS_PER_S);
+    return c->from_ns + (int64_t)ceil(fmin(c->duration_s, NEVER_S) * (double)NS_PER_S);
 }
 
 bool chamber_stable(const struct chamber *c, int64_t t_ns)
@@ -180,7 +182,7 @@ static void plan_ramp(struct chamber *c, double set_degc, int64_t t_ns)
     }
     const bool up = set_degc > air_degc;
     const double limit = up ? c->cfg.heating_max_k_per_min : c->cfg.cooling_max_k_per_min;
-    const double speed_kps = fmin(c->ramp_k_per_min, limit) / S_PER_MIN;
+    const double speed_kps = fmin(c->ramp_k_per_min, limit) / S_PER_MIN * c->rate_part;
     c->set_degc = set_degc;
     c->from_ns = t_ns;
     c->from_degc = air_degc;
@@ -193,8 +195,11 @@ void chamber_init(struct chamber *c, const struct chamber_cfg *cfg)
 {
     assert(!cfg->present ||
            (cfg->ramp_k_per_min > 0.0 && cfg->heating_max_k_per_min > 0.0 && cfg->cooling_max_k_per_min > 0.0));
-    *c = (struct chamber){
-        .cfg = *cfg, .ramp_k_per_min = cfg->ramp_k_per_min, .set_degc = cfg->start_degc, .from_degc = cfg->start_degc};
+    *c = (struct chamber){.cfg = *cfg,
+                          .rate_part = 1.0,
+                          .ramp_k_per_min = cfg->ramp_k_per_min,
+                          .set_degc = cfg->start_degc,
+                          .from_degc = cfg->start_degc};
 }
 
 enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns)
@@ -211,4 +216,17 @@ enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_
     c->ramp_k_per_min = k_per_min;
     plan_ramp(c, c->set_degc, t_ns);
     return CHAMBER_OK;
+}
+
+void chamber_hinder(struct chamber *c, double rate_part, int64_t t_ns)
+{
+    assert(rate_part > 0.0);
+    if (rate_part == c->rate_part) return;
+    c->rate_part = rate_part;
+    plan_ramp(c, c->set_degc, t_ns);
+}
+
+void chamber_mislead(struct chamber *c, double misreading_k)
+{
+    c->misreading_k = misreading_k;
 }

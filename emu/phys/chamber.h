@@ -53,6 +53,8 @@ struct chamber_body {
 struct chamber {
     struct chamber_cfg cfg;
     double ramp_k_per_min;
+    double rate_part;    /* of a faulty one: part of its ramp that the air makes; 1: all of it */
+    double misreading_k; /* of a faulty thermometer */
     double set_degc;
     int64_t from_ns;   /* of the latest command */
     double from_degc;  /* of the air, then */
@@ -74,6 +76,10 @@ enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns);
 
 /* New ramp, from CHAMBER_RAMP_MIN_K_PER_MIN up to the greater of the two limits; one that is under way goes on with it. */
 enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_ns);
+
+/* Faults: the air makes this part of its ramp from now on (above 0; 1: none); the thermometer reads so much more (0: none). */
+void chamber_hinder(struct chamber *c, double rate_part, int64_t t_ns);
+void chamber_mislead(struct chamber *c, double misreading_k);
 
 double chamber_ramp_max_k_per_min(const struct chamber *c);
 

@@ -33,6 +33,8 @@ VALUES: dict[str, dict[str, object]] = {
     "link.delay": {"hold_s": 1},
     "supply.brownout": {"drop_v": 12, "for_s": 1},
     "platform.drift_step": {"drift_degph": 1},
+    "chamber.slow": {"rate_part": 0.5},
+    "chamber.readout": {"readout_k": 1},
 }
 
 

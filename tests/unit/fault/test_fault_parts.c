@@ -1,6 +1,7 @@
 /* The fault engine: what is accepted reaches the part it is for. */
 #include "fault_rig.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
@@ -85,6 +86,33 @@ static void any_number_of_brownouts_may_be_under_way_at_once(void **state)
     assert_true(supply_volts(&r.lab.supply, 201 * MS) == 12.0);
 }
 
+/* 1 K/s from 25 degC: two that halve it make a quarter, errors of the thermometer add up; then everything is as before. */
+static void faults_of_the_chamber_add_up_and_end(void **state)
+{
+    (void)state;
+    struct chamber_cfg cfg = chamber_default();
+    cfg.present = true;
+    cfg.heating_max_k_per_min = cfg.ramp_k_per_min = 60.0;
+    chamber_init(&r.lab.chamber, &cfg);
+    run_to(100 * MS);
+    assert_int_equal(chamber_set(&r.lab.chamber, 85.0, 100 * MS), CHAMBER_OK);
+    add("{'kind':'chamber.slow','point':'chamber','rate_part':0.5,'at_s':0.1,'for_s':0.4}");
+    add("{'kind':'chamber.slow','point':'chamber','rate_part':0.5,'at_s':0.3,'for_s':0.2}");
+    add("{'kind':'chamber.readout','point':'chamber','readout_k':3,'at_s':0.1,'for_s':0.4}");
+    add("{'kind':'chamber.readout','point':'chamber','readout_k':-1,'at_s':0.3,'for_s':0.2}");
+    static const struct {
+        int64_t t_ms;
+        double air_degc, off_k;
+    } rows[] = {{290, 25.095, 3}, {490, 25.1475, 2}, {600, 25.25, 0}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const int64_t t_ns = rows[i].t_ms * MS;
+        run_to(t_ns);
+        const double air_degc = chamber_air_degc(&r.lab.chamber, t_ns);
+        if (fabs(air_degc - rows[i].air_degc) > 1e-9) fail_msg("%.9g degC at %" PRId64 " ms", air_degc, rows[i].t_ms);
+        assert_true(fabs(chamber_shown_degc(&r.lab.chamber, t_ns) - air_degc - rows[i].off_k) < 1e-9);
+    }
+}
+
 /* Registers without power hold nothing. */
 static void a_flip_in_a_board_without_power_is_void(void **state)
 {
@@ -148,6 +176,7 @@ int main(void)
         TEST(the_least_bias_is_seen),
         TEST(brownouts_are_those_that_were_asked_for),
         TEST(a_bias_is_in_the_codes),
+        TEST(faults_of_the_chamber_add_up_and_end),
         TEST(volts_of_a_current_sensor_are_those_at_its_load),
         TEST(faults_of_a_chip_add_up),
         TEST(what_is_over_at_once_needs_no_lifting),
