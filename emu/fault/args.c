@@ -42,6 +42,7 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_DRIFT_DEGPH] = {"drift_degph", CONTROL_REAL, true, "deg/h", -1000, 1000, .what = "additional gyroscope drift", .least = 1e-3},
     [FAULT_RATE_PART] = {"rate_part", CONTROL_REAL, true, NULL, 1e-6, 0.99, .what = "part of the chamber's ramp that the air makes; 1e-6: it sticks"},
     [FAULT_READOUT_K] = {"readout_k", CONTROL_REAL, true, "K", -200, 200, .what = "error of the chamber's thermometer", .least = 0.1},
+    [FAULT_RIPPLE_DPS] = {"ripple_dps", CONTROL_REAL, true, "deg/s", 1e-3, 100, .what = "amplitude of the rate of a table's axis"},
 };
 // clang-format on
 _Static_assert(FAULT_ARGS <= CONTROL_ARGS_MAX, "all values of a command fit");

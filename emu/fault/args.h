@@ -49,6 +49,7 @@ enum fault_arg {
     FAULT_DRIFT_DEGPH,
     FAULT_RATE_PART,
     FAULT_READOUT_K,
+    FAULT_RIPPLE_DPS,
     FAULT_ARGS
 };
 

@@ -33,6 +33,7 @@ union fault_body {
     struct afe_fault afe;
     uint32_t line; /* number among the faults of the unit's lines */
     struct can_fault can;
+    struct table_ripple ripple;
     const struct can_node *client; /* that is stalled */
 };
 

@@ -1,4 +1,4 @@
-/* Faults of the instruments: the supply; the chamber; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
+/* Faults of the instruments: the supply; the chamber; an axis of the table; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
  * angle sensor. */
 #include "fault/internal.h"
 
@@ -100,6 +100,37 @@ static void refresh_chamber(struct fault *f, int64_t t_ns)
     chamber_mislead(c, misreading_k);
 }
 
+/* ---- table */
+
+static struct table *table_of(const struct fault *f)
+{
+    return &f->engine->bench->lab->table;
+}
+
+/* What they measure up to now belongs to the axis as it was. */
+static void settle_units(const struct fault *f, int64_t t_ns)
+{
+    const struct control_bench *b = f->engine->bench;
+    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
+}
+
+static bool ripple_axis(struct fault *f, int64_t t_ns)
+{
+    settle_units(f, t_ns);
+    f->as.ripple = (struct table_ripple){.axis = f->point.index,
+                                         .rate_radps = f->value[FAULT_RIPPLE_DPS] * RAD_PER_DEG,
+                                         .hz = f->value[FAULT_FREQUENCY_HZ],
+                                         .from_ns = t_ns};
+    table_ripple_add(table_of(f), &f->as.ripple);
+    return true;
+}
+
+static void lift_ripple(struct fault *f, int64_t t_ns)
+{
+    settle_units(f, t_ns);
+    table_ripple_remove(table_of(f), &f->as.ripple);
+}
+
 // clang-format off
 static const struct fault_kind lab[] = {
     {"supply.brownout", "The supply voltage drops by drop_v for for_s, below the boards' threshold.", "frames break off; after the supply returns: boot-up message, set-up, frame numbers from 0",
@@ -115,6 +146,8 @@ static const struct fault_kind lab[] = {
      .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_RATE_PART), .lift = refresh_chamber},
     {"chamber.readout", "The thermometer of the chamber reads readout_k too much.", "the chamber's reading differs from the temperature codes by readout_k; at rest it is off its set point",
      .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_READOUT_K), .nonzero = FAULT_BIT(FAULT_READOUT_K), .lift = refresh_chamber},
+    {"table.ripple", "The servo of the axis ripples: a sine of amplitude ripple_dps in its rate.", "a spectral line at frequency_hz in the readout of the rate, and in the codes of a unit on the table",
+     .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ), .apply = ripple_axis, .lift = lift_ripple},
 };
 // clang-format on
 const struct fault_table fault_lab = {lab, sizeof lab / sizeof *lab};

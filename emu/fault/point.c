@@ -21,6 +21,7 @@ static const struct {
     [FAULT_AT_TORQUER] = {"platform.level|azimuth", "an axis of the platform"},
     [FAULT_AT_ENCODER] = {"platform.encoder", "the angle sensor of the platform"},
     [FAULT_AT_CHAMBER] = {"chamber", "the thermal chamber"},
+    [FAULT_AT_TABLE] = {"table.N", "an axis of the rate table"},
 };
 
 const char *fault_place_any(enum fault_place place)
@@ -132,12 +133,21 @@ static bool point_of_chamber(struct fault_point *p, char *name)
     return true;
 }
 
+static bool point_of_table(unsigned axis, struct fault_point *p, char *name)
+{
+    *p = (struct fault_point){.place = FAULT_AT_TABLE, .index = axis};
+    snprintf(name, FAULT_POINT_MAX, "table.%u", axis + 1);
+    return true;
+}
+
 /* The n-th of the instruments that not every bench has. */
 static bool point_of_instrument(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
 {
     const bool chamber = b->lab && b->lab->chamber.cfg.present;
+    const unsigned axes = b->lab ? b->lab->table.cfg.axes : 0;
     if (chamber && n == 0) return point_of_chamber(p, name);
-    return point_of_platform(b, n - chamber, p, name);
+    n -= chamber;
+    return n < axes ? point_of_table(n, p, name) : point_of_platform(b, n - axes, p, name);
 }
 
 /* The n-th of those that are not a unit's; false past the last. */

@@ -19,6 +19,7 @@ enum fault_place {
     FAULT_AT_TORQUER,    /* platform.level, platform.azimuth: by enum platform_axis */
     FAULT_AT_ENCODER,    /* platform.encoder */
     FAULT_AT_CHAMBER,    /* chamber */
+    FAULT_AT_TABLE,      /* table.1: an axis, from the outermost */
     FAULT_PLACES
 };
 

@@ -116,6 +116,42 @@ enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, 
     return MOTION_OK;
 }
 
+/* ---- ripple */
+
+void table_ripple_add(struct table *t, struct table_ripple *r)
+{
+    r->next = t->ripples;
+    t->ripples = r;
+    (void)drop_cache(t, MOTION_OK);
+}
+
+void table_ripple_remove(struct table *t, struct table_ripple *r)
+{
+    struct table_ripple **at = &t->ripples;
+    while (*at && *at != r) at = &(*at)->next;
+    if (*at) *at = r->next;
+    (void)drop_cache(t, MOTION_OK);
+}
+
+/* Rate A sin(w t): the angle swings between 0 and 2 A / w. */
+static void apply_ripple(const struct table_ripple *r, int64_t t_ns, struct motion_state *s)
+{
+    const double w_radps = TURN_RAD * r->hz;
+    const double turns = r->hz * sched_since_s(r->from_ns, t_ns);
+    const struct det_pair at = det_sin_cos(TURN_RAD * (turns - floor(turns)));
+    s->angle_rad += r->rate_radps / w_radps * (1.0 - at.cos);
+    s->rate_radps += r->rate_radps * at.sin;
+    s->accel_radps2 += r->rate_radps * w_radps * at.cos;
+}
+
+static struct motion_state axis_state(const struct table *t, unsigned axis, int64_t t_ns)
+{
+    struct motion_state s = motion_at(&t->axis[axis], t_ns);
+    for (const struct table_ripple *r = t->ripples; r; r = r->next)
+        if (r->axis == axis && t_ns >= r->from_ns) apply_ripple(r, t_ns, &s);
+    return s;
+}
+
 /* ---- readout */
 
 /* A stream for each instant: who reads twice, or another axis between, sees the same. */
@@ -134,7 +170,7 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
     const struct table_axis_cfg *c = &t->cfg.axis[axis];
     const struct motion *m = &t->axis[axis];
     const int64_t shown_ns = t_ns - (int64_t)nearbyint(c->readout_delay_s * (double)NS_PER_S);
-    const struct motion_state s = motion_at(m, shown_ns);
+    const struct motion_state s = axis_state(t, axis, shown_ns);
     const double angle_rad = det_quantise(s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns),
                                           c->readout_resolution_arcsec * RAD_PER_ARCSEC);
     const int64_t rest_ns = motion_rest_ns(m);
@@ -151,6 +187,7 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
 
 static bool all_at_rest(const struct table *t, int64_t t_ns)
 {
+    if (t->ripples) return false;
     for (unsigned i = 0; i < t->cfg.axes; i++) {
         if (!motion_at_rest(&t->axis[i], t_ns)) return false;
     }
@@ -160,7 +197,7 @@ static bool all_at_rest(const struct table *t, int64_t t_ns)
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns)
 {
     assert(axis < t->cfg.axes);
-    return motion_at(&t->axis[axis], t_ns);
+    return axis_state(t, axis, t_ns);
 }
 
 /* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). det_sin() takes up to 1e6
@@ -195,7 +232,7 @@ static void set_pose(const struct table *t, int64_t t_ns, struct pose *p)
     pose_tilt(p, tilt_rad);
     for (unsigned i = 0; i < t->cfg.axes; i++) {
         const struct table_axis_cfg *c = &t->cfg.axis[i];
-        const struct motion_state s = motion_at(&t->axis[i], t_ns);
+        const struct motion_state s = axis_state(t, i, t_ns);
         if (i > 0) {
             pose_turn(p, axis_across(c->along, t->cfg.axis[i - 1].along), c->nonorthogonality_arcsec * RAD_PER_ARCSEC,
                       0.0, 0.0);

@@ -41,12 +41,21 @@ struct table_reading {
     double rest_in_s; /* 0 at rest; negative if this motion does not end */
 };
 
+/* Fault of a servo: a sine in the rate of an axis. Owned by its injector, linked in while it lasts. */
+struct table_ripple {
+    unsigned axis;
+    double rate_radps, hz; /* amplitude */
+    int64_t from_ns;       /* begins with rate and angle as they are without it */
+    struct table_ripple *next;
+};
+
 struct table {
     struct table_cfg cfg;
     struct site site;
     uint64_t seed; /* of the readout's noise */
     struct motion axis[TABLE_AXES_MAX];
     double set_zero_rad[TABLE_AXES_MAX]; /* by table_zero() */
+    struct table_ripple *ripples;
     int64_t cached_from_ns, cached_to_ns;
     struct pose cached;
 };
@@ -69,6 +78,9 @@ double table_offset_deg(const struct table *t, unsigned axis);
 
 /* From now on the readout, without noise, shows angle_deg where the axis is. */
 enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns);
+
+void table_ripple_add(struct table *t, struct table_ripple *r);
+void table_ripple_remove(struct table *t, struct table_ripple *r); /* the axis is where it would be without */
 
 /* Pure: the same instant shows the same noise. The axis exists. */
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns);

@@ -75,7 +75,7 @@ def kinds_told() -> list[str]:
 ELSEWHERE = (
     *("controller.capacitor", "controller.stuck_reset", "controller.stuck_key"),  # test_faults_boards.py
     *("platform.torquer", "platform.drift_step", "platform.encoder_stuck"),  # test_gyro.py
-    *("chamber.slow", "chamber.readout"),  # test_faults_chamber.py
+    *("chamber.slow", "chamber.readout", "table.ripple"),  # test_faults_instruments.py
 )
 
 

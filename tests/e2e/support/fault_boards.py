@@ -69,6 +69,7 @@ ACCEPTED = {
     "supply": r"supply",
     "platform": r"platform\..*",  # there is none here
     "chamber": r"chamber",  # nor this
+    "table": r"table\.\d",  # nor this
 }
 
 _database = cast(cantools.database.can.Database, cantools.database.load_file(DBC))

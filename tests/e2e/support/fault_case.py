@@ -35,6 +35,7 @@ VALUES: dict[str, dict[str, object]] = {
     "platform.drift_step": {"drift_degph": 1},
     "chamber.slow": {"rate_part": 0.5},
     "chamber.readout": {"readout_k": 1},
+    "table.ripple": {"ripple_dps": 1, "frequency_hz": 1},
 }
 
 

@@ -248,6 +248,7 @@ static void every_kind_at_every_point_fits_or_says_why_not(void **state)
     const struct fault_kind *kind;
     unsigned fit = 0, refused = 0;
     r.lab.chamber.cfg.present = true;
+    r.lab.table.cfg.axes = 2;
     for (unsigned i = 0; (kind = fault_kind(i)) != NULL; i++) {
         struct fault f = {.kind = kind};
         unsigned of_kind = 0;

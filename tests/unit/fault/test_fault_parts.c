@@ -113,6 +113,34 @@ static void faults_of_the_chamber_add_up_and_end(void **state)
     }
 }
 
+/* Two sines in the rate of one axis, one in another; angle and acceleration belong to the rate. */
+static void ripples_of_a_table_add_up_and_end(void **state)
+{
+    (void)state;
+    const double deg = 0.017453292519943295, pi2 = 6.283185307179586;
+    const struct table_cfg cfg = table_default(2);
+    table_init(&r.lab.table, &cfg, &r.lab.site, 1);
+    run_to(100 * MS);
+    add("{'kind':'table.ripple','point':'table.1','ripple_dps':2,'frequency_hz':4,'for_s':0.5}");
+    add("{'kind':'table.ripple','point':'table.1','ripple_dps':1,'frequency_hz':10,'for_s':0.3}");
+    add("{'kind':'table.ripple','point':'table.2','ripple_dps':3,'frequency_hz':1}");
+    run_to(130 * MS);
+    const struct motion_state s = table_axis(&r.lab.table, 0, 130 * MS), other = table_axis(&r.lab.table, 1, 130 * MS);
+    const double a = pi2 * 4 * 0.03, b = pi2 * 10 * 0.03;
+    assert_true(fabs(s.rate_radps / deg - 2 * sin(a) - sin(b)) < 1e-9);
+    assert_true(fabs(s.angle_rad / deg - 2 * (1 - cos(a)) / (pi2 * 4) - (1 - cos(b)) / (pi2 * 10)) < 1e-9);
+    assert_true(fabs(s.accel_radps2 / deg - 2 * pi2 * 4 * cos(a) - pi2 * 10 * cos(b)) < 1e-9);
+    assert_true(fabs(other.rate_radps / deg - 3 * sin(pi2 * 0.03)) < 1e-9);
+    assert_true(fabs(table_read(&r.lab.table, 0, 130 * MS).rate_dps - s.rate_radps / deg) < 1e-12);
+    const struct pose p = *table_pose(&r.lab.table, 130 * MS);
+    assert_true(fabs(p.w_ib_b_radps[1] - s.rate_radps) < 0.01 * fabs(s.rate_radps)); /* y carries z, which is near 0 */
+    run_to(500 * MS);
+    assert_true(fabs(table_axis(&r.lab.table, 0, 500 * MS).rate_radps / deg - 2 * sin(pi2 * 4 * 0.4)) < 1e-9);
+    run_to(601 * MS);
+    assert_true(table_axis(&r.lab.table, 0, 601 * MS).rate_radps == 0.0);
+    assert_true(table_axis(&r.lab.table, 1, 601 * MS).rate_radps != 0.0);
+}
+
 /* Registers without power hold nothing. */
 static void a_flip_in_a_board_without_power_is_void(void **state)
 {
@@ -177,6 +205,7 @@ int main(void)
         TEST(brownouts_are_those_that_were_asked_for),
         TEST(a_bias_is_in_the_codes),
         TEST(faults_of_the_chamber_add_up_and_end),
+        TEST(ripples_of_a_table_add_up_and_end),
         TEST(volts_of_a_current_sensor_are_those_at_its_load),
         TEST(faults_of_a_chip_add_up),
         TEST(what_is_over_at_once_needs_no_lifting),

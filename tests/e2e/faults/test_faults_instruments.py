@@ -1,9 +1,10 @@
-"""Faults of the thermal chamber, as its reading over SCPI and the temperature codes of a board show them."""
+"""Faults of chamber and table, as their readings over SCPI and the codes of a board show them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from psabench import Bench
 from psabench.errors import BenchError, TimeOut
@@ -57,8 +58,35 @@ def test_a_slow_chamber_is_late_and_a_stuck_one_never_there(tmp_path: Path) -> N
         assert b.chamber.temp_degc == pytest.approx(80.0)
 
 
-def test_without_a_chamber_both_are_refused(tmp_path: Path) -> None:
-    with bench(tmp_path, UNITS) as b:
-        for kind, values in (("chamber.slow", {"rate_part": 0.5}), ("chamber.readout", {"readout_k": 5.0})):
-            with pytest.raises(BenchError, match="chamber"):
-                b.fault(kind, "chamber", **values)
+def test_a_table_that_ripples_shows_it_in_its_rate_and_in_the_codes(tmp_path: Path) -> None:
+    """A level axis x that stands still: gravity along z comes into y by the angle, A / w (1 - cos w t)."""
+    units = "units: [{on: table, axes: {x: {sensor: none}, y: {sensor: mems, kx_v_per_g: 1}}}]\n"
+    with bench(tmp_path, "table: {axes: [{along: x}]}\n" + units) as b:
+        b.unit.wait_ready()
+        still = b.unit.stream(500).axis("y")
+        with b.fault("table.ripple", "table.1", ripple_dps=10, frequency_hz=5):
+            rates_dps = []
+            for _ in range(40):
+                b.wait(0.005)
+                rates_dps.append(b.table.rate_dps())
+            volts = b.unit.stream(500).axis("y")
+        assert max(rates_dps) == pytest.approx(10.0, rel=0.05)
+        assert min(rates_dps) == pytest.approx(-10.0, rel=0.05)
+        swing_rad = 2 * np.radians(10.0) / (2 * np.pi * 5)
+        assert np.ptp(volts) == pytest.approx(np.sin(swing_rad), rel=0.05)
+        assert np.ptp(still) < 1e-4
+        b.wait(0.1)
+        assert np.ptp(b.unit.stream(500).axis("y")) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("kind", "point", "values"),
+    [
+        ("chamber.slow", "chamber", {"rate_part": 0.5}),
+        ("chamber.readout", "chamber", {"readout_k": 5.0}),
+        ("table.ripple", "table.1", {"ripple_dps": 1.0, "frequency_hz": 1.0}),
+    ],
+)
+def test_what_the_bench_has_not_is_refused(kind: str, point: str, values: dict[str, float], tmp_path: Path) -> None:
+    with bench(tmp_path, UNITS) as b, pytest.raises(BenchError, match=point):
+        b.fault(kind, point, **values)
