@@ -39,7 +39,7 @@ def make_parser() -> argparse.ArgumentParser:
     p.add_argument("studies", nargs="*", metavar="STUDY", help=f"{', '.join(STUDIES)} (all)")
     p.add_argument("--seeds", type=int, default=200, metavar="N", help="1 to N (%(default)s)")
     p.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (%(default)s)")
-    p.add_argument("--minutes", type=float, default=60.0, metavar="N", help="begin no run after that (%(default)g)")
+    p.add_argument("--minutes", type=float, default=60.0, metavar="N", help="begin no run after that; 0: none at all (%(default)g)")
     p.add_argument("--out", type=Path, default=OUT, metavar="FILE", help="results (build/coverage.jsonl)")
     p.add_argument("--docs", action="store_true", help="write the table of docs/reference/coverage.md")
     return p
@@ -64,7 +64,7 @@ def run_missing(todo: Sequence[tuple[str, int]], args: argparse.Namespace) -> No
     if args.out.exists() and not args.out.read_text(encoding="utf-8").endswith("\n"):
         args.out.write_text(args.out.read_text(encoding="utf-8") + "\n", encoding="utf-8")  # a line that was cut
     with ProcessPoolExecutor(args.jobs) as pool, args.out.open("a", encoding="utf-8") as out:
-        waiting = iter(todo)
+        waiting = iter(todo if args.minutes > 0.0 else ())
         futures = {pool.submit(run_study, *key): key for key in islice(waiting, args.jobs)}
         done = 0
         while futures:
