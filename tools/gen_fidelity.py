@@ -44,9 +44,9 @@ tests* that says E2 has our word that a figure of the data sheet is met; one in 
 STALE = (
     """A group is stale when one of its files has changed, comments and blanks apart, since its tests last passed."""
 )
-TEETH = """Random mutants of the code, one wrong operator, constant, index or call each, judged by the unit tests nearest
-to them (`make mutate`; [mutants.md](docs/reference/mutants.md)). A mutant that changes nothing counts as not killed, so
-a rate is the least that the tests find; a sample is small, its interval says so."""
+TEETH = """Random mutants of the code, one wrong operator, constant, index or call each, judged by the unit tests
+nearest to them (`make mutate`; [mutants.md](docs/reference/mutants.md)). A mutant that changes nothing counts as not
+killed, so a rate is the least that the tests find; a sample is small, its interval says so."""
 STATEMENTS = ("E0", "E1", "E2", "E3", "E4")
 REACHED = ("E2", "E3", "E4", "E5")
 NOT_AGAIN = "not judged again"  # a recording, with the present sources

@@ -139,9 +139,9 @@ WHY_BULK = (
     "repeats; back to back on one machine the writer is 1.75 times as fast as before, the board 1.45 times"
 )
 WHY_MODULATOR = (
-    "of 122 instructions a clock the recurrence of the fourth-order modulator, which is serial, takes 27, a white draw 24, "
-    "the analog chain's pole, which is serial too, 11; the three channels side by side are not built: X is sampled with the "
-    "temperature of the period before, Y and Z with that of the present one, so they have no common instant"
+    "of 122 instructions a clock the recurrence of the fourth-order modulator, which is serial, takes 27, a white draw "
+    "24, the analog chain's pole, which is serial too, 11; the three channels side by side are not built: X is sampled "
+    "with the temperature of the period before, Y and Z with that of the present one, so they have no common instant"
 )
 WHY_GYRO = (
     "on a platform, whose acceleration has no bound, the PSA-2 computes everything, and the platform's loops and the "

@@ -39,7 +39,9 @@ def make_parser() -> argparse.ArgumentParser:
     p.add_argument("studies", nargs="*", metavar="STUDY", help=f"{', '.join(STUDIES)} (all)")
     p.add_argument("--seeds", type=int, default=200, metavar="N", help="1 to N (%(default)s)")
     p.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (%(default)s)")
-    p.add_argument("--minutes", type=float, default=60.0, metavar="N", help="begin no run after that; 0: none at all (%(default)g)")
+    p.add_argument(
+        "--minutes", type=float, default=60.0, metavar="N", help="begin no run after that; 0: none at all (%(default)g)"
+    )
     p.add_argument("--out", type=Path, default=OUT, metavar="FILE", help="results (build/coverage.jsonl)")
     p.add_argument("--docs", action="store_true", help="write the table of docs/reference/coverage.md")
     return p
