@@ -193,7 +193,7 @@ void gyro_init(struct gyro *b, const struct gyro_profile *p, const struct board_
     board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, gyro_lines, GYRO_LINES, cfg, io, s);
-    if (io->platform) sched_ev(&b->step, run_step, b); /* it moves what stands there */
+    if (io->platform) sched_ev(&b->step, run_step, b); /* it moves what is mounted there */
     else sched_ev_inner(&b->step, run_step, b);
 }
 
