@@ -1,3 +1,6 @@
 #include "base/lanes.h"
 
-bool lanes_plain;
+bool lanes_allowed(void)
+{
+    return true;
+}

@@ -1,7 +1,8 @@
 /* Four numbers side by side, by the compiler's portable vectors: each lane holds what the same operations give one by one, to the
  * bit, with the vector instructions of any machine or with none.
  *
- * A function that works on rows is written once, LANES_BODY, and compiled twice: for every machine, and for those that have AVX2. Functions take vectors by pointer: how they would be passed differs between the two. */
+ * A function that works on rows is written once, LANES_BODY, and compiled twice: for every machine, and for those that have
+ * AVX2. Functions take vectors by pointer: how they would be passed differs between the two. */
 #ifndef PSABENCH_BASE_LANES_H
 #define PSABENCH_BASE_LANES_H
 
@@ -17,19 +18,20 @@ typedef uint64_t lanes_u64 __attribute__((vector_size(32)));
 
 #define LANES_BODY static inline __attribute__((always_inline))
 
-extern bool lanes_plain; /* for tests: as on a machine without */
+/* Whether vector instructions may be used where the machine has them: yes. A test has a function of its own in its place. */
+bool lanes_allowed(void);
 
 #if defined __x86_64__
 #define LANES_AVX2 __attribute__((target("avx2")))
 #define LANES_BMI2 __attribute__((target("bmi2")))
 static inline bool lanes_avx2(void)
 {
-    return !lanes_plain && __builtin_cpu_supports("avx2");
+    return lanes_allowed() && __builtin_cpu_supports("avx2");
 }
 
 static inline bool lanes_bmi2(void)
 {
-    return !lanes_plain && __builtin_cpu_supports("bmi2");
+    return lanes_allowed() && __builtin_cpu_supports("bmi2");
 }
 #else
 #define LANES_AVX2

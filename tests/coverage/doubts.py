@@ -18,7 +18,7 @@ CHUNK = 50  # runs of one task
 WORDS = 40  # of a doubt, that tell which check it is
 
 EPILOG = """\
-example (in the root of a checkout, with PYTHONPATH=tools:tests/py/support:tests/py/procedures):
+example (in the root of a checkout, with PYTHONPATH=tools:tests/py/support):
   python -m tests.coverage.doubts improved --latitude 80 --latitude -80 --runs 2000
 
 The table is the one of docs/procedures/gyrocompass.md.
@@ -27,7 +27,7 @@ The table is the one of docs/procedures/gyrocompass.md.
 
 def doubts_of_runs(reading: str, latitude_deg: float, first: int, runs: int) -> Counter[str]:
     """Doubts of runs `first` and on, each with a generator of its own: by check, and by "runs" how many had one."""
-    from test_gyrocompass_doubts import article_s_instrument, run  # type: ignore[import-untyped]
+    from gyro_instruments import article_s_instrument, run
 
     found: Counter[str] = Counter()
     for k in range(first, first + runs):

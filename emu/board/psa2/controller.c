@@ -325,7 +325,7 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
     init_read(b);
     sched_ev_inner(&b->temp.timeout, on_temp_timeout, b);
     psa2_temp_restart(b);
-    psa2_temp_skip_init(b);
+    psa2_lazy_init(b);
     psa2_out_init(b);
     init_accel(b);
     init_temp(b);

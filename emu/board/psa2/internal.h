@@ -64,8 +64,7 @@ void psa2_cycle_break(struct psa2_cycle *c);                      /* the next on
 uint32_t psa2_cycle_pass(const struct psa2_cycle *c, struct psa2_start *at, int64_t until_ns);
 
 /* psa2/temp_skip.c */
-void psa2_temp_skip_init(struct psa2 *b);
-/* Conversions that no one looks at before until_ns, from where on codes are true. */
+/* Conversions that no one looks at before until_ns, from where on codes are true; lazy.again is due before the last one's word. */
 void psa2_temp_skip(struct psa2 *b, int64_t until_ns);
 
 /* psa2/request.c */
@@ -78,6 +77,7 @@ void psa2_lazy_frame(struct psa2 *b,
                      int64_t t_ns); /* a frame has ended: the board may fall asleep, skip frames, wake up */
 void psa2_lazy_sleep(
     struct psa2 *b); /* between two frames it has done something else: if it sleeps, it may skip frames */
+void psa2_lazy_init(struct psa2 *b);
 void psa2_lazy_stop(struct psa2 *b);                      /* a reset: nothing to be awake for */
 const char *psa2_why_eager(struct psa2 *b, int64_t t_ns); /* NULL: what no one looks at need not be computed */
 

@@ -197,6 +197,17 @@ void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)
     psa2_lazy_sleep(b);
 }
 
+static void skip_again(void *ctx, int64_t t_ns)
+{
+    (void)t_ns;
+    psa2_lazy_sleep(ctx);
+}
+
+void psa2_lazy_init(struct psa2 *b)
+{
+    sched_ev_inner(&b->lazy.again, skip_again, b);
+}
+
 void psa2_lazy_stop(struct psa2 *b)
 {
     sched_cancel(b->base.sched, &b->lazy.again);

@@ -14,6 +14,7 @@
 #include "board/board.h"
 #include "board/psa2/event.h"
 #include "board/psa2/profile.h"
+#include "board/psa2/sleep.h"
 #include "chip/ads1256/ads1256.h"
 #include "chip/ads1282/ads1282.h"
 

@@ -125,17 +125,6 @@ static void begin_run(struct psa2 *b, uint32_t n, const struct scan *s)
     sched_at(b->base.sched, &b->lazy.again, s->sync_ns);
 }
 
-static void skip_again(void *ctx, int64_t t_ns)
-{
-    (void)t_ns;
-    psa2_lazy_sleep(ctx);
-}
-
-void psa2_temp_skip_init(struct psa2 *b)
-{
-    sched_ev_inner(&b->lazy.again, skip_again, b);
-}
-
 void psa2_temp_skip(struct psa2 *b, int64_t until_ns)
 {
     const int64_t ahead_ns = b->base.sched->now_ns + AHEAD_NS, turn = turn_ns(b);
