@@ -293,6 +293,7 @@ static void saturation_is_counted_and_told(void **state)
     assert_in_range(r.b.channel[0].lost, 24, 29); /* 0.167 V s times 174 */
     assert_int_equal(r.reading[90].status, PIK_ST_NEW | PIK_ST_SATURATED_X);
     assert_int_equal(r.event[PIK_EV_SATURATED], 1);
+    assert_int_equal(r.b.counters.readings, r.event[PIK_EV_LATCH]);
     assert_int_equal(r.saturations, 1);
     assert_int_equal(r.ends, 0);
     pik_sample_until(&r.b, r.s.now_ns);
