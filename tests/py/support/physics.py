@@ -54,7 +54,7 @@ SIGNATURES: dict[str, tuple[object, list[object]]] = {
 def build(where: Path) -> ctypes.CDLL:
     """Compile emu/phys with the bridge into a library of its own and load it."""
     out = where / "physics.so"
-    base = (ROOT / f"emu/base/{name}.c" for name in ("detmath", "draws", "rng"))
+    base = (ROOT / f"emu/base/{name}.c" for name in ("detmath", "draws", "lanes", "rng"))
     sources = [ROOT / "tests/py/support/phys_bridge.c", *base]
     sources += sorted((ROOT / "emu/phys").rglob("*.c"))
     flags = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{ROOT / 'emu'}"]
