@@ -1,5 +1,5 @@
 """For all tests: their tier (--tier), Ctrl-C for the programs that they start, one thread for linear algebra, and a
-folder that everybody may enter.
+folder that all users may enter.
 
 A runner in the background (`make test &` in a script, many CI runners) starts us with SIGINT ignored; programs would
 inherit that, and the tests that press Ctrl-C would wait without end.
@@ -90,7 +90,7 @@ def _described(item: pytest.Item) -> tuple[Path, str, str, frozenset[str]]:
 
 @pytest.fixture
 def shared_path(tmp_path: Path) -> Path:
-    """tmp_path with the folders above it, which pytest makes its user's own, passable to everybody."""
+    """tmp_path with the folders above it, which pytest makes its user's own, passable to all users."""
     for folder in tmp_path.parents:
         if "pytest-of-" in str(folder):
             folder.chmod(0o755)

@@ -44,7 +44,7 @@ struct sched {
     int64_t look_ns;   /* no one looks at the boards before, at the end of the run either */
     unsigned asleep;   /* boards whose values are not what they would be if all had been computed */
     bool eager;        /* nothing is put off */
-    unsigned any_time; /* who may look at, or change, what boards measure at an instant that is not known before */
+    unsigned any_time; /* observers that may look at, or change, inputs of boards at unpredictable instants */
     uint32_t at_once;
     int64_t at_once_ns;
     uint64_t number;               /* of the next event for the heap */

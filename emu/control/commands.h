@@ -24,10 +24,4 @@ static inline bool control_by_step(const struct control_bench *b)
     return p.by_step;
 }
 
-/* The converters take their inputs in blocks: what was before a change of their world must be sampled before it. */
-static inline void control_settle_inputs(const struct control_bench *b, int64_t t_ns)
-{
-    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
-}
-
 #endif

@@ -96,6 +96,7 @@ static void refresh_chamber(struct fault *f, int64_t t_ns)
         if (fault_given(other, FAULT_RATE_PART)) part *= other->value[FAULT_RATE_PART];
         if (fault_given(other, FAULT_READOUT_K)) misreading_k += other->value[FAULT_READOUT_K];
     }
+    control_settle_inputs(f->engine->bench, t_ns);
     chamber_hinder(c, fmax(part, RATE_PART_LEAST), t_ns);
     chamber_mislead(c, misreading_k);
 }
@@ -107,16 +108,9 @@ static struct table *table_of(const struct fault *f)
     return &f->engine->bench->lab->table;
 }
 
-/* What they measure up to now belongs to the axis as it was. */
-static void settle_units(const struct fault *f, int64_t t_ns)
-{
-    const struct control_bench *b = f->engine->bench;
-    for (unsigned i = 0; i < b->units; i++) unit_sample_until(b->unit[i], t_ns);
-}
-
 static bool ripple_axis(struct fault *f, int64_t t_ns)
 {
-    settle_units(f, t_ns);
+    control_settle_inputs(f->engine->bench, t_ns);
     f->as.ripple = (struct table_ripple){.axis = f->point.index,
                                          .rate_radps = f->value[FAULT_RIPPLE_DPS] * RAD_PER_DEG,
                                          .hz = f->value[FAULT_FREQUENCY_HZ],
@@ -127,7 +121,7 @@ static bool ripple_axis(struct fault *f, int64_t t_ns)
 
 static void lift_ripple(struct fault *f, int64_t t_ns)
 {
-    settle_units(f, t_ns);
+    control_settle_inputs(f->engine->bench, t_ns);
     table_ripple_remove(table_of(f), &f->as.ripple);
 }
 

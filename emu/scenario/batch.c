@@ -59,6 +59,23 @@ static double value_of(const struct quartz_batch *b, const char *key)
 
 enum { SAMPLES = 30 };
 
+/* Whether a group that there is gives ratios within the limits: drawn as if all units were of it. */
+static bool check_group(struct yaml_file *f, const struct yaml_node *node, const struct quartz_batch *b,
+                        enum quartz_group group, double share)
+{
+    struct quartz_batch alone = *b;
+    alone.share_a = group == QUARTZ_GROUP_A;
+    alone.share_b = group == QUARTZ_GROUP_B;
+    for (uint32_t i = 0; share > 0.0 && i < SAMPLES; i++) {
+        struct quartz_g g = quartz_default();
+        if (!quartz_batch_draw(&alone, 0, i, 0, &g))
+            return yaml_file_fail(f, yaml_at(node, "ratio_max"), "ratio_max",
+                                  "expected curves and slopes that give ratios of %g to %g, got none in group %s",
+                                  b->ratio_min, b->ratio_max, quartz_group_name(group));
+    }
+    return true;
+}
+
 static bool check_batch(struct yaml_file *f, const struct yaml_node *node, const struct quartz_batch *b)
 {
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
@@ -70,14 +87,8 @@ static bool check_batch(struct yaml_file *f, const struct yaml_node *node, const
     if (b->share_a + b->share_b > 1.0)
         return yaml_file_fail(f, yaml_at(node, "share_b"), "share_b", "expected up to 1 with share_a, got %g",
                               b->share_a + b->share_b);
-    for (uint32_t i = 0; i < SAMPLES; i++) {
-        struct quartz_g g = quartz_default();
-        if (!quartz_batch_draw(b, 0, i, 0, &g))
-            return yaml_file_fail(f, yaml_at(node, "ratio_max"), "ratio_max",
-                                  "expected curves and slopes that give ratios of %g to %g, got none in group %s",
-                                  b->ratio_min, b->ratio_max, quartz_group_name(quartz_group(&g)));
-    }
-    return true;
+    return check_group(f, node, b, QUARTZ_GROUP_A, b->share_a) && check_group(f, node, b, QUARTZ_GROUP_B, b->share_b) &&
+           check_group(f, node, b, QUARTZ_REST, 1.0 - b->share_a - b->share_b);
 }
 
 static bool open_batch(struct yaml_file *f, const struct yaml_node *node, struct quartz_batch *b)

@@ -33,7 +33,7 @@ static void draw_quartz(const struct scenario *s, uint32_t serial, unsigned axis
 {
     c->quartz = quartz_with_pendulum(&c->quartz, s->lab.site.g_mps2);
     (void)quartz_batch_draw(&s->spread.quartz, s->seed, serial, axis,
-                            &c->quartz); /* its ratios were tried at loading */
+                            &c->quartz); /* its groups were tried at loading */
 }
 
 static void draw_unit(const struct scenario *s, struct scenario_unit *u)

@@ -310,6 +310,7 @@ bool yaml_find_proto(struct yaml_file *f, const struct yaml_node *node, const ch
 static const struct {
     const char *end, *unit;
 } units[] = { /* the longer first */
+    {"share_a", ""},
     {"_ppm_per_k", "ppm/K"}, {"_k_per_min", "K/min"}, {"_v_per_g2", "V/g²"}, {"_v_per_g", "V/g"}, {"_v_per_k", "V/K"},
     {"_n_m_per_rad", "N m/rad"}, {"_v_per_rad", "V/rad"}, {"_n_m_per_a", "N m/A"}, {"_a_per_v", "A/V"}, {"_kg_m2", "kg m²"},
     {"_n_m_s", "N m s"}, {"_kg", "kg"}, {"_ug_per_urad", "µg/µrad"}, {"_arcsec_per_k", "arcsec/K"}, {"_ug_per_g2", "µg/g²"}, {"_ug_per_k", "µg/K"},

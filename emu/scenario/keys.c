@@ -107,7 +107,7 @@ static const struct field quartz_rows[] = {
     ROW(noise_a_rthz,       0, 1,       "white noise, one-sided density"),
     ROW(limit_a,            0, 10,      "largest current of either sign; 0: none"),
     {.key = "pendulum", .type = FIELD_SECTION, .offset = QUARTZ(pendulum), .sub = &scenario_pendulum_fields, .present = QUARTZ(pendulum_given),
-     .what = "parts of the pendulum and its loop; they decide `scale_a_per_g`, `natural_hz`, `damping`, `pendulous_ug_per_g2` and `hinge_ug_per_urad`"},
+     .what = "parts of the pendulum and its loop; they decide `scale_a_per_g`, `natural_hz`, `damping`, `pendulous_ug_per_g2` and `hinge_ug_per_urad`, and a `limit_a` where the gap is less"},
 #undef ROW
 };
 const struct fields scenario_quartz_fields = FIELDS(quartz_rows);

@@ -253,13 +253,49 @@ static bool check_signals(struct yaml_file *f, const struct yaml_node *node, con
     return true;
 }
 
+#define STANDARD_G_MPS2 9.80665
+
+/* What follows from the parts of a pendulum is within the limits of the keys that it decides. */
+static bool check_pendulum(struct yaml_file *f, const struct yaml_node *node, const char *where,
+                           const struct pendulum *p)
+{
+    const struct pendulum_law law = pendulum_law(p, STANDARD_G_MPS2);
+    const struct {
+        const char *key;
+        double value;
+    } rows[] = {{"pendulous_ug_per_g2", law.deflection_urad_per_g},
+                {"natural_hz", law.natural_hz},
+                {"scale_a_per_g", law.scale_a_per_g},
+                {"hinge_ug_per_urad", law.hinge_ug_per_urad}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const struct field *d = fields_find(&scenario_quartz_fields, rows[i].key);
+        if (!(rows[i].value <= d->max))
+            return yaml_file_fail(f, node, where, "expected parts that give %s up to %g, got %.4g", d->key, d->max,
+                                  rows[i].value);
+    }
+    return true;
+}
+
+static bool check_pendulums(struct yaml_file *f, const struct yaml_node *node, const struct scenario_unit *u)
+{
+    static const char *const axes[] = {"x", "y", "z"};
+    static const char *const where[] = {"axes.x.quartz.pendulum", "axes.y.quartz.pendulum", "axes.z.quartz.pendulum"};
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        const struct quartz_g *const q = &u->cfg.axis[i].quartz;
+        const struct yaml_node *const axis = yaml_at(yaml_at(node, "axes"), axes[i]);
+        const struct yaml_node *const parts = yaml_at(yaml_at(axis, "quartz"), "pendulum");
+        if (q->pendulum_given && !check_pendulum(f, parts, where[i], &q->pendulum)) return false;
+    }
+    return true;
+}
+
 /* A name, a node and a number that no other unit of the scenario has. */
 static bool check_unit(struct yaml_file *f, const struct yaml_node *node, const struct scenario *s,
                        const struct scenario_unit *u)
 {
     if (!is_plain(u->name))
         return yaml_file_fail(f, yaml_at(node, "name"), "name", "expected letters, digits and _, got \"%s\"", u->name);
-    if (!check_inputs(f, node, u) || !check_signals(f, node, u)) return false;
+    if (!check_inputs(f, node, u) || !check_signals(f, node, u) || !check_pendulums(f, node, u)) return false;
     for (const struct scenario_unit *other = s->units; other < s->units + s->unit_count; other++) {
         if (strcmp(other->name, u->name) == 0)
             return yaml_file_fail(f, yaml_at(node, "name"), "name",

@@ -189,8 +189,7 @@ static const char *why_eager(struct board *board, int64_t t_ns)
 {
     (void)board;
     (void)t_ns;
-    return "its converters could sleep, but its reads of them are not passed over, and its gyros sum their angle step "
-           "by step";
+    return "skipping its read cycles is not built, and its gyros integrate step by step";
 }
 
 const struct board_type psd1_board = {

@@ -108,14 +108,6 @@ enum motion_result table_stop(struct table *t, unsigned axis, int64_t t_ns)
     return drop_cache(t, MOTION_OK);
 }
 
-enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns)
-{
-    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
-    const double true_rad = motion_at(&t->axis[axis], t_ns).angle_rad;
-    t->set_zero_rad[axis] += angle_deg * RAD_PER_DEG - (true_rad + offset_rad(t, axis));
-    return MOTION_OK;
-}
-
 /* ---- ripple */
 
 void table_ripple_add(struct table *t, struct table_ripple *r)
@@ -153,6 +145,14 @@ static struct motion_state axis_state(const struct table *t, unsigned axis, int6
 }
 
 /* ---- readout */
+
+enum motion_result table_zero(struct table *t, unsigned axis, double angle_deg, int64_t t_ns)
+{
+    if (axis >= t->cfg.axes) return MOTION_NO_AXIS;
+    const double true_rad = axis_state(t, axis, t_ns).angle_rad;
+    t->set_zero_rad[axis] += angle_deg * RAD_PER_DEG - (true_rad + offset_rad(t, axis));
+    return MOTION_OK;
+}
 
 /* A stream for each instant: who reads twice, or another axis between, sees the same. */
 static double readout_noise_rad(const struct table *t, unsigned axis, int64_t t_ns)

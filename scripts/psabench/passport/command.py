@@ -6,14 +6,20 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from psabench.options import Parser
+
+if TYPE_CHECKING:
+    from psabench.passport.store import UnitRun
+    from psabench.thermal.compensation import Compensation
 
 STORE = Path("build/passports.sqlite")
 
 EPILOG = """\
 A unit is known by its serial number. `add` enters the sections of a calibration's result.json, a run of the unit each;
-a later run of the same method supersedes the one before, which stays. What is there already is not entered twice.
+a run of the same method that began later supersedes the one before, which stays. What is there already is not entered
+twice. `header` is for runs that a program has entered with a curve (docs/procedures/compensation.md).
 
 examples:
   psabench run turns --out build/a
@@ -22,7 +28,6 @@ examples:
   psabench passport show QA-0001 --all       with the runs that are superseded
   psabench passport diff QA-0001@1 QA-0001   the first run, and the last of the same method
   psabench passport export QA-0001 --out qa-0001.json
-  psabench passport header QA-0001 --quantity u0_ug --step 0.01 --out zero.h
 
 Exit status: 0 done, for diff: the same; 1 diff: they differ; 2 bad input, 3 the store cannot be written.
 """
@@ -44,8 +49,8 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     export.add_argument("serial", metavar="SERIAL")
     export.add_argument("--out", type=Path, metavar="FILE", help="in place of the terminal")
     diff = _add_subcommand(commands, "diff", "compare two runs", _compare_runs)
-    diff.add_argument("a", metavar="A", help="SERIAL@NUMBER of a run; SERIAL: its last one")
-    diff.add_argument("b", metavar="B", help="the other one")
+    diff.add_argument("a", metavar="A", help="SERIAL@NUMBER of a run; SERIAL: its latest one")
+    diff.add_argument("b", metavar="B", help="the other one; SERIAL: its latest of the same method")
     diff.add_argument("--json", action="store_true", help="print JSON in place of tables")
     header = _add_subcommand(commands, "header", "write a compensation as a C header in integers", _write_header)
     header.add_argument("serial", metavar="SERIAL[@NUMBER]")
@@ -108,8 +113,9 @@ def _compare_runs(args: argparse.Namespace) -> int:
     from psabench.report import diff
 
     with PassportStore(args.store, read_only=True) as store:
-        a, b = (comparable_dict(find_run(store, name)) for name in (args.a, args.b))
-    found = diff.compare_results(a, b)
+        a = find_run(store, args.a)
+        b = find_run(store, args.b, lambda run: run.method == a.method)
+    found = diff.compare_results(comparable_dict(a), comparable_dict(b))
     if args.json:
         print(json.dumps(diff.diff_dict(found), indent=1, ensure_ascii=False))
     else:
@@ -123,13 +129,17 @@ def _write_header(args: argparse.Namespace) -> int:
     from psabench.thermal.fixed_point import c_header, fixed_point
 
     with PassportStore(args.store, read_only=True) as store:
-        run = find_run(store, args.serial)
-    fitted = {q.name: q.compensation for q in run.quantities if q.compensation}
+        run = find_run(store, args.serial, lambda run: args.quantity in _fitted_curves(run))
+    fitted = _fitted_curves(run)
     if args.quantity not in fitted:
         known = ", ".join(fitted) or "a run with a compensation"
         raise BadInput(expected(known, args.quantity, f"{args.serial}: run {run.number}"))
     made = fixed_point(fitted[args.quantity], args.step)
     return _write_text(c_header(made, args.name or args.quantity), args.out)
+
+
+def _fitted_curves(run: UnitRun) -> dict[str, Compensation]:
+    return {q.name: q.compensation for q in run.quantities if q.compensation}
 
 
 def _write_text(text: str, path: Path | None) -> int:

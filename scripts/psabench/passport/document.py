@@ -77,7 +77,7 @@ def list_lines(passports: list[Passport]) -> Iterator[str]:
 
 def passport_lines(p: Passport, *, history: bool) -> Iterator[str]:
     """The runs that are valid now, or all of them."""
-    yield f"{p.serial}, {p.type}: {len(p.runs)} runs"
+    yield f"{p.serial}, {p.type}: {len(p.runs)} run{'s' if len(p.runs) != 1 else ''}"
     for run in p.runs if history else p.current_runs():
         yield ""
         yield from _run_lines(run)

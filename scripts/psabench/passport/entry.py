@@ -22,13 +22,16 @@ def runs_of_result(path: Path) -> list[UnitRun]:
     sections = [s for s in data.get("sections", []) if s.get("estimates")]
     if not sections:
         raise BadInput(expected("a result with estimates", "none", path))
+    procedure = data.get("facts", {}).get("procedure", "")
     try:
-        return [_run_of_section(section, origin) for section in sections]
+        return [_run_of_section({"procedure": procedure, **section}, origin) for section in sections]
     except (KeyError, TypeError, ValueError) as e:
         raise BadInput(expected("the sections of a calibration", f"{type(e).__name__}: {e}", path)) from e
 
 
 def _run_of_section(section: Mapping[str, Any], origin: Mapping[str, Any]) -> UnitRun:
+    if not section["procedure"]:
+        raise ValueError(expected("the name of a procedure", "none", "section"))
     words = (section.get(key) for key in ("procedure", "reading", "label"))
     estimates = [e for e in section["estimates"] if e.get("identifiable", True)]
     judged = [e["within_limits"] for e in estimates if e.get("within_limits") is not None]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,13 +32,13 @@ CREATE TABLE run (
     number      INTEGER NOT NULL,   -- of the unit's runs, from 1
     method      TEXT NOT NULL,      -- procedure and reading
     begun       TEXT NOT NULL,      -- ISO 8601, UTC
-    seed        INTEGER,            -- NULL: not of an emulator
+    seed        TEXT,               -- of 64 bits, in decimal digits; NULL: not of an emulator
     version     TEXT NOT NULL,      -- of psabench
     data_sha256 TEXT NOT NULL,      -- of the result that was entered
     within      INTEGER,            -- limits: 1 kept, 0 not, NULL none
     low_c       REAL,               -- temperatures for which it is valid
     high_c      REAL,
-    supersedes  INTEGER REFERENCES run (id), -- the run whose numbers these replace
+    supersedes  INTEGER REFERENCES run (id), -- the latest run of the method that had begun before, as it was entered
     provenance  TEXT NOT NULL,      -- JSON
     UNIQUE (unit, number),
     UNIQUE (unit, data_sha256)
@@ -101,16 +101,16 @@ class UnitRun:
 
 @dataclass(frozen=True, kw_only=True)
 class Passport:
-    """A unit and its runs, the earliest first."""
+    """A unit and its runs, in the order in which they were entered."""
 
     serial: str
     type: str
     runs: tuple[UnitRun, ...]
 
     def current_runs(self) -> tuple[UnitRun, ...]:
-        """Those that no later one supersedes."""
-        gone = {run.supersedes for run in self.runs}
-        return tuple(run for run in self.runs if run.number not in gone)
+        """Of each method the one that began last, whenever it was entered."""
+        last = {run.method: run for run in sorted(self.runs, key=lambda run: (run.begun, run.number))}
+        return tuple(run for run in self.runs if last[run.method] is run)
 
     def run_of(self, number: int) -> UnitRun:
         """Raises BadInput."""
@@ -158,7 +158,7 @@ class PassportStore(AbstractContextManager["PassportStore"]):
                 number=number,
                 method=method,
                 begun=begun,
-                seed=seed,
+                seed=None if seed is None else int(seed),
                 version=version,
                 data_sha256=sha,
                 within=None if within is None else bool(within),
@@ -181,13 +181,15 @@ class PassportStore(AbstractContextManager["PassportStore"]):
     # ---- changes, each whole or not at all
 
     def put_run(self, serial: str, kind: str, run: UnitRun) -> int:
-        """Enter a run of a unit, which is made where it is new; the number it has. A run of the same method is
-        superseded. What is there already, the same data of the same unit, is left as it is.
+        """Enter a run of a unit, which is made where it is new; the number it has. It supersedes the run of its method
+        that began before it. What is there already, the same data of the same unit, is left as it is.
 
         Raises BadInput for a serial number that is none, or one of another type of unit.
         """
         if not (serial.isprintable() and serial.strip() == serial and 0 < len(serial) <= MOST_SERIAL):
             raise BadInput(expected(f"1 to {MOST_SERIAL} printable characters", repr(serial), "serial number"))
+        if _parted_name(serial)[1] is not None:
+            raise BadInput(expected("no @ and number at its end, which names a run", repr(serial), "serial number"))
         with self._db.whole_change():
             self._db.execute_sql(
                 "INSERT INTO unit (serial, type) VALUES (?, ?) ON CONFLICT (serial) DO NOTHING", serial, kind
@@ -204,13 +206,15 @@ class PassportStore(AbstractContextManager["PassportStore"]):
     def _insert_run(self, unit: int, run: UnitRun) -> int:
         number = int(self._db.first_value("SELECT coalesce(max(number), 0) + 1 FROM run WHERE unit = ?", unit))
         before = self._db.execute_sql(
-            "SELECT id FROM run WHERE unit = ? AND method = ? ORDER BY number DESC LIMIT 1", unit, run.method
+            "SELECT id FROM run WHERE unit = ? AND method = ? AND begun <= ? ORDER BY begun DESC, number DESC LIMIT 1",
+            *(unit, run.method, run.begun),
         ).fetchone()
         low, high = run.range_c or (None, None)
+        seed = None if run.seed is None else str(run.seed)
         cursor = self._db.execute_sql(
             "INSERT INTO run (unit, number, method, begun, seed, version, data_sha256, within, low_c, high_c,"
             " supersedes, provenance) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            *(unit, number, run.method, run.begun, run.seed, run.version, run.data_sha256, run.within, low, high),
+            *(unit, number, run.method, run.begun, seed, run.version, run.data_sha256, run.within, low, high),
             *(before[0] if before else None, json.dumps(run.provenance, ensure_ascii=False)),
         )
         for q in run.quantities:
@@ -236,12 +240,19 @@ def data_digest(data: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def find_run(store: PassportStore, name: str) -> UnitRun:
-    """SERIAL@NUMBER: a run; SERIAL: its last one. Raises BadInput for what is not there."""
+def _parted_name(name: str) -> tuple[str, int | None]:
+    """SERIAL@NUMBER: both; SERIAL: None for the number."""
     serial, at, number = name.rpartition("@")
-    if not at or not number.isascii() or not number.isdigit():
-        serial, number = name, ""
+    return (serial, int(number)) if at and number.isascii() and number.isdigit() else (name, None)
+
+
+def find_run(store: PassportStore, name: str, suits: Callable[[UnitRun], bool] = lambda _: True) -> UnitRun:
+    """SERIAL@NUMBER: a run; SERIAL: its latest one that suits. Raises BadInput for what is not there."""
+    serial, number = _parted_name(name)
     passport = store.read_passport(serial)
-    if not passport.runs:
-        raise BadInput(expected("a unit with a run", "none", serial))
-    return passport.run_of(int(number)) if number else passport.runs[-1]
+    if number is not None:
+        return passport.run_of(number)
+    found = [run for run in passport.current_runs() if suits(run)]
+    if not found:
+        raise BadInput(expected("a unit with such a run", "none", serial))
+    return max(found, key=lambda run: (run.begun, run.number))

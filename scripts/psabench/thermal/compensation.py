@@ -119,7 +119,7 @@ def fit_sweep(
     Raises BadInput as fit_soak does, and where time does not ascend or the sweep does not turn: one leg cannot tell a
     lag from a shift of the curve.
     """
-    case_c, y = checked_readings(quantity, case_c, y, degree + 2)
+    case_c, y = checked_readings(quantity, case_c, y, degree, more=2)
     t_s = np.asarray(t_s, np.float64)
     if t_s.shape != y.shape or not np.all(np.isfinite(t_s)) or np.any(np.diff(t_s) <= 0):
         raise BadInput(expected("instants that ascend, one a reading", "others", quantity))
@@ -144,8 +144,10 @@ def turns_of(case_c: Array) -> int:
     return turns
 
 
-def checked_readings(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree: int) -> tuple[Array, Array]:
-    """As arrays (n,). Raises BadInput."""
+def checked_readings(
+    quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree: int, more: int = 0
+) -> tuple[Array, Array]:
+    """As arrays (n,). more: parameters beside the polynomial's. Raises BadInput."""
     t_c, y = np.asarray(t_c, np.float64), np.asarray(y, np.float64)
     if not 0 <= degree <= MOST_DEGREE:
         raise BadInput(expected(f"a degree of 0 to {MOST_DEGREE}", degree, quantity))
@@ -153,8 +155,8 @@ def checked_readings(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree
         raise BadInput(expected("a temperature for each reading", f"{t_c.shape} for {y.shape}", quantity))
     if not (np.all(np.isfinite(t_c)) and np.all(np.isfinite(y))):
         raise BadInput(expected("finite temperatures and readings", "others", quantity))
-    if len(np.unique(t_c)) < degree + 2:
-        raise BadInput(expected(f"readings at {degree + 2} temperatures or more", len(np.unique(t_c)), quantity))
+    if len(np.unique(t_c)) < (least := degree + 2 + more):
+        raise BadInput(expected(f"readings at {least} temperatures or more", len(np.unique(t_c)), quantity))
     if np.ptp(t_c) < LEAST_SPAN_K:
         raise BadInput(expected(f"a range of {LEAST_SPAN_K:g} K or more", f"{np.ptp(t_c):.3g} K", quantity))
     return t_c, y

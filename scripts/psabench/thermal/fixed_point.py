@@ -7,13 +7,14 @@ from the compensation in double precision over every thousandth of its range.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from psabench.errors import BadInput, expected
-from psabench.thermal.compensation import Compensation
+from psabench.thermal.compensation import Compensation, Lag
 
 X_BITS = 30
 SUM_BITS = 32  # what the recurrence may reach: products with the scaled temperature stay below 2^63
@@ -31,6 +32,7 @@ class FixedPoint:
     coefficients: tuple[int, ...]  # in step / 2^FINE_BITS
     step: float
     error: float  # largest, of the quantity's unit, inside the range
+    lag: Lag | None  # not in these integers
 
     def value_at(self, element_mdegc: npt.ArrayLike) -> Integers:
         """As the C function gives it, the same to the bit; temperature in thousandths of deg C."""
@@ -57,20 +59,29 @@ def fixed_point(c: Compensation, step: float) -> FixedPoint:
     fine = step / (1 << FINE_BITS)
     # |b_k| of the recurrence is at most the sum of (j + 1) |c_j|.
     least = sum((j + 1) * abs(k) for j, k in enumerate(c.coefficients)) / (1 << (SUM_BITS - FINE_BITS))
-    if not step > least:
+    if not least < step < math.inf:
         raise BadInput(expected(f"a step above {least:.3g}", f"{step:g}", c.quantity))
     low, high = (round(1000.0 * t) for t in (c.low_c, c.high_c))
     numbers = tuple(round(k / fine) for k in c.coefficients)
-    made = FixedPoint(quantity=c.quantity, low_mdegc=low, high_mdegc=high, coefficients=numbers, step=step, error=0.0)
+    made = FixedPoint(
+        quantity=c.quantity, low_mdegc=low, high_mdegc=high, coefficients=numbers, step=step, error=0.0, lag=c.lag
+    )
     every = np.arange(low, high + 1)
     error = np.abs(made.value_at(every) * step - c.value_at(every / 1000.0)).max()
     return FixedPoint(**{**made.__dict__, "error": float(error)})
 
 
+C_WORDS = frozenset(  # C11, 6.4.1
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register"
+    " restrict return short signed sizeof static struct switch typedef union unsigned void volatile while".split()
+)
+_LAG = """
+ * NOT in this function: add {per_k:.9g} a kelvin that the case is warmer than the element, which follows the
+ * case with a time constant of {tau_s:.6g} s."""
 _HEADER = """\
 /* Compensation of {quantity} against the temperature of the element, {low:.3f} to {high:.3f} degC; clamped outside.
  * Polynomial of degree {degree} in Chebyshev form. A result counts {step:.9g} of the quantity's unit.
- * Largest error of these integers against double precision: {error:.3g}. Made by psabench {version}. */
+ * Largest error of these integers against double precision: {error:.3g}. Made by psabench {version}.{lag} */
 #ifndef {guard}
 #define {guard}
 
@@ -106,8 +117,9 @@ def c_header(f: FixedPoint, name: str) -> str:
     """The header's text, with a function `name`. Raises BadInput for a name that C does not take."""
     from importlib.metadata import version
 
-    if not (name.isidentifier() and name.isascii()):
+    if not (name.isidentifier() and name.isascii()) or name in C_WORDS:
         raise BadInput(expected("a name of C", name, "header"))
+    lag = f.lag and _LAG.format(tau_s=f.lag.tau_s, per_k=f.lag.per_k)
     return _HEADER.format(
         quantity=f.quantity,
         low=f.low_mdegc / 1000,
@@ -118,6 +130,7 @@ def c_header(f: FixedPoint, name: str) -> str:
         step=f.step,
         error=f.error,
         version=version("psabench"),
+        lag=lag or "",
         guard=f"{name.upper()}_H",
         name=name,
         coefficients=", ".join(str(k) for k in f.coefficients),

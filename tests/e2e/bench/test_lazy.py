@@ -42,9 +42,7 @@ def test_lazy_and_eager_go_on_to_the_same_bytes(tmp_path: Path) -> None:
 
 SENSOR = "{sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0}"
 LONE = f"axes: {{x: {SENSOR}, y: {SENSOR}, z: {SENSOR}}}"
-PSD1 = (
-    "its converters could sleep, but its reads of them are not passed over, and its gyros sum their angle step by step"
-)
+PSD1 = "skipping its read cycles is not built, and its gyros integrate step by step"
 UNITS = {
     "still": ("on: fixed", None),
     "arm": ("on: fixed, lever_arm_m: [0.1, 0, 0]", None),

@@ -80,6 +80,17 @@ def test_runs_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "+0.1" in line
 
 
+def test_two_procedures_with_one_reading_are_two_methods(tmp_path: Path) -> None:
+    for k, name in enumerate(("gyrocompass", "heading-hold")):
+        estimates = [{"name": "heading_deg", "unit": "deg", "value": 40.0, "sd": 0.1, "ci95": [39.8, 40.2]}]
+        sections = [{"reading": "improved", "estimates": estimates}]
+        result = written_result(tmp_path / f"r{k}", 2.5, facts={"procedure": name}, sections=sections)
+        assert run_passport(tmp_path, "add", str(result), "--serial", "GP-1", "--type", "platform") == 0
+    with PassportStore(tmp_path / "p.sqlite", read_only=True) as store:
+        current = store.read_passport("GP-1").current_runs()
+    assert [run.method for run in current] == ["gyrocompass improved", "heading-hold improved"]
+
+
 def test_export_and_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fitted = fit_soak("q0_v", np.linspace(-60, 85, 60), np.linspace(-60, 85, 60) ** 2)
     run = make_run(1)
@@ -94,15 +105,19 @@ def test_export_and_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "static inline int32_t q0_v(int32_t element_mdegc)" in (tmp_path / "q.h").read_text()
     capsys.readouterr()
     assert run_passport(tmp_path, "header", "QA-1", "--quantity", "q1_v", "--step", "0.1") == 2
-    assert "QA-1: run 1: expected q0_v, got q1_v" in capsys.readouterr().err
+    assert "QA-1: expected a unit with such a run, got none" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
+        ({"sections": [{"label": "quiet", "estimates": [{"name": "a"}]}]}, "the name of a procedure"),
         ({"provenance": None}, "a result with its provenance, got none"),
         ({"sections": []}, "a result with estimates, got none"),
-        ({"sections": [{"estimates": [{"name": "a"}]}]}, "the sections of a calibration, got KeyError"),
+        (
+            {"sections": [{"procedure": "turns", "estimates": [{"name": "a"}]}]},
+            "the sections of a calibration, got KeyError",
+        ),
     ],
 )
 def test_results_that_cannot_enter(

@@ -54,12 +54,39 @@ def test_the_same_data_enter_once(tmp_path: Path) -> None:
 
 def test_runs_by_name(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "p") as store:
-        store.put_run("QA@1", "quartz", make_run(1))
-        store.put_run("QA@1", "quartz", make_run(2))
-        assert [find_run(store, n).number for n in ("QA@1@1", "QA@1@2")] == [1, 2]
-        for name, says in (("QA@1@3", "a run of 1 to 2, got 3"), ("QB", "a serial number of the store, got QB")):
+        store.put_run("QA-1", "quartz", make_run(1))
+        store.put_run("QA-1", "quartz", make_run(2))
+        assert [find_run(store, n).number for n in ("QA-1@1", "QA-1@2")] == [1, 2]
+        for name, says in (("QA-1@3", "a run of 1 to 2, got 3"), ("QB", "a serial number of the store, got QB")):
             with pytest.raises(BadInput, match=says):
                 find_run(store, name)
+
+
+def test_the_run_that_began_last_is_valid_in_any_order_of_entry(tmp_path: Path) -> None:
+    with PassportStore(tmp_path / "p") as store:
+        for n in (2, 1, 3):
+            store.put_run("QA-1", "quartz", make_run(n))
+        p = store.read_passport("QA-1")
+        assert [(run.seed, run.supersedes) for run in p.runs] == [(2, None), (1, None), (3, 1)]
+        assert [run.seed for run in p.current_runs()] == [3]
+        store.put_run("QA-1", "quartz", make_run(4, "reversal quiet"))
+        assert find_run(store, "QA-1").seed == 4
+        assert find_run(store, "QA-1", lambda run: run.method == "turns quiet").seed == 3
+
+
+def test_a_seed_of_64_bits_is_kept(tmp_path: Path) -> None:
+    with PassportStore(tmp_path / "p") as store:
+        store.put_run("QA-1", "quartz", replace(make_run(1), seed=2**64 - 1))
+        assert store.read_passport("QA-1").runs[0].seed == 2**64 - 1
+
+
+def test_the_page_shows_a_query_that_works(tmp_path: Path) -> None:
+    page = (CHECKOUT / "docs/tools/passports.md").read_text()
+    query = page.partition("```sql\n")[2].partition("```")[0]
+    with PassportStore(tmp_path / "p") as store:
+        store.put_run("QA-1", "quartz", make_run(1))
+    with sqlite3.connect(tmp_path / "p") as db:
+        assert db.execute(query).fetchone() == ("QA-1", 1, "q0_v", 1.0, 1e-6)
 
 
 def test_the_export_follows_its_schema(tmp_path: Path) -> None:
@@ -179,7 +206,7 @@ def test_a_full_disk_leaves_the_store_as_it_was(tmp_path: Path) -> None:
         assert store.put_run("QA-1", "quartz", make_run(60)) == len(runs) + 1
 
 
-@pytest.mark.parametrize("serial", ["", " QA", "QA\n1", "Q" * 65])
+@pytest.mark.parametrize("serial", ["", " QA", "QA\n1", "Q" * 65, "QA@1"])
 def test_a_serial_number_is_short_and_printable(tmp_path: Path, serial: str) -> None:
     with PassportStore(tmp_path / "p") as store, pytest.raises(BadInput, match="serial number: expected"):
         store.put_run(serial, "quartz", make_run(1))

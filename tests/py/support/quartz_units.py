@@ -1,4 +1,4 @@
-"""Zero signals of quartz accelerometers against temperature, drawn after the fact sheet: the estimators' tests use it.
+"""Zero signals of quartz accelerometers against temperature, drawn after the article: the estimators' tests use it.
 
 Nothing here is the emulator's: the same law written a second time, from the article's figures.
 """

@@ -70,7 +70,7 @@ def draw_sweeps(count: int) -> list[Sweep]:
 
 
 def test_both_legs_need_the_lag() -> None:
-    """The fact sheet: 6.0 % of the largest on both legs, 0.45 % with the lag."""
+    """An independent computation: 6.0 % of the largest on both legs, 0.45 % with the lag."""
     plain, lagged = [], []
     for s in draw_sweeps(40):
         free = np.abs(s.y_ug).max()
@@ -92,13 +92,15 @@ def smoothed_means(residual: np.ndarray, n: int = 5) -> np.ndarray:
 
 
 def test_a_leg_is_wrong_by_the_loop_on_the_other_leg() -> None:
-    s = draw_sweeps(1)[0]
-    up = fit_soak("u0_v", s.case_c[s.up], s.y_ug[s.up])
-    here, there = (
-        most_percent(smoothed_means(s.y_ug[leg] - up.value_at(s.case_c[leg])), s.y_ug) for leg in (s.up, ~s.up)
-    )
-    assert here < 0.7
-    assert there > 5.0
+    """An independent computation: the loop is 11.7 % of the largest, median."""
+    here, there = [], []
+    for s in draw_sweeps(40):
+        up = fit_soak("u0_v", s.case_c[s.up], s.y_ug[s.up])
+        for legs, leg in ((here, s.up), (there, ~s.up)):
+            legs.append(most_percent(smoothed_means(s.y_ug[leg] - up.value_at(s.case_c[leg])), s.y_ug))
+    assert np.percentile(here, 95) < 0.9, f"seed {SEED}"
+    assert np.percentile(there, 5) > 5.0, f"seed {SEED}"
+    assert 9.0 < np.median(there) < 15.0, f"seed {SEED}"
 
 
 def test_the_interval_holds_the_curve() -> None:

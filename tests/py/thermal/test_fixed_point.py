@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from psabench.errors import BadInput
-from psabench.thermal.compensation import Compensation, fit_soak
+from psabench.thermal.compensation import Compensation, Lag, fit_soak
 from psabench.thermal.fixed_point import FixedPoint, c_header, fixed_point
 from quartz_units import HIGH_C, LOW_C, draw_unit
 
@@ -52,5 +53,15 @@ def test_the_stated_error_is_the_largest() -> None:
 def test_what_does_not_fit_is_rejected() -> None:
     with pytest.raises(BadInput, match="a step above"):
         fixed_point(fitted_unit(SEED), 1e-7)
-    with pytest.raises(BadInput, match="a name of C"):
-        c_header(fixed_point(fitted_unit(SEED), 0.01), "zero signal")
+    with pytest.raises(BadInput, match="a step above"):
+        fixed_point(fitted_unit(SEED), float("inf"))
+    for name in ("zero signal", "int"):
+        with pytest.raises(BadInput, match="a name of C"):
+            c_header(fixed_point(fitted_unit(SEED), 0.01), name)
+
+
+def test_the_header_says_that_the_lag_is_left_out(tmp_path: Path) -> None:
+    c = replace(fitted_unit(SEED), lag=Lag(tau_s=360.0, per_k=0.25))
+    f = fixed_point(c, 0.01)
+    assert "NOT in this function: add 0.25 a kelvin" in c_header(f, "zero_signal")
+    assert compiled_header(tmp_path, f).at(30_000) == f.value_at(30_000)

@@ -134,6 +134,8 @@ static void ripples_of_a_table_add_up_and_end(void **state)
     assert_true(fabs(table_read(&r.lab.table, 0, 130 * MS).rate_dps - s.rate_radps / deg) < 1e-12);
     const struct pose p = *table_pose(&r.lab.table, 130 * MS);
     assert_true(fabs(p.w_ib_b_radps[1] - s.rate_radps) < 0.01 * fabs(s.rate_radps)); /* y carries z, which is near 0 */
+    assert_int_equal(table_zero(&r.lab.table, 0, 30.0, 130 * MS), MOTION_OK);
+    assert_true(fabs(table_read(&r.lab.table, 0, 130 * MS).angle_deg - 30.0) < 0.001); /* as without ripple */
     run_to(500 * MS);
     assert_true(fabs(table_axis(&r.lab.table, 0, 500 * MS).rate_radps / deg - 2 * sin(pi2 * 4 * 0.4)) < 1e-9);
     run_to(601 * MS);

@@ -165,7 +165,7 @@ static void noise_of_a_look_follows_its_interval(void **state)
     }
 }
 
-/* Each thermal cycle leaves a half, whoever counts it: the scenario or the chamber. */
+/* Each thermal cycle leaves a half, counted by the scenario or by the chamber. */
 static void cycles_relax_the_glue(void **state)
 {
     (void)state;

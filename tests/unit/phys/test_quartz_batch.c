@@ -194,7 +194,7 @@ static void a_sixth_degree_follows_the_curves(void **state)
     near(100.0 * sum / CURVES, 0.22, 0.06);
 }
 
-static void a_batch_that_cannot_be_is_told(void **state)
+static void a_batch_without_possible_units_is_reported(void **state)
 {
     (void)state;
     struct quartz_batch b = quartz_batch_default();
@@ -213,7 +213,7 @@ int main(void)
         cmocka_unit_test(one_stress_moves_all_three_by_one_factor),
         cmocka_unit_test(run_in_follows_its_law),
         cmocka_unit_test(a_sixth_degree_follows_the_curves),
-        cmocka_unit_test(a_batch_that_cannot_be_is_told),
+        cmocka_unit_test(a_batch_without_possible_units_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
