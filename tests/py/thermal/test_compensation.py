@@ -93,7 +93,8 @@ def smoothed_means(residual: np.ndarray, n: int = 5) -> np.ndarray:
 
 def test_a_leg_is_wrong_by_the_loop_on_the_other_leg() -> None:
     """An independent computation: the loop is 11.7 % of the largest, median."""
-    here, there = [], []
+    here: list[float] = []
+    there: list[float] = []
     for s in draw_sweeps(40):
         up = fit_soak("u0_v", s.case_c[s.up], s.y_ug[s.up])
         for legs, leg in ((here, s.up), (there, ~s.up)):

@@ -205,7 +205,8 @@ static const struct {
      "group"},
     {"units: [{axes: {x: {quartz: {pendulum: {pickoff_v_per_rad: 1, amplifier_a_per_v: 1e-7, hinge_n_m_per_rad: "
      "0}}}}}]\n",
-     "dir/s.yaml:1:40: units.a.axes.x.quartz.pendulum: expected parts that give pendulous_ug_per_g2 up to 10000, got 1.281e+10"},
+     "dir/s.yaml:1:40: units.a.axes.x.quartz.pendulum: expected parts that give pendulous_ug_per_g2 up to 10000, got "
+     "1.281e+10"},
     {"spread: {quartz: {share_a: 0.98, share_b: 0, rest_slope_min_ug_per_k: 1000, rest_slope_max_ug_per_k: 2000}}\n",
      "dir/s.yaml:1:18: spread.quartz.ratio_max: expected curves and slopes that give ratios of 3 to 16, got none in "
      "group rest"},
