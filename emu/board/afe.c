@@ -210,7 +210,7 @@ static void filter_even(struct afe *a, double *row, const struct looks *at)
 LANES_BODY void filter_row(struct afe *a, double *row, const struct looks *at)
 {
     divide_row(row, a->scale.divider, at->n);
-    if (a->t_ns >= 0 && same_steps(a->dt_ns, a->t_ns, at->t_ns, at->n)) filter_even(a, row, at);
+    if (at->n >= LANES && a->t_ns >= 0 && same_steps(a->dt_ns, a->t_ns, at->t_ns, at->n)) filter_even(a, row, at);
     else filter_any(a, row, at);
 }
 
@@ -222,16 +222,6 @@ LANES_BODY void pass_row(struct afe *a, double *row, const struct looks *at)
     filter_row(a, row, at);
 }
 
-/* Too few for a vector. */
-static void pass_few(struct afe *a, double *row, const struct looks *at)
-{
-    if (a->faults) faulty_row(a, row, at);
-    for (unsigned i = 0; !a->faults && i < at->n; i++) row[i] = loaded_v(a, row[i]);
-    if (a->cfg.noise_v_rthz > 0.0) add_noise(a, row, at);
-    for (unsigned i = 0; i < at->n; i++) row[i] /= a->scale.divider;
-    filter_any(a, row, at);
-}
-
 LANES_AVX2 static void pass_row_avx2(struct afe *a, double *row, const struct looks *at)
 {
     pass_row(a, row, at);
@@ -240,8 +230,7 @@ LANES_AVX2 static void pass_row_avx2(struct afe *a, double *row, const struct lo
 void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const struct looks *at)
 {
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
-    if (at->n < LANES) pass_few(a, signal_to_v, at);
-    else if (lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
+    if (at->n >= LANES && lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
     else pass_row(a, signal_to_v, at);
     for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] /= apply_faults(a, 0.0, at->t_ns[i]).reference;
 }

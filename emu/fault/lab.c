@@ -1,5 +1,5 @@
-/* Faults of the instruments: the supply; the chamber; an axis of the table; of the gyro-stabilised platform the torquers and the drift of an axis, and the gimbal's
- * angle sensor. */
+/* Faults of the instruments: the supply; the chamber; an axis of the table; of the gyro-stabilised platform the torquers and
+ * the drift of an axis, and the gimbal's angle sensor. */
 #include "fault/internal.h"
 
 #include <math.h>

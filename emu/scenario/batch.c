@@ -6,7 +6,7 @@
 
 // clang-format off
 static const struct field batch_rows[] = {
-#define ROW(key_, lo, hi, words) {.key = #key_, .type = FIELD_REAL, .offset = offsetof(struct quartz_batch, key_), .min = (lo), .max = (hi), .what = (words)}
+#define ROW(name_, lo, hi, words) REAL_ROW(struct quartz_batch, name_, lo, hi, words)
     {.key = "name", .type = FIELD_TEXT, .offset = offsetof(struct quartz_batch, name), .max = 32, .what = "of the batch"},
     ROW(share_a,                 0, 1,      "share of the article's group (a)"),
     ROW(share_b,                 0, 1,      "share of its group (b); the rest has a straight line"),

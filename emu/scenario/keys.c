@@ -19,7 +19,7 @@ static const struct field buses_rows[] = {
 const struct fields scenario_buses_fields = FIELDS_OF(struct scenario_bus, buses_rows);
 
 static const struct field mems_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = MEMS(name), .min = (lo), .max = (hi), .what = (words)}
+#define ROW(name, lo, hi, words) REAL_ROW(struct mems_g, name, lo, hi, words)
     ROW(u0_v,            -10, 10, "output without acceleration"),
     ROW(kx_v_per_g,      -10, 10, "sensitivity along the axis"),
     ROW(ky_v_per_g,      -10, 10, "sensitivity across, second axis"),
@@ -56,7 +56,7 @@ static const struct field series_rows[] = {
 const struct fields scenario_series_fields = FIELDS(series_rows);
 
 static const struct field pendulum_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = offsetof(struct pendulum, name), .min = (lo), .max = (hi), .what = (words)}
+#define ROW(name, lo, hi, words) REAL_ROW(struct pendulum, name, lo, hi, words)
     ROW(mass_kg,           1e-6, 1,   "m, mass of the pendulum"),
     ROW(arm_m,             1e-5, 0.1, "L, from the hinge to the centre of mass"),
     ROW(inertia_kg_m2,     1e-12, 1e-2, "J, moment of inertia about the hinge"),
@@ -73,7 +73,7 @@ const struct fields scenario_pendulum_fields = FIELDS(pendulum_rows);
 
 #define QUARTZ(m) offsetof(struct quartz_g, m)
 static const struct field quartz_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = QUARTZ(name), .min = (lo), .max = (hi), .what = (words)}
+#define ROW(name, lo, hi, words) REAL_ROW(struct quartz_g, name, lo, hi, words)
     ROW(scale_a_per_g,      -1, 1,      "current for one g at 30 °C"),
     ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "temperature coefficient"),
     ROW(scale_curve_ppm,    -1e5, 1e5,  "greatest deviation of the scale over temperature, hot side, by the curve of the bias"),
@@ -113,7 +113,7 @@ static const struct field quartz_rows[] = {
 const struct fields scenario_quartz_fields = FIELDS(quartz_rows);
 
 static const struct field afe_numbers[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = AFE(name), .min = (lo), .max = (hi), .what = (words)}
+#define ROW(name, lo, hi, words) REAL_ROW(struct afe_cfg, name, lo, hi, words)
     ROW(load_ohm,                 1, 1e6,      "load resistor of a current output"),
     ROW(load_tol_ppm,             -1e5, 1e5,   "deviation from the nominal value"),
     ROW(load_tc_ppm_per_k,        -1e4, 1e4,   "temperature coefficient, from 25 °C"),

@@ -5,6 +5,12 @@
 #include "scenario/fields.h"
 #include "scenario/scenario.h"
 
+/* A number of a struct: key, limits, meaning. */
+#define REAL_ROW(of, name, lo, hi, words)                                                                              \
+    {                                                                                                                  \
+        .key = #name, .type = FIELD_REAL, .offset = offsetof(of, name), .min = (lo), .max = (hi), .what = (words)      \
+    }
+
 extern const struct fields scenario_bus_fields;           /* of struct can_bus_cfg: the key `bus` */
 extern const struct fields scenario_buses_fields;         /* of struct scenario_bus: an element of `buses` */
 extern const struct fields scenario_site_fields;          /* of struct scenario_site */

@@ -42,7 +42,7 @@ static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
     const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
     u->mems[axis].temp_degc = q->element_degc = element_degc;
     q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
-    if (c->cfg.present) q->cycles = chamber_body_cycles(c, &u->body, step * WARM_STEP_NS);
+    if (c->cfg.present && is_quartz(u, axis)) q->cycles = chamber_body_cycles(c, &u->body, step * WARM_STEP_NS);
 }
 
 /* What the sensor of a channel measures at a row of instants, a = -f on its own axes: at rest the projections of gravity. The face

@@ -8,14 +8,12 @@
 #define ONE_52  0x1p52
 #define BITS_52 INT64_C(0x4330000000000000)
 
-#define LOW_16 UINT64_C(0x0000FFFF0000FFFF)
-
 /* As ads1282_sum_draw(). */
 LANES_BODY void sum_draws(const uint64_t *u, lanes_f64 *out)
 {
     lanes_u64 v;
     LANES_LOAD(v, u);
-    const lanes_u64 pairs = (v & LOW_16) + (v >> 16 & LOW_16);
+    const lanes_u64 pairs = (v & ADS1282_DRAW_PAIRS) + (v >> 16 & ADS1282_DRAW_PAIRS);
     const lanes_u64 sum = (pairs & 0xFFFFFFFF) + (pairs >> 32);
     *out = (lanes_f64)(sum | (uint64_t)BITS_52) - (ONE_52 + 131070.0);
 }
@@ -23,8 +21,7 @@ LANES_BODY void sum_draws(const uint64_t *u, lanes_f64 *out)
 /* As ads1282_saturate_lsb(): rounds to an integer, and down by one where that was up. */
 LANES_BODY void saturate_lanes(const lanes_f64 *in, lanes_i64 *lsb)
 {
-    const double limit = ADS1282_SATURATION * (double)(INT64_C(1) << ADS1282_BLOCK_LOG2);
-    const lanes_f64 max = LANES_ALL(limit), min = LANES_ALL(-limit);
+    const lanes_f64 max = LANES_ALL(ADS1282_INPUT_MAX_LSB), min = LANES_ALL(-ADS1282_INPUT_MAX_LSB);
     lanes_f64 x = LANES_PICK(*in < max, *in, max);
     x = LANES_PICK(x < min, min, x);
     const lanes_f64 y = x + 0x1p36 + 0.5;

@@ -12,20 +12,22 @@ struct ads1282_scale {
     double noise_lsb; /* times ads1282_sum_draw() */
 };
 
+#define ADS1282_INPUT_MAX_LSB (ADS1282_SATURATION * (double)(INT64_C(1) << ADS1282_BLOCK_LOG2))
+#define ADS1282_DRAW_PAIRS    UINT64_C(0x0000FFFF0000FFFF)
+
 /* Zero mean, unit rms after division by sqrt((2^32 - 1) / 3). Four uniforms are enough: the chain averages more than 50 blocks,
  * which leaves the output an excess kurtosis below 0.006, at a seventh of the cost of a Gaussian draw. */
 static inline double ads1282_sum_draw(uint64_t u)
 {
-    const uint64_t pairs = (u & UINT64_C(0x0000FFFF0000FFFF)) + (u >> 16 & UINT64_C(0x0000FFFF0000FFFF));
+    const uint64_t pairs = (u & ADS1282_DRAW_PAIRS) + (u >> 16 & ADS1282_DRAW_PAIRS);
     return (double)(int32_t)((pairs & 0xFFFFFFFF) + (pairs >> 32)) - 131070.0;
 }
 
 /* A number of full scale 2^34 to the modulator, which saturates. Rounds to nearest without a call into libm. */
 static inline int64_t ads1282_saturate_lsb(double x)
 {
-    const double max = ADS1282_SATURATION * (double)(INT64_C(1) << ADS1282_BLOCK_LOG2);
-    if (!(x < max)) x = max; /* not a number saturates too */
-    if (x < -max) x = -max;
+    if (!(x < ADS1282_INPUT_MAX_LSB)) x = ADS1282_INPUT_MAX_LSB; /* not a number saturates too */
+    if (x < -ADS1282_INPUT_MAX_LSB) x = -ADS1282_INPUT_MAX_LSB;
     return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
 }
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.passport.store import Covariance, Measured, UnitRun, data_digest
+from psabench.passport.store import Covariance, Measured, UnitRun
 from psabench.report.diff import read_result
-from psabench.report.provenance import KEY
+from psabench.report.provenance import KEY, json_digest
 
 
 def runs_of_result(path: Path) -> list[UnitRun]:
@@ -40,7 +40,7 @@ def _run_of_section(section: Mapping[str, Any], origin: Mapping[str, Any]) -> Un
         method=" ".join(str(w) for w in words if w),
         begun=str(origin["begun"]),
         version=str(origin["psabench"]),
-        data_sha256=data_digest(section),
+        data_sha256=json_digest(section),
         seed=seed if isinstance(seed, int) else None,
         within=all(judged) if judged else None,
         quantities=tuple(_measured_of(e) for e in estimates),

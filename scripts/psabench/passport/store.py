@@ -6,7 +6,6 @@ all its numbers and what it supersedes, or not at all, whatever ends us.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -232,12 +231,6 @@ class PassportStore(AbstractContextManager["PassportStore"]):
 def _covariance_of(names: str, matrix: str) -> Covariance:
     rows: Sequence[Sequence[float]] = json.loads(matrix)
     return Covariance(names=tuple(json.loads(names)), matrix=tuple(tuple(row) for row in rows))
-
-
-def data_digest(data: Any) -> str:
-    """SHA-256 of JSON's types, 64 hexadecimal digits; the same for the same values."""
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _parted_name(name: str) -> tuple[str, int | None]:

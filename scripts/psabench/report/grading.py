@@ -34,13 +34,12 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Graded:
+class Compared:
     """An estimate beside what it should have been."""
 
     estimate: Estimate
     truth: float | None
     error: float | None  # estimate - truth
-    within: bool | None  # None: nothing to compare, or flagged as not identifiable
 
     @property
     def z(self) -> float | None:
@@ -51,6 +50,13 @@ class Graded:
     def en(self) -> float | None:
         """Normalised error, ISO 13528 9.6: error over U, for the truth is exact. None: no truth."""
         return None if self.error is None else ratio_of(self.error, self.estimate.ci_half)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Graded(Compared):
+    """An estimate of a calibration."""
+
+    within: bool | None  # None: nothing to compare, or flagged as not identifiable
 
 
 def ratio_of(error: float, u: float) -> float:

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 from psabench.budget.gum import COVERAGE
 from psabench.estimate.angles import wrapped_deg
-from psabench.estimate.uncertainty import Estimate
 from psabench.native.nav import DEGPH
 from psabench.procedures.gyrocompass import GyrocompassResult
 from psabench.procedures.heading_hold import HoldResult
 from psabench.procedures.result import DEG, LIMIT_CI
-from psabench.report.grading import aligned, as_ratio, estimate_dict, finite_or_none, ratio_of, with_ci
+from psabench.report.grading import Compared, aligned, as_ratio, estimate_dict, finite_or_none, ratio_of, with_ci
 
 # What the article says that its simulation reaches, and what a hold may be off by.
 CLAIMS: Mapping[str, tuple[float, str]] = {"heading_deg": (0.1, "deg"), "drift1_degph": (0.05, "deg/h")}
@@ -48,12 +47,9 @@ class GyroSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GradedEstimate:
-    """An estimate beside what it should have been."""
+class GradedEstimate(Compared):
+    """A number of gyrocompassing."""
 
-    estimate: Estimate
-    truth: float | None
-    error: float | None
     claim: str  # of the article, "": none
 
     @property
@@ -64,16 +60,6 @@ class GradedEstimate:
     @property
     def within(self) -> bool | None:
         return None if self.error is None else abs(self.error) <= self.limit
-
-    @property
-    def z(self) -> float | None:
-        """Error in standard uncertainties. None: no truth."""
-        return None if self.error is None else ratio_of(self.error, self.estimate.sd)
-
-    @property
-    def en(self) -> float | None:
-        """Normalised error. None: no truth."""
-        return None if self.error is None else ratio_of(self.error, self.estimate.ci_half)
 
 
 def grade(s: GyroSection) -> tuple[GradedEstimate, ...]:

@@ -115,7 +115,7 @@ def noted_scenarios() -> list[dict[str, Any]]:
 def note_digest(name: str, seed: int, value: object) -> None:
     """What a command without an emulator computes from, as JSON has it."""
     if run := noted_run():
-        run.rows.append({"name": name, "seed": seed, "sha256": _json_digest(value)})
+        run.rows.append({"name": name, "seed": seed, "sha256": json_digest(value)})
 
 
 def note_file(role: str, path: Path) -> None:
@@ -140,16 +140,16 @@ def scenario_digest(resolved: Mapping[str, Any]) -> dict[str, Any]:
     """Seed, and SHA-256 of a resolved scenario without its seed, of its profiles and of its sensors' passports."""
     body = {k: v for k, v in resolved.items() if k not in ("seed", "version")}
     units = body.get("units", [])
-    profiles = {u["profile_set"]["name"]: _json_digest(u["profile_set"]) for u in units if "profile_set" in u}
+    profiles = {u["profile_set"]["name"]: json_digest(u["profile_set"]) for u in units if "profile_set" in u}
     return {
         "seed": int(resolved["seed"]),
-        "sha256": _json_digest(body),
+        "sha256": json_digest(body),
         "profiles": dict(sorted(profiles.items())),
-        "passports_sha256": _json_digest([[u.get("name"), u.get("axes"), u.get("spread")] for u in units]),
+        "passports_sha256": json_digest([[u.get("name"), u.get("axes"), u.get("spread")] for u in units]),
     }
 
 
-def _json_digest(value: object) -> str:
+def json_digest(value: object) -> str:
     """SHA-256 of JSON: keys in order, no blanks."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 

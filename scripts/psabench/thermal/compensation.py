@@ -18,7 +18,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from numpy.polynomial.chebyshev import chebval, chebvander
 
 from psabench.errors import BadInput, expected
-from psabench.estimate.uncertainty import t_quantile
+from psabench.estimate.uncertainty import CONFIDENCE, t_quantile
 
 Array = npt.NDArray[np.float64]
 
@@ -54,25 +54,19 @@ class Compensation:
     def degree(self) -> int:
         return len(self.coefficients) - 1
 
-    def scale_temperature(self, element_c: npt.ArrayLike) -> Array:
-        """Temperature, clamped to the range, as the polynomials take it: -1 to 1. Outside the polynomial is no law."""
-        t_c = np.clip(np.asarray(element_c, np.float64), self.low_c, self.high_c)
-        return (2.0 * t_c - self.low_c - self.high_c) / (self.high_c - self.low_c)
-
-    def is_inside(self, element_c: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether a temperature is within the range of the fit."""
-        t_c = np.asarray(element_c, np.float64)
-        return np.asarray((self.low_c <= t_c) & (t_c <= self.high_c))
+    def _scale_clamped(self, element_c: npt.ArrayLike) -> Array:
+        """As the polynomials take it; outside of its range the polynomial is no law."""
+        return scale_temperature(np.clip(element_c, self.low_c, self.high_c), self.low_c, self.high_c)
 
     def value_at(self, element_c: npt.ArrayLike, case_less_element_k: npt.ArrayLike = 0.0) -> Array:
         """The quantity at a temperature of the element, deg C; the same shape."""
-        curve = np.asarray(chebval(self.scale_temperature(element_c), self.coefficients))
+        curve = np.asarray(chebval(self._scale_clamped(element_c), self.coefficients))
         per_k = self.lag.per_k if self.lag else 0.0
         return np.asarray(curve + per_k * np.asarray(case_less_element_k, np.float64))
 
-    def half_width(self, element_c: npt.ArrayLike, confidence: float = 0.95) -> Array:
+    def half_width(self, element_c: npt.ArrayLike, confidence: float = CONFIDENCE) -> Array:
         """Half the confidence interval of the fitted curve: of noise alone, not of what a polynomial cannot follow."""
-        rows = chebvander(self.scale_temperature(element_c), self.degree)
+        rows = chebvander(self._scale_clamped(element_c), self.degree)
         p = self.degree + 1
         variance = np.einsum("...i,ij,...j->...", rows, self.covariance[:p, :p], rows)
         return np.asarray(t_quantile(self.dof, confidence) * np.sqrt(np.maximum(variance, 0.0)))
@@ -85,6 +79,11 @@ class Compensation:
         coefs = np.zeros(self.degree + 1)
         coefs[: len(plain.coef)] = plain.coef
         return tuple(float(c) for c in coefs[::-1])
+
+
+def scale_temperature(t_c: npt.ArrayLike, low_c: float, high_c: float) -> Array:
+    """-1 at low_c to 1 at high_c; the same shape."""
+    return np.asarray((2.0 * np.asarray(t_c, np.float64) - low_c - high_c) / (high_c - low_c))
 
 
 def element_temperature(t_s: Array, case_c: Array, tau_s: npt.ArrayLike) -> Array:
@@ -107,8 +106,7 @@ def fit_soak(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree: int = 
     Raises BadInput for too few readings, too little of a range or a number that is not finite.
     """
     t_c, y = checked_readings(quantity, t_c, y, degree)
-    low, high = float(t_c.min()), float(t_c.max())
-    return _fit_readings(quantity, low, high, t_c, y, degree)
+    return _fit_readings(quantity, t_c, y, degree)
 
 
 def fit_sweep(
@@ -127,8 +125,7 @@ def fit_sweep(
         raise BadInput(expected("both legs of a sweep, to tell the lag from the curve", "one leg", quantity))
     tau_s = _best_tau_s(t_s, case_c, y, degree)
     element = element_temperature(t_s, case_c, tau_s)
-    low, high = float(element.min()), float(element.max())
-    return _fit_readings(quantity, low, high, element, y, degree, Lag(tau_s=tau_s, per_k=0.0), case_c - element)
+    return _fit_readings(quantity, element, y, degree, tau_s, case_c - element)
 
 
 def turns_of(case_c: Array) -> int:
@@ -167,14 +164,10 @@ def _design_matrix(scaled: Array, degree: int, column: Array | None) -> Array:
     return np.asarray(rows if column is None else np.column_stack([rows, column]), np.float64)
 
 
-def _scale_to_range(t_c: Array) -> Array:
-    low, high = float(t_c.min()), float(t_c.max())
-    return np.asarray((2.0 * t_c - low - high) / (high - low))
-
-
 def _residual_squares(case_c: Array, element_c: Array, y: Array, degree: int) -> float:
     """Sum of the residuals' squares with that temperature of the element."""
-    rows = _design_matrix(_scale_to_range(element_c), degree, case_c - element_c)
+    scaled = scale_temperature(element_c, float(element_c.min()), float(element_c.max()))
+    rows = _design_matrix(scaled, degree, case_c - element_c)
     residual = y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]
     return float(residual @ residual)
 
@@ -191,21 +184,15 @@ def _best_tau_s(t_s: Array, case_c: Array, y: Array, degree: int) -> float:
 
 
 def _fit_readings(
-    quantity: str,
-    low_c: float,
-    high_c: float,
-    t_c: Array,
-    y: Array,
-    degree: int,
-    lag: Lag | None = None,
-    column: Array | None = None,
+    quantity: str, t_c: Array, y: Array, degree: int, tau_s: float | None = None, column: Array | None = None
 ) -> Compensation:
     """Least squares by QR; the lag's time constant counts as a parameter that was found."""
-    rows = _design_matrix((2.0 * t_c - low_c - high_c) / (high_c - low_c), degree, column)
+    low_c, high_c = float(t_c.min()), float(t_c.max())
+    rows = _design_matrix(scale_temperature(t_c, low_c, high_c), degree, column)
     q, r = np.linalg.qr(rows)
     found = np.linalg.solve(r, q.T @ y)
     residual = y - rows @ found
-    dof = max(len(y) - rows.shape[1] - (lag is not None), 1)
+    dof = max(len(y) - rows.shape[1] - (tau_s is not None), 1)
     variance = float(residual @ residual) / dof
     inverse = np.linalg.inv(r)
     return Compensation(
@@ -216,7 +203,7 @@ def _fit_readings(
         covariance=variance * inverse @ inverse.T,
         dof=dof,
         rms=float(np.sqrt(variance)),
-        lag=None if lag is None else Lag(tau_s=lag.tau_s, per_k=float(found[-1])),
+        lag=None if tau_s is None else Lag(tau_s=tau_s, per_k=float(found[-1])),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.chebyshev import chebvander
 
-from psabench.thermal.compensation import Array, checked_readings, fit_soak
+from psabench.thermal.compensation import Array, checked_readings, fit_soak, scale_temperature
 
 ZERO_C_IN_K = 273.15
 
@@ -57,8 +57,7 @@ def best_degree(rows: Sequence[DegreeRow]) -> int:
 def condition_numbers(t_c: npt.ArrayLike, degree: int) -> dict[str, float]:
     """Condition number (2-norm) of the matrix of each form's fit at these temperatures, (n,)."""
     t_c = np.asarray(t_c, np.float64)
-    low, high = float(t_c.min()), float(t_c.max())
-    s = (2.0 * t_c - low - high) / (high - low)
+    s = scale_temperature(t_c, float(t_c.min()), float(t_c.max()))
     forms: Mapping[str, Array] = {
         "powers of °C": np.vander(t_c, degree + 1),
         "powers of K": np.vander(t_c + ZERO_C_IN_K, degree + 1),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from psabench.passport.store import Covariance, Measured, UnitRun, data_digest
+from psabench.passport.store import Covariance, Measured, UnitRun
+from psabench.report.provenance import json_digest
 from psabench.thermal.compensation import fit_soak
 
 FITTED = fit_soak("u0_ug", np.linspace(-60, 85, 60), np.sin(np.linspace(-1, 1.2, 60)))
@@ -15,7 +16,7 @@ def make_run(number: int, method: str = "turns quiet", count: int = 3) -> UnitRu
         method=method,
         begun=f"2026-11-27T10:00:{number:02d}+00:00",
         version="0.1.0",
-        data_sha256=data_digest([method, number]),
+        data_sha256=json_digest([method, number]),
         seed=number,
         within=number % 2 == 0,
         range_c=(-60.0, 85.0),

@@ -113,6 +113,35 @@ static void faults_of_the_chamber_add_up_and_end(void **state)
     }
 }
 
+/* 1 K/s and 1 V/K; the ramp is held in the midst of a reading whose inputs were, or were not, taken until then. Code of X after
+ * it. */
+static int32_t code_of_a_held_ramp(int64_t held_ns, bool taken)
+{
+    void *none = NULL;
+    struct chamber_cfg cfg = chamber_default();
+    fresh(&none);
+    r.engine.changed = NULL;
+    cfg.present = true;
+    cfg.heating_max_k_per_min = cfg.ramp_k_per_min = 60.0;
+    chamber_init(&r.lab.chamber, &cfg);
+    chamber_put_in(&r.lab.chamber, &r.unit[0].body, 1e-3, 1e-3);
+    r.unit[0].mems[0].cfg.u0_tc_v_per_k = 1.0;
+    run_to(100 * MS);
+    assert_int_equal(chamber_set(&r.lab.chamber, 85.0, 100 * MS), CHAMBER_OK);
+    run_to(held_ns);
+    if (taken) unit_sample_until(&r.unit[0], held_ns);
+    assert_true(add("{'kind':'chamber.slow','point':'chamber','rate_part':1e-6}") != 0);
+    run_to(held_ns + 36 * MS); /* the delay of the filter */
+    return r.frame.code[0];
+}
+
+static void what_was_felt_before_a_fault_of_the_chamber_stays(void **state)
+{
+    (void)state;
+    for (int64_t held_ns = 310 * MS + 50000; held_ns < 311 * MS; held_ns += 150000)
+        assert_int_equal(code_of_a_held_ramp(held_ns, false), code_of_a_held_ramp(held_ns, true));
+}
+
 /* Two sines in the rate of one axis, one in another; angle and acceleration belong to the rate. */
 static void ripples_of_a_table_add_up_and_end(void **state)
 {
@@ -207,6 +236,7 @@ int main(void)
         TEST(brownouts_are_those_that_were_asked_for),
         TEST(a_bias_is_in_the_codes),
         TEST(faults_of_the_chamber_add_up_and_end),
+        TEST(what_was_felt_before_a_fault_of_the_chamber_stays),
         TEST(ripples_of_a_table_add_up_and_end),
         TEST(volts_of_a_current_sensor_are_those_at_its_load),
         TEST(faults_of_a_chip_add_up),
