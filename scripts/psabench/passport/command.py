@@ -114,7 +114,7 @@ def _compare_runs(args: argparse.Namespace) -> int:
 
     with PassportStore(args.store, read_only=True) as store:
         a = find_run(store, args.a)
-        b = find_run(store, args.b, lambda run: run.method == a.method)
+        b = find_run(store, args.b, lambda run: run.method == a.method, f"a run of {a.method}")
     found = diff.compare_results(comparable_dict(a), comparable_dict(b))
     if args.json:
         print(json.dumps(diff.diff_dict(found), indent=1, ensure_ascii=False))
@@ -129,10 +129,15 @@ def _write_header(args: argparse.Namespace) -> int:
     from psabench.thermal.fixed_point import c_header, fixed_point
 
     with PassportStore(args.store, read_only=True) as store:
-        run = find_run(store, args.serial, lambda run: args.quantity in _fitted_curves(run))
+        run = find_run(
+            store,
+            args.serial,
+            lambda run: args.quantity in _fitted_curves(run),
+            f"a run with a curve of {args.quantity}",
+        )
     fitted = _fitted_curves(run)
     if args.quantity not in fitted:
-        known = ", ".join(fitted) or "a run with a compensation"
+        known = ", ".join(fitted) or "a run with a curve"
         raise BadInput(expected(known, args.quantity, f"{args.serial}: run {run.number}"))
     made = fixed_point(fitted[args.quantity], args.step)
     return _write_text(c_header(made, args.name or args.quantity), args.out)

@@ -239,13 +239,15 @@ def _parted_name(name: str) -> tuple[str, int | None]:
     return (serial, int(number)) if at and number.isascii() and number.isdigit() else (name, None)
 
 
-def find_run(store: PassportStore, name: str, suits: Callable[[UnitRun], bool] = lambda _: True) -> UnitRun:
-    """SERIAL@NUMBER: a run; SERIAL: its latest one that suits. Raises BadInput for what is not there."""
+def find_run(
+    store: PassportStore, name: str, suits: Callable[[UnitRun], bool] = lambda _: True, what: str = "a run"
+) -> UnitRun:
+    """SERIAL@NUMBER: a run; SERIAL: its latest one that suits, `what`. Raises BadInput for what is not there."""
     serial, number = _parted_name(name)
     passport = store.read_passport(serial)
     if number is not None:
         return passport.run_of(number)
     found = [run for run in passport.current_runs() if suits(run)]
     if not found:
-        raise BadInput(expected("a unit with such a run", "none", serial))
+        raise BadInput(expected(what, "none", serial))
     return max(found, key=lambda run: (run.begun, run.number))

@@ -76,7 +76,15 @@ def test_runs_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert run_passport(tmp_path, "diff", "QA-1@1", "QA-1@1") == 0
     assert "the same" in capsys.readouterr().out
     assert run_passport(tmp_path, "diff", "QA-1@1", "QA-1") == 1
-    line = next(w for w in capsys.readouterr().out.splitlines() if "u0_v" in w)
+    assert run_passport(tmp_path, "add", str(tmp_path / "r0"), "--serial", "QB", "--type", "mems") == 0
+    made = json.loads((tmp_path / "r0/result.json").read_text())
+    made["sections"][0]["procedure"] = "reversal"
+    (tmp_path / "r0/result.json").write_text(json.dumps(made))
+    assert run_passport(tmp_path, "add", str(tmp_path / "r0"), "--serial", "QC", "--type", "mems") == 0
+    printed = capsys.readouterr().out
+    assert run_passport(tmp_path, "diff", "QC", "QB") == 2
+    assert "QB: expected a run of reversal quiet, got none" in capsys.readouterr().err
+    line = next(w for w in printed.splitlines() if "u0_v" in w)
     assert "+0.1" in line
 
 
@@ -105,7 +113,7 @@ def test_export_and_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "static inline int32_t q0_v(int32_t element_mdegc)" in (tmp_path / "q.h").read_text()
     capsys.readouterr()
     assert run_passport(tmp_path, "header", "QA-1", "--quantity", "q1_v", "--step", "0.1") == 2
-    assert "QA-1: expected a unit with such a run, got none" in capsys.readouterr().err
+    assert "QA-1: expected a run with a curve of q1_v, got none" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
