@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from psabench.boards.psa2.frames import Frames
 from psabench.boards.readings import Readings
 from psabench.lcm.event_log import Event, read_events
 from psabench.lcm.frames import read_frames
+from psabench.link.control import Control
 from psabench.places import find_emulator
 from rig import HOST, PSABENCH, ROOT, TIMEOUT_S, MakeRig, one_line, psa_emu, until
 
@@ -329,35 +331,52 @@ def program(name: str) -> str:
     return shutil.which(name) or str(Path(sys.executable).with_name(name))
 
 
-MARK = "MARK"
+MARK = "MARK"  # a channel of the test's own
+QUEUE = 30  # messages that a subscriber of LCM keeps unless it asks for more, as lcm-logger does not
 
 
-def await_mark(net: Network, log: Path) -> None:
-    """Publish marks until the logger has one on disk: what was sent before them it has read by then, and written."""
-    code = (
-        "import lcm, sys, time\nlink = lcm.LCM(sys.argv[1])\n"
-        f"while True:\n    link.publish('{MARK}', b'')\n    time.sleep(0.02)\n"
-    )
-    marker = net.start(sys.executable, "-c", code, URL)
-    until(lambda: MARK.encode() in log.read_bytes(), f"a mark in {log}")
-    net.ask("stop", marker)
+def await_logged(net: Network, log: Path) -> None:
+    """Until the logger has a new mark on disk: it listens, and what was sent before it has read."""
+
+    def marks() -> int:
+        return log.read_bytes().count(MARK.encode()) if log.exists() else 0
+
+    def has_new_mark() -> bool:
+        look = next(looks)
+        if look & (look - 1) == 0:  # more and more seldom: it flushes as it writes, and marks wait in its queue, too
+            net.ask("publish", [URL, MARK])
+        return marks() > before
+
+    before, looks = marks(), count(1)
+    until(has_new_mark, f"a mark in {log}")
 
 
 def test_lcm_logger_has_every_message_or_the_kernel_has_counted_it(net: Network, tmp_path: Path) -> None:
-    log, want = tmp_path / "logger.lcmlog", tmp_path / "want.lcmlog"
-    logger = net.start(program("lcm-logger"), f"--lcm-url={URL}", "--quiet", log)
-    options = (find_emulator(), "stream", "--can", "none", "--for", "1s")
-    status, _, err = net.run(*options, "--pace", "wall", "--lcm", URL)
+    """By steps of 5 ms, 15 messages: a logger that a busy machine does not run drops what is beyond its queue."""
+    log, want, control_path = tmp_path / "logger.lcmlog", tmp_path / "want.lcmlog", tmp_path / "control"
+    logger = net.start(program("lcm-logger"), f"--lcm-url={URL}", "--quiet", "--flush-interval=1", log)
+    await_logged(net, log)  # its socket is bound before it joins the group
+    options = ("stream", "--can", "none")
+    by_step = ("--pace", "step", "--control", control_path, "--lcm", URL)
+    emulator = net.start(find_emulator(), *options, *by_step)
+    until(control_path.exists, f"{control_path}")
+    with Control(control_path) as control:
+        for _ in range(200):
+            control.call("run", for_s=0.005)
+            await_logged(net, log)
+        control.call("quit")
+    status, _, err = net.ask("wait", emulator)
     assert status == 0, err
     sent, lost = next(line for line in err.splitlines() if "LCM" in line).split(": ")[2].split(", ")
     drops = net.ask("drops", PORT)
-    await_mark(net, log)
+    await_logged(net, log)
     net.ask("stop", logger)
-    assert psa_emu(*options[1:], *FREE, "--lcm", f"file://{want}").returncode == 0
+    assert psa_emu(*options, "--for", "1s", *FREE, "--lcm", f"file://{want}").returncode == 0
     events, expected = [e for e in read_events(log) if e.channel != MARK], list(read_events(want))
     assert sent == f"{len(expected)} messages"
     assert lost == "0 lost"
     assert len(events) + drops == len(expected) > 2000
+    assert max(Counter(e.t_us // 5_000 for e in expected).values()) < QUEUE
     if not drops:
         assert [(e.channel, e.data) for e in events] == [(e.channel, e.data) for e in expected]
 
@@ -376,7 +395,8 @@ def test_messages_leave_with_hop_limit_0(net: Network) -> None:
 
 
 def test_lcm_logplayer_feeds_psabench_record_and_a_subscriber_of_lcm_gen(net: Network, tmp_path: Path) -> None:
-    log, out, types = tmp_path / "run.lcmlog", tmp_path / "out.log", tmp_path / "types"
+    """Each of the two makes a file when it has subscribed; their sockets are bound before they join the group."""
+    log, out, types, ready = (tmp_path / name for name in ("run.lcmlog", "out.log", "types", "ready"))
     events, path = recorded(tmp_path, "stream", "--for", "200ms", "--can", f"log:{tmp_path / 'bus.log'}")
     assert path == log
     subprocess.run(
@@ -388,13 +408,13 @@ def test_lcm_logplayer_feeds_psabench_record_and_a_subscriber_of_lcm_gen(net: Ne
         "import sys; sys.path.insert(0, sys.argv[1]); import lcm; from psabench_lcm import psa2_reading_t\n"
         "got = []; link = lcm.LCM(sys.argv[2])\n"
         "s = link.subscribe('PSABENCH_PSA2_a', lambda _, d: got.append(psa2_reading_t.decode(d)))\n"
-        "s.set_queue_capacity(10000)\n"
+        "s.set_queue_capacity(10000); open(sys.argv[4], 'w').close()\n"
         "while len(got) < int(sys.argv[3]) and link.handle_timeout(30000): pass\n"
         "print(len(got), sum(r.x_code for r in got))\n"
     )
-    net.ask("start", [sys.executable, "-c", count, str(types), URL, str(len(readings))])
+    net.ask("start", [sys.executable, "-c", count, str(types), URL, str(len(readings)), str(ready)])
     net.ask("start", [str(PSABENCH), "record", str(out), "--lcm", URL, "--count", str(frames)])
-    assert net.ask("sockets", [PORT, 2])
+    until(lambda: out.exists() and ready.exists(), "two subscribers")
     status, _, err = net.run(program("lcm-logplayer"), f"--lcm-url={URL}", log)
     assert status == 0, err
     assert net.ask("wait", 0) == [0, f"{len(readings)} {sum(r['x_code'] for r in readings)}\n", ""]

@@ -1,9 +1,9 @@
 """A network of one's own with a route for multicast, and programs in it: python lcm_net.py, by `unshare -rn`.
 
 Reads one JSON object a line from standard input: {"start": [argv]}, {"port": N} waits until someone listens there,
-{"sockets": [N, k]} until k sockets are; {"run": [argv]} waits for its end, {"wait": k} for that of the k-th of the
-started programs, {"stop": k} ends it; {"drops": N} is how many datagrams for the port the kernel has dropped. Writes an
-answer to each.
+{"run": [argv]} waits for its end, {"wait": k} for that of the k-th of the started programs, {"stop": k} ends it;
+{"drops": N} is how many datagrams for the port the kernel has dropped; {"publish": [URL, channel]} sends an empty
+message of LCM. Writes an answer to each.
 """
 
 import json
@@ -11,7 +11,10 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
+
+import lcm
 
 TIMEOUT_S = 60.0
 
@@ -22,14 +25,24 @@ def rows(port: int) -> list[list[str]]:
     return [row for row in lines if row[1].endswith(f":{port:04X}")]
 
 
-def wait_for_sockets(port: int, count: int) -> bool:
-    """Whether so many are bound to it within the time; 2 ms between two looks."""
+def wait_for_socket(port: int) -> bool:
+    """Whether one is bound to it within the time; 2 ms between two looks."""
     deadline_s = time.monotonic() + TIMEOUT_S
     while time.monotonic() < deadline_s:
-        if len(rows(port)) >= count:
+        if rows(port):
             return True
         time.sleep(0.002)
     return False
+
+
+@cache
+def link_of(url: str) -> lcm.LCM:
+    return lcm.LCM(url)
+
+
+def publish(url: str, channel: str) -> None:
+    """By a link that stays open."""
+    link_of(url).publish(channel, b"")
 
 
 def main() -> None:
@@ -42,11 +55,11 @@ def main() -> None:
         if word == "start":
             started.append(subprocess.Popen(value, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
         elif word == "port":
-            answer = wait_for_sockets(value, 1)
-        elif word == "sockets":
-            answer = wait_for_sockets(*value)
+            answer = wait_for_socket(value)
         elif word == "drops":
             answer = sum(int(row[-1]) for row in rows(value))
+        elif word == "publish":
+            publish(*value)
         elif word == "run":
             done = subprocess.run(value, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
             answer = [done.returncode, done.stdout, done.stderr]
