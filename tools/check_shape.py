@@ -163,7 +163,7 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 59_704, 59_704),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 49_155, 49_155),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 49_162, 49_155),
     "tracked-files": Rule(lambda root: len(tracked(root)), 1_772, 1_772),
 }
 
