@@ -13,13 +13,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from psabench.emulator import STOP_S
+
 from tests.mutants.declared import Target
 from tests.mutants.tree import ROOT, SUITE, copy
 
 PROGRAM = "import sys; from psabench.cli import main; sys.exit(main())"
 BENCH_FAILED = 3  # exit status of psabench: the bench or a link failed
 BADNESS = {"failed": 2, "inconclusive": 1}  # of a verdict; the others: 0
-GRACE_S = 5.0
+GRACE_S = 6 * STOP_S  # psabench ends its emulator, which has a session of its own, by force after STOP_S
 NO_DEBUGGER = {"PYTHONFAULTHANDLER": "", "NO_COLOR": "1"}
 
 
