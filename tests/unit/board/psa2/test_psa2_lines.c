@@ -161,6 +161,30 @@ static void command_bytes_keep_their_gap(void **state)
     assert_int_equal(rig.b.tadc.n.gap_violations, 0);
 }
 
+static bool level_before(const struct rig *r, enum psa2_line line, int64_t t_ns)
+{
+    return last_change_ns(r, line, true, t_ns) > last_change_ns(r, line, false, t_ns);
+}
+
+/* Bytes of the article's writes: 41h ends in a 1, 42h in a 0; after the last byte of each, which ends in 0 and in 1, DIn is low. */
+static void din_keeps_its_last_bit_up_to_the_next_byte(void **state)
+{
+    (void)state;
+    static const unsigned first_of_write[] = {0, 12};
+    watched_run(&rig, "article", 200000000);
+    (void)rig_decode_spi(&rig, bytes, BYTES);
+    for (size_t k = 0; k < COUNT(first_of_write); k++) {
+        const struct rig_byte *w = bytes + first_of_write[k];
+        for (unsigned i = 0; i < 3; i++) {
+            const bool want = i < 2 && w[i].mosi & 1;
+            assert_int_equal(level_before(&rig, PSA2_LINE_DIN, w[i].last_sample_ns + 2000), want);
+        }
+    }
+    assert_int_equal(bytes[0].mosi & 1, 1);
+    assert_int_equal(bytes[12].mosi & 1, 0);
+    assert_int_equal(bytes[14].mosi & 1, 1);
+}
+
 /* The 24 bits of each read on DOutX, Y, Z are the codes of the frame. */
 static void dout_carries_the_codes(void **state)
 {
@@ -320,6 +344,7 @@ int main(void)
         cmocka_unit_test(each_transfer_follows_its_event),
         cmocka_unit_test(cst_frames_the_temperature_port),
         cmocka_unit_test(command_bytes_keep_their_gap),
+        cmocka_unit_test(din_keeps_its_last_bit_up_to_the_next_byte),
         cmocka_unit_test(dout_carries_the_codes),
         cmocka_unit_test(frame_waveform),
         cmocka_unit_test(between_frames_the_line_rests),
