@@ -40,12 +40,23 @@ static bool take_over(struct service *s, const struct options *o, int out_fd, ch
     return service_reopen(s, o, why, cap);
 }
 
-static _Noreturn void run_child(struct service *s, const struct options *o, int out_fd)
+static bool reseed(struct service *s, uint64_t seed, char *why, size_t cap)
+{
+    cJSON *args = cJSON_CreateObject(), *result = cJSON_CreateObject();
+    const bool made = args && result && cJSON_AddNumberToObject(args, "seed", (double)seed);
+    const int64_t t_ns = s->bench->sched.now_ns;
+    const bool done = made && control_call(&s->control, "reseed", args, result, t_ns) == CONTROL_DONE;
+    cJSON_Delete(args);
+    cJSON_Delete(result);
+    return done || why_fail(why, cap, "reseed: %s", made ? s->control.error.why : "out of memory");
+}
+
+static _Noreturn void run_child(struct service *s, const struct options *o, const uint64_t *seed, int out_fd)
 {
     char why[1024];
     FILE *out = fdopen(out_fd, "w");
     if (!out) _exit(SERVICE_MACHINE);
-    if (!take_over(s, o, out_fd, why, sizeof why)) {
+    if (!take_over(s, o, out_fd, why, sizeof why) || (seed && !reseed(s, *seed, why, sizeof why))) {
         fprintf(out, "%s%s\n", failure, why);
         fflush(out);
         _exit(SERVICE_MACHINE);
@@ -126,7 +137,7 @@ bool service_fork(void *ctx, const struct control_fork *f, cJSON *result, char *
     }
     fflush(NULL); /* or both would write what waits */
     const pid_t pid = fork();
-    if (pid == 0) run_child(s, &w->o, pipe_fd[1]); /* w is the child's as long as it lives */
+    if (pid == 0) run_child(s, &w->o, f->seed, pipe_fd[1]); /* w is the child's as long as it lives */
     const int err = errno;
     free(w);
     close(pipe_fd[1]);

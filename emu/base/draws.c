@@ -18,6 +18,11 @@ struct draws draws_of(uint64_t seed, uint64_t unit, const char *source)
     return (struct draws){key, rng_u64(&r)};
 }
 
+void draws_reseed(struct draws *d, uint64_t seed)
+{
+    *d = draws_of(seed, d->key ^ d->high, "reseeded");
+}
+
 static inline struct draws_pair philox_block(uint64_t low, uint64_t high, uint64_t key, unsigned rounds)
 {
 #pragma GCC unroll 7

@@ -20,6 +20,9 @@ struct draws_pair {
 /* The draws of one noise source: unit is the unit's serial number, source a short constant name ("adc.x", "mems"). */
 struct draws draws_of(uint64_t seed, uint64_t unit, const char *source);
 
+/* From here on the same source's draws of another seed, independent of those before. */
+void draws_reseed(struct draws *d, uint64_t seed);
+
 /* The block of 128 bits for a counter and a key, after so many rounds. */
 struct draws_pair draws_philox(uint64_t low, uint64_t high, uint64_t key, unsigned rounds);
 

@@ -30,6 +30,11 @@ struct rng rng_stream(uint64_t seed, uint64_t unit, const char *source)
     return r;
 }
 
+void rng_reseed(struct rng *r, uint64_t seed)
+{
+    *r = rng_stream(seed, r->s[0] ^ r->s[3], "reseeded");
+}
+
 static double uniform_of(uint64_t u)
 {
     return ((double)(u >> 12) + 0.5) * 0x1p-52;

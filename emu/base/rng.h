@@ -16,6 +16,9 @@ struct rng {
 /* The stream of one noise source: unit is the unit's serial number, source a short constant name ("adc.x", "mems"). */
 struct rng rng_stream(uint64_t seed, uint64_t unit, const char *source);
 
+/* From here on the same source's stream of another seed, independent of that before. */
+void rng_reseed(struct rng *r, uint64_t seed);
+
 static inline uint64_t rng_rotl(uint64_t x, int k)
 {
     return (x << k) | (x >> (64 - k));

@@ -35,6 +35,14 @@ void board_put_truth(board_truth_fn *put, void *ctx, double value, const char *n
     put(ctx, text, value);
 }
 
+void board_reseed(struct board *b, uint64_t seed)
+{
+    struct draws *at[BOARD_NOISES_MAX];
+    const unsigned n = b->type->noises ? b->type->noises(b, at) : 0;
+    for (unsigned i = 0; i < n; i++) draws_reseed(at[i], seed);
+    for (unsigned i = 0; i < BOARD_AXES; i++) draws_reseed(&b->afe[i].noise, seed);
+}
+
 bool board_has(const struct board_type *t, const char *capability)
 {
     for (const char *const *c = t->capabilities; c && *c; c++)

@@ -16,6 +16,8 @@
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
+#define BOARD_NOISES_MAX 6u
+
 struct board {
     const struct board_type *type; /* set by the unit */
     struct trace trace;            /* lines numbered as in board_type.lines */
@@ -89,6 +91,7 @@ struct board_type {
     const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
+    unsigned (*noises)(struct board *b, struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
     bool analog;                                          /* it has analog inputs; for faults: sample_until() first */
     void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const struct board *b, board_truth_fn *put,
@@ -124,6 +127,9 @@ static inline void board_notify(const struct board *b, unsigned event, int64_t t
 /* A hidden parameter whose name has parts: "axis_x_gyro_bias_radps". */
 __attribute__((format(printf, 4, 5))) void board_put_truth(board_truth_fn *put, void *ctx, double value,
                                                            const char *name, ...);
+
+/* Noise of its analog inputs, converters and gyros comes from another seed from here on; the specimen stays what it is. */
+void board_reseed(struct board *b, uint64_t seed);
 
 bool board_has(const struct board_type *t, const char *capability);
 uint32_t board_fault_bit(const struct board_type *t,

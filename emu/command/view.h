@@ -36,6 +36,7 @@ struct cJSON;
 /* Endpoints of a child of `fork`. */
 struct control_fork {
     const char *control, *can, *truth; /* paths of sockets, truth may be NULL; can: as --can, several with spaces */
+    const uint64_t *seed;              /* of the child's noise from the fork on; NULL: the parent's */
 };
 
 /* What the bench does for commands, by trade. Each function gets control_bench.ctx; those with `why` write a sentence into it

@@ -36,6 +36,13 @@ void fault_init(struct fault_engine *e, const struct control_bench *bench, struc
     memset(e, 0, sizeof *e);
     e->bench = bench;
     e->sched = s;
+    e->seed = bench->seed;
+}
+
+void fault_reseed(struct fault_engine *e, uint64_t seed)
+{
+    e->seed = seed;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) rng_reseed(&e->fault[i].random, seed);
 }
 
 const char *fault_state_name(enum fault_state state)
@@ -141,7 +148,7 @@ uint32_t fault_add(struct fault_engine *e, const struct fault *made, int64_t t_n
     f->id = ++e->last_id;
     f->engine = e;
     f->state = FAULT_WAITING;
-    f->random = rng_stream(e->bench->seed, f->id, "fault");
+    f->random = rng_stream(e->seed, f->id, "fault");
     memset(&f->ev, 0, sizeof f->ev);
     sched_ev(&f->ev, on_due, f);
     if (f->at_ns > t_ns) sched_at(e->sched, &f->ev, f->at_ns);

@@ -84,11 +84,15 @@ struct fault_engine {
     struct sched *sched;
     struct fault fault[FAULTS_MAX];
     uint32_t last_id;
+    uint64_t seed; /* the bench's, until fault_reseed() */
     void (*changed)(void *ctx, const struct fault *f, int64_t t_ns); /* it began or ended; may be NULL */
     void *ctx;
 };
 
 void fault_init(struct fault_engine *e, const struct control_bench *bench, struct sched *s);
+
+/* Faults that are added later, and the noise of those that begin later, draw from another seed. */
+void fault_reseed(struct fault_engine *e, uint64_t seed);
 
 /* The i-th kind; NULL past the last. */
 const struct fault_kind *fault_kind(unsigned i);

@@ -135,7 +135,7 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
                                          .value_high = values[k][1],
                                          .zero = mems ? u->mems[f->point.index].cfg.u0_v : 0.0,
                                          .from_ns = t_ns,
-                                         .noise = draws_of(f->engine->bench->seed, f->id, "fault")};
+                                         .noise = draws_of(f->engine->seed, f->id, "fault")};
     sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);
     return true;
 }

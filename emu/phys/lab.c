@@ -25,6 +25,13 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
     platform_init(&l->platform, &cfg->platform, &cfg->vehicle, &cfg->site, seed);
 }
 
+void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns)
+{
+    rng_reseed(&l->head.error, seed);
+    l->table.seed = seed;
+    if (l->platform.cfg.present) platform_reseed(&l->platform, seed, t_ns);
+}
+
 static bool is_zero(const double v[3])
 {
     return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;

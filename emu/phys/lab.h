@@ -69,6 +69,10 @@ struct lab_cfg lab_default(void);
 
 void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed);
 
+/* Random errors of the instruments come from another seed from t_ns on: settings of the head, readings of the table, drift and
+ * settings of the platform. */
+void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns);
+
 /* At at_m from the unit's origin, in its case's axes. */
 void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                     struct kinematics *out);

@@ -187,9 +187,12 @@ class Bench(AbstractContextManager["Bench"]):
             node=node,
         )
 
-    def fork(self, *, can: str = "socketcand:0") -> Bench:
-        """A second bench that goes on from this very instant: the emulator forks, the copy gets doors of its own."""
-        return Bench._of(Forked(self.control, can=can))
+    def fork(self, *, can: str = "socketcand:0", seed: int | None = None) -> Bench:
+        """A second bench that goes on from this very instant: the emulator forks, the copy gets doors of its own.
+
+        seed: of the copy's noise from here on. Its units and their state stay: one of a batch of runs of a warm bench.
+        """
+        return Bench._of(Forked(self.control, can=can, seed=seed))
 
     def close(self) -> None:
         """Close all connections and end the emulator if it is ours."""

@@ -189,13 +189,14 @@ def _key_value(m: re.Match[str]) -> tuple[str, str]:
 class Forked:
     """A copy of a running emulator, made by its `fork` command: a process of its own, with doors of its own."""
 
-    def __init__(self, parent: Control, *, can: str = "socketcand:0") -> None:
+    def __init__(self, parent: Control, *, can: str = "socketcand:0", seed: int | None = None) -> None:
         self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
         self.directory = Path(self._dir.name)
         self.control_path = self.directory / "control"
         self.truth_path = self.directory / "truth"
         try:
-            made = parent.call("fork", control=str(self.control_path), can=can, truth=str(self.truth_path))
+            paths = {"control": str(self.control_path), "truth": str(self.truth_path)}
+            made = parent.call("fork", can=can, **paths, **({} if seed is None else {"seed": seed}))
         except BaseException:
             self._dir.cleanup()
             raise

@@ -19,7 +19,8 @@ from tests.mutants.declared import Target
 from tests.mutants.tree import ROOT, SUITE, copy
 
 PROGRAM = "import sys; from psabench.cli import main; sys.exit(main())"
-BENCH_FAILED = 3  # exit status of psabench: the bench or a link failed
+NO_VERDICT = {3: "crashed"}  # exit status of psabench without a verdict: the bench or a link failed
+REFUSED = "psabench: psa-emu: "  # begins what it says of an emulator that rejects its bench
 BADNESS = {"failed": 2, "inconclusive": 1}  # of a verdict; the others: 0
 GRACE_S = 6 * STOP_S  # psabench ends its emulator, which has a session of its own, by force after STOP_S
 NO_DEBUGGER = {"PYTHONFAULTHANDLER": "", "NO_COLOR": "1"}
@@ -29,7 +30,7 @@ NO_DEBUGGER = {"PYTHONFAULTHANDLER": "", "NO_COLOR": "1"}
 class Run:
     """What one run came to. verdicts: by requirement; empty where there is none."""
 
-    how: str  # judged, crashed (the emulator), time-out, broken (the suite)
+    how: str  # judged, crashed or refused (the emulator), time-out, broken (the suite)
     verdicts: Mapping[str, str] = field(default_factory=dict)
     tests: Mapping[str, str] = field(default_factory=dict)
     conforms: bool = False
@@ -84,7 +85,8 @@ class Suite:
         if status is None:
             return Run(how="time-out", said=f"no end after {timeout_s:.0f} s", took_s=took_s)
         if not path.is_file():
-            return Run(how="crashed" if status == BENCH_FAILED else "broken", said=said, took_s=took_s)
+            how = "refused" if said.startswith(REFUSED) else NO_VERDICT.get(status, "broken")
+            return Run(how=how, said=said, took_s=took_s)
         found = json.loads(path.read_text(encoding="utf-8"))
         return Run(
             how="judged",

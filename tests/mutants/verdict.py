@@ -15,7 +15,8 @@ from tests.mutants.folder_tests import FolderTests
 from tests.mutants.suite import Run, Suite
 from tests.mutants.tree import BuildError, Tree
 
-KILLED = ("killed", "crashed", "time-out")  # by a failed requirement; the emulator fell over; no one came to an end
+# By a failed requirement; the emulator fell over; it rejects a bench that it takes unmutated; no one came to an end.
+KILLED = ("killed", "crashed", "refused", "time-out")
 SPARED = ("equivalent", "excused", "survived")  # no one can see it; the suite cannot, and says why; it should have
 WRONG = ("bad list", "does not compile", "suite broken")  # nothing is known of the mutant
 TIMEOUT_FACTOR, TIMEOUT_MIN_S = 6.0, 120.0  # of the unmutated run: a loaded machine is no verdict

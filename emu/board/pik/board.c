@@ -181,6 +181,13 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
+static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+{
+    struct pik *b = (struct pik *)board;
+    for (unsigned i = 0; i < PIK_AXES; i++) at[i] = &b->channel[i].noise;
+    return PIK_AXES;
+}
+
 static const char *why_eager(struct board *board, int64_t t_ns)
 {
     (void)board;
@@ -203,5 +210,6 @@ const struct board_type pik_board = {
     .observe = observe,
     .analog = true,
     .why_eager = why_eager,
+    .noises = noises,
     .truth = truth,
 };

@@ -212,6 +212,14 @@ static const struct board_controller_fault controller_faults[] = {
 };
 static const char *const capabilities[] = {"temp_noise_scale", NULL};
 
+static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+{
+    struct pmka *b = (struct pmka *)board;
+    at[0] = &b->adc_noise;
+    at[1] = &b->temp_noise;
+    return 2;
+}
+
 static const char *why_eager(struct board *board, int64_t t_ns)
 {
     (void)board;
@@ -236,5 +244,6 @@ const struct board_type pmka_board = {
     .set_faults = set_faults,
     .analog = true,
     .why_eager = why_eager,
+    .noises = noises,
     .truth = truth,
 };

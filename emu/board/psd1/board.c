@@ -185,6 +185,16 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
+static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+{
+    struct psd1 *b = (struct psd1 *)board;
+    for (unsigned i = 0; i < 3; i++) {
+        at[i] = &b->adc[i].noise;
+        at[3 + i] = &b->gyros.axis[i].noise;
+    }
+    return 6;
+}
+
 static const char *why_eager(struct board *board, int64_t t_ns)
 {
     (void)board;
@@ -207,5 +217,6 @@ const struct board_type psd1_board = {
     .bus = &psd1_bus,
     .analog = true,
     .why_eager = why_eager,
+    .noises = noises,
     .truth = truth,
 };

@@ -269,6 +269,13 @@ void platform_reposition(struct platform *p, int64_t t_ns)
     p->force_ns = -1;
 }
 
+void platform_reseed(struct platform *p, uint64_t seed, int64_t t_ns)
+{
+    struct platform_node *n = change_from(p, t_ns);
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) rng_reseed(&n->gm[i], seed);
+    rng_reseed(&p->draws, seed);
+}
+
 struct vehicle *platform_vehicle(struct platform *p, int64_t t_ns)
 {
     const int64_t k = t_ns > 0 ? t_ns / p->cfg.step_ns : 0;

@@ -97,6 +97,9 @@ bool platform_torque(struct platform *p, double u1_radps, double u2_radps, int64
 /* A new setting begins: draws the errors of level, setting and reading. The first is drawn at power-on. */
 void platform_reposition(struct platform *p, int64_t t_ns);
 
+/* Drift and errors of settings come from another seed from the first grid point not before t_ns on; the present setting stays. */
+void platform_reseed(struct platform *p, uint64_t seed, int64_t t_ns);
+
 /* The vehicle, to be given a command for t_ns: vehicle_fly(platform_vehicle(p, t_ns), ..., t_ns). */
 struct vehicle *platform_vehicle(struct platform *p, int64_t t_ns);
 

@@ -112,6 +112,7 @@ def test_nothing_is_equivalent_to_what_cannot_be_seen(tmp_path: Path, said: list
         (BAD, MUTANT, "killed"),
         (OPEN, MUTANT, "killed"),
         (Run(how="crashed"), MUTANT, "crashed"),
+        (Run(how="refused"), MUTANT, "refused"),
         (Run(how="time-out"), MUTANT, "time-out"),
         (Run(how="broken"), MUTANT, "suite broken"),
         (GOOD, MUTANT, "survived"),
@@ -169,3 +170,20 @@ def test_an_interruption_ends_what_runs_and_begins_no_more(tmp_path: Path) -> No
         judged([judge(tmp_path, suite)], [replace(MUTANT, id=str(k)) for k in range(50)], keep)
     assert len(told) == 1
     assert ("stop", ()) in suite.asked
+
+
+@pytest.mark.parametrize(
+    ("status", "said", "how"),
+    [
+        (2, "psabench: psa-emu: bench.yaml:1:9: units.a.noise_v: expected 0 to 1, got 0.0", "refused"),
+        (2, "psabench: --only: expected a requirement, got 'X'", "broken"),
+        (3, "psabench: emulator ended", "crashed"),
+        (1, "ModuleNotFoundError", "broken"),
+        (None, "", "time-out"),
+    ],
+)
+def test_runs_without_a_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int | None, said: str, how: str
+) -> None:
+    monkeypatch.setattr(Suite, "_bounded", lambda *_: (status, said))
+    assert Suite(tmp_path).run(tmp_path / "psa-emu", Target.of("psa2"), 1.0).how == how
