@@ -336,9 +336,10 @@ void unit_sample_until(struct unit *u, int64_t t_ns)
 void unit_reseed(struct unit *u, uint64_t seed)
 {
     for (unsigned i = 0; i < UNIT_AXES; i++) {
-        struct draws *const at[] = {&u->mems[i].noise, &u->mems[i].slow.draws, &u->quartz[i].noise,
-                                    &u->quartz[i].scatter};
-        for (unsigned k = 0; k < sizeof at / sizeof *at; k++) draws_reseed(at[k], seed);
+        draws_reseed(&u->mems[i].noise, seed);
+        draws_reseed(&u->mems[i].slow.draws, seed);
+        draws_reseed(&u->quartz[i].noise, seed);
+        draws_reseed(&u->quartz[i].scatter, seed);
     }
     board_reseed(u->board, seed);
 }

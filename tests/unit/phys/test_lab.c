@@ -198,6 +198,53 @@ static void mounts_have_names(void **state)
     assert_null(lab_mount_name((enum lab_mount)4));
 }
 
+/* What is random from an instant on: angle of a later setting of the head, reading of the table, drift of the platform. */
+struct random_part {
+    double head_rad, table_deg, drift_radps;
+};
+
+static struct random_part random_at(struct lab *l, int64_t t_ns)
+{
+    struct platform_state s;
+    head_turn(&l->head, 77.0, t_ns);
+    platform_at(&l->platform, t_ns + 20 * NS_PER_S, &s);
+    return (struct random_part){head_motion(&l->head, t_ns + 20 * NS_PER_S).angle_rad,
+                                table_read(&l->table, 0, t_ns + 20 * NS_PER_S).angle_deg, s.drift_radps[0]};
+}
+
+static struct lab up_with_errors(void)
+{
+    struct lab l;
+    struct lab_cfg c = lab_default();
+    c.site = site_at(55.7 * RAD_PER_DEG, 150.0, 0.0);
+    c.head.setting_error_arcsec_rms = 2.0;
+    c.table = table_default(1);
+    c.table.axis[0].readout_noise_arcsec_rms = 3.0;
+    c.platform.present = true;
+    c.platform.gm_sigma_degph = 0.2;
+    c.platform.gm_tau_s = 100.0;
+    lab_init(&l, &c, 1);
+    return l;
+}
+
+static void a_seed_changes_what_is_random_from_its_instant_on(void **state)
+{
+    (void)state;
+    struct lab plain = up_with_errors(), seventh = up_with_errors(), again = up_with_errors(), eighth = up_with_errors();
+    struct platform_state before, after;
+    lab_reseed(&seventh, 7, 10 * NS_PER_S);
+    lab_reseed(&again, 7, 10 * NS_PER_S);
+    lab_reseed(&eighth, 8, 10 * NS_PER_S);
+    platform_at(&plain.platform, 10 * NS_PER_S, &before);
+    platform_at(&seventh.platform, 10 * NS_PER_S, &after);
+    assert_memory_equal(&after, &before, sizeof after);
+    const struct random_part p = random_at(&plain, 10 * NS_PER_S), s = random_at(&seventh, 10 * NS_PER_S),
+                             a = random_at(&again, 10 * NS_PER_S), e = random_at(&eighth, 10 * NS_PER_S);
+    assert_memory_equal(&s, &a, sizeof s);
+    assert_true(p.head_rad != s.head_rad && p.table_deg != s.table_deg && p.drift_radps != s.drift_radps);
+    assert_true(e.head_rad != s.head_rad && e.table_deg != s.table_deg && e.drift_radps != s.drift_radps);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -209,6 +256,7 @@ int main(void)
         cmocka_unit_test(mounts_feel_gravity_down_their_own_axes),
         cmocka_unit_test(a_spinning_table_presses_outwards),
         cmocka_unit_test(mounts_have_names),
+        cmocka_unit_test(a_seed_changes_what_is_random_from_its_instant_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
