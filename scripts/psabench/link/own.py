@@ -99,15 +99,15 @@ class OutputFile(io.FileIO):
 
 
 @contextmanager
-def output_text(path: Path, stored: Callable[[], str] = str) -> Iterator[IO[str]]:
-    """Open a UTF-8 text file for writing, without translation of line ends; an earlier file is replaced.
+def output_text(path: Path, stored: Callable[[], str] = str, *, append: bool = False) -> Iterator[IO[str]]:
+    """Open a UTF-8 text file for writing, without translation of line ends; an earlier file is replaced, or continued.
 
     stored: what the file holds, for the error message. Raises BadInput and OutputError as Owned does, when the file
     cannot take all of the text, and when it was moved or removed. On return the disk has the data.
     """
     owned = Owned(path)
     try:
-        with _opened(path) as raw, io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="") as file:
+        with _opened(path, append) as raw, io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="") as file:
             yield file
             file.flush()
             if path.is_file():
@@ -120,9 +120,9 @@ def output_text(path: Path, stored: Callable[[], str] = str) -> Iterator[IO[str]
         owned.release()
 
 
-def _opened(path: Path) -> OutputFile:
+def _opened(path: Path, append: bool) -> OutputFile:
     try:
-        return OutputFile(path, "w")
+        return OutputFile(path, "a" if append else "w")
     except OSError as e:
         raise output_error(path, e) from e
 

@@ -27,14 +27,19 @@ COLUMNS = ("t_s", "face", "set_deg", "alpha_deg", "axis", "realisation", "u_v")
 class SeriesFile:
     """A time series of a run: named columns with their units, a row at a time; the format of all of them."""
 
-    def __init__(self, path: Path, columns: Sequence[str], what: str = "rows") -> None:
-        """Raises BadInput or OutputError when the file cannot be made; an earlier file of that name is replaced."""
+    def __init__(self, path: Path, columns: Sequence[str], what: str = "rows", *, append: bool = False) -> None:
+        """Raises BadInput or OutputError when the file cannot be made; an earlier file of that name is replaced.
+
+        append: it is continued after its last row, which has to be complete.
+        """
         self.path = path
         self.rows = 0
         with ExitStack() as stack:
-            self._file: IO[str] = stack.enter_context(output_text(path, lambda: f"stored {self.rows} {what}"))
+            file = output_text(path, lambda: f"stored {self.rows} {what}", append=append)
+            self._file: IO[str] = stack.enter_context(file)
             self._csv = csv.writer(self._file, lineterminator="\n")
-            self._csv.writerow(columns)
+            if not append or path.stat().st_size == 0:
+                self._csv.writerow(columns)
             self._file.flush()  # a run that is interrupted at once leaves a series without rows
             self._stack = stack.pop_all()
 

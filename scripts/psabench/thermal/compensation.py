@@ -110,9 +110,19 @@ def fit_soak(quantity: str, t_c: npt.ArrayLike, y: npt.ArrayLike, degree: int = 
 
 
 def fit_sweep(
-    quantity: str, t_s: npt.ArrayLike, case_c: npt.ArrayLike, y: npt.ArrayLike, degree: int = DEGREE
+    quantity: str,
+    t_s: npt.ArrayLike,
+    case_c: npt.ArrayLike,
+    y: npt.ArrayLike,
+    degree: int = DEGREE,
+    *,
+    history: tuple[Array, Array] | None = None,
+    tau_s: float | None = None,
 ) -> Compensation:
     """From readings of a sweep in both directions, with time: the lag is found beside the polynomial. (n,) each.
+
+    history: instants and temperatures of the case, (m,) each, where it was read more often than y. tau_s: a lag that
+    is known, from another quantity of the same element.
 
     Raises BadInput as fit_soak does, and where time does not ascend or the sweep does not turn: one leg cannot tell a
     lag from a shift of the curve.
@@ -123,9 +133,24 @@ def fit_sweep(
         raise BadInput(expected("instants that ascend, one a reading", "others", quantity))
     if turns_of(case_c) == 0:
         raise BadInput(expected("both legs of a sweep, to tell the lag from the curve", "one leg", quantity))
-    tau_s = _best_tau_s(t_s, case_c, y, degree)
-    element = element_temperature(t_s, case_c, tau_s)
-    return _fit_readings(quantity, element, y, degree, tau_s, case_c - element)
+    sweep = SweepCase(t_s=t_s, case_c=case_c, history=history or (t_s, case_c))
+    tau = _best_tau_s(sweep, y, degree) if tau_s is None else tau_s
+    element = sweep.element_c(np.array([tau]))[:, 0]
+    return _fit_readings(quantity, element, y, degree, tau, case_c - element)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SweepCase:
+    """Temperature of the case at the readings of a sweep, (n,), and its history, (m,) each."""
+
+    t_s: Array
+    case_c: Array
+    history: tuple[Array, Array]
+
+    def element_c(self, tau_s: Array) -> Array:
+        """Of elements that follow with these lags, (k,), at the readings: (n, k)."""
+        element = element_temperature(*self.history, tau_s)
+        return np.stack([np.interp(self.t_s, self.history[0], column) for column in element.T], axis=1)
 
 
 def turns_of(case_c: Array) -> int:
@@ -172,13 +197,13 @@ def _residual_squares(case_c: Array, element_c: Array, y: Array, degree: int) ->
     return float(residual @ residual)
 
 
-def _best_tau_s(t_s: Array, case_c: Array, y: Array, degree: int) -> float:
+def _best_tau_s(sweep: SweepCase, y: Array, degree: int) -> float:
     """The lag with the least squares: rows of lags in equal ratios, each row between the neighbours of the best."""
     low, high = TAU_BOUNDS_S
     for _ in range(SCANS):
         scan = np.geomspace(low, high, SCAN)
-        element = element_temperature(t_s, case_c, scan)
-        best = int(np.argmin([_residual_squares(case_c, column, y, degree) for column in element.T]))
+        element = sweep.element_c(scan)
+        best = int(np.argmin([_residual_squares(sweep.case_c, column, y, degree) for column in element.T]))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, SCAN - 1)]
     return float(np.sqrt(low * high))
 

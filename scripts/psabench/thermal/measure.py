@@ -1,0 +1,126 @@
+"""The run itself: the actions of a schedule on a bench, each recording stored before anything else happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from psabench.procedures.head_bench import Progress, Silent
+from psabench.thermal.bench import CASE_CHANNEL, ThermalBench
+from psabench.thermal.follow import FollowCheck
+from psabench.thermal.records import Recording
+from psabench.thermal.schedule import Action, Schedule, Setting, Take, planned_actions
+
+
+def _drop(_: object) -> None:
+    """No one wants it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThermalWatch:
+    """Who follows a run. store: gets each recording as soon as it exists; checkpoint: after each round of positions,
+    with the number of recordings."""
+
+    store: Callable[[Recording], object] = _drop
+    checkpoint: Callable[[int], object] = _drop
+    progress: Progress = field(default_factory=Silent)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunStart:
+    """Where a run begins."""
+
+    origin_s: float  # of its times, s of the bench
+    chamber_degc: float  # what the chamber shows then
+
+
+def measure_schedule(
+    bench: ThermalBench,
+    schedule: Schedule,
+    start: RunStart,
+    watch: ThermalWatch,
+    kept: Sequence[Recording] = (),
+) -> list[Recording]:
+    """Carry out a schedule; kept: its first recordings, which are not made again. All recordings.
+
+    Raises BenchError where the chamber or the case does not follow, LinkError for a sensor that gives nothing.
+    """
+    actions = planned_actions(schedule, start.chamber_degc)
+    recordings, follow = list(kept), FollowCheck()
+    first = _after_takes(actions, len(kept))
+    _recall_follow(follow, actions[:first], start, recordings)
+    total = sum(isinstance(a, Take) for a in actions)
+    with watch.progress.step(f"thermal run, {total - len(kept)} recordings", total - len(kept)) as done:
+        for k, action in enumerate(actions[first:], start=first):
+            if isinstance(action, Setting):
+                bench.wait_until(start.origin_s + action.at_s)
+                shown = bench.chamber_degc()
+                bench.set_chamber(action.temp_degc, action.ramp_k_per_min)
+                follow.note_setting(action, bench.t_s, shown)
+                continue
+            recordings.append(_record_take(bench, schedule, action, start, follow, watch))
+            if _ends_round(actions, k):
+                watch.checkpoint(len(recordings))
+            done()
+    return recordings
+
+
+def _record_take(
+    bench: ThermalBench, schedule: Schedule, take: Take, start: RunStart, follow: FollowCheck, watch: ThermalWatch
+) -> Recording:
+    alpha_deg = bench.turn(take.position)
+    bench.wait_until(start.origin_s + take.at_s)
+    shown = bench.chamber_degc()
+    s = bench.record(schedule.record_s)
+    temps = [float(t) for t in s.temps_degc]
+    made = Recording(
+        t_s=s.t_s,
+        segment=take.segment,
+        part=take.part,
+        position=take.position.name,
+        alpha_deg=alpha_deg,
+        chamber_degc=shown,
+        case_degc=temps[CASE_CHANNEL],
+        element_x_degc=temps[0],
+        element_y_degc=temps[1],
+        element_z_degc=temps[2],
+        x_v=float(s.u_v[0]),
+        y_v=float(s.u_v[1]),
+        z_v=float(s.u_v[2]),
+        sd_x_v=float(s.sd_v[0]),
+        sd_y_v=float(s.sd_v[1]),
+        sd_z_v=float(s.sd_v[2]),
+    )
+    watch.store(made)
+    follow.see(s.t_s, shown, made.case_degc)
+    return made
+
+
+def _after_takes(actions: Sequence[Action], takes: int) -> int:
+    """The first action after so many recordings."""
+    if takes == 0:
+        return 0
+    at = [k for k, a in enumerate(actions) if isinstance(a, Take)]
+    return at[takes - 1] + 1
+
+
+def _ends_round(actions: Sequence[Action], k: int) -> bool:
+    """Whether the next recording is of another round, or there is none."""
+    this = actions[k]
+    assert isinstance(this, Take)
+    after = next((a for a in actions[k + 1 :] if isinstance(a, Take)), None)
+    return after is None or (after.segment, after.part) != (this.segment, this.part)
+
+
+def _recall_follow(
+    follow: FollowCheck, actions: Sequence[Action], start: RunStart, recordings: Sequence[Recording]
+) -> None:
+    """What the check would know by now: each setting found the air where the one before had sent it."""
+    shown, takes = start.chamber_degc, iter(recordings)
+    for a in actions:
+        if isinstance(a, Setting):
+            follow.note_setting(a, start.origin_s + a.at_s, shown)
+            shown = a.temp_degc
+        else:
+            r = next(takes)
+            follow.note_reading(r.t_s, r.chamber_degc)

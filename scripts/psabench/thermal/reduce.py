@@ -1,0 +1,223 @@
+"""From recordings to scale factor, zero signal and base error of each axis at each temperature.
+
+Along gravity and against it, half the difference of an axis's readings is its scale factor, half the sum its zero; with
+another axis along gravity, half the difference over the scale is the component of the misalignment towards that axis.
+During a sweep the positions are recorded one after the other, at different temperatures: each is interpolated to one
+instant a round, by cubics through the four nearest of its recordings. How far off that may be is measured, by leaving
+out recordings: `Points.interpolation_v`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.errors import BadInput, expected
+from psabench.estimate.face import Face
+from psabench.thermal.records import Recording
+from psabench.thermal.schedule import POSITIONS, Position
+
+Array = npt.NDArray[np.float64]
+
+AXES = "xyz"
+ARCSEC = np.degrees(1.0) * 3600.0
+LEFT_OUT = 4.0  # a gap twice as long: four times the error, where the curve is smooth more
+LEAST_VISITS = 6  # of a position in a sweep
+SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Points:
+    """What one segment gives: n instants."""
+
+    segment: str
+    t_s: Array  # (n,)
+    case_c: Array  # (n,)
+    zero_ug: Array  # (n, 3)
+    scale_v_per_g: Array  # (n, 3)
+    base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
+    scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
+    interpolation_v: Array  # (3,) of one position's reading, rms; 0 for a soak
+    interpolation_most_v: Array  # (3,) the largest
+    history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
+    notes: tuple[str, ...] = ()
+
+    def quantity(self, name: str) -> Array:
+        """By the name of its estimate, (n,): zero_x_ug, scale_x_v_per_g, base_xy_arcsec."""
+        kind, axes = name.split("_")[:2]
+        i = AXES.index(axes[0])
+        if kind == "base":
+            return self.base_arcsec[:, i, AXES.index(axes[1])]
+        return (self.zero_ug if kind == "zero" else self.scale_v_per_g)[:, i]
+
+
+def quantity_names() -> list[str]:
+    """Of the three axes."""
+    base = [f"base_{a}{b}_arcsec" for a in AXES for b in AXES if a != b]
+    return [f"zero_{a}_ug" for a in AXES] + [f"scale_{a}_v_per_g" for a in AXES] + base
+
+
+def gravity_at(position: Position, alpha_deg: float) -> Array:
+    """Projections of gravity on the axes of the case, g, (3,), at the angle that the head shows."""
+    th = np.radians(alpha_deg)
+    along, across = -np.sin(th), -np.cos(th)
+    return np.array([along, 0.0, across] if position.face in SIDE_FACES else [along, across, 0.0])
+
+
+def points_of(recordings: Sequence[Recording]) -> dict[str, Points]:
+    """By segment, in the order of the run. Raises BadInput where there are too few recordings."""
+    segments: dict[str, list[Recording]] = {}
+    for r in recordings:
+        segments.setdefault(r.segment, []).append(r)
+    found = {name: _soak_points(rows) if name == "soak" else _sweep_points(rows) for name, rows in segments.items()}
+    if not found:
+        raise BadInput(expected("recordings", "none", "thermal run"))
+    return found
+
+
+# ---- positions
+
+
+def _volts(r: Recording) -> Array:
+    return np.array([r.x_v, r.y_v, r.z_v])
+
+
+def _levelled(rows: Sequence[Recording]) -> Array:
+    """Readings as if the head had met each position, (n, 3): what its scale shows beside it is taken out."""
+    u = np.array([_volts(r) for r in rows])
+    at = [POSITIONS[r.position] for r in rows]
+    scale = np.array([_rough_scale(u, at, i) for i in range(3)])
+    off = [gravity_at(p, r.alpha_deg) - p.sign * np.eye(3)[p.axis] for p, r in zip(at, rows, strict=True)]
+    return np.asarray(u - np.array(off) * scale)
+
+
+def _rough_scale(u: Array, at: Sequence[Position], i: int) -> float:
+    rows = [(p.sign, v[i]) for p, v in zip(at, u, strict=True) if p.axis == i]
+    down, up = ([v for sign, v in rows if sign == s] for s in (1.0, -1.0))
+    if not down or not up:
+        raise BadInput(expected(f"recordings with {AXES[i]} down and up", "one of them missing", "thermal run"))
+    return float(np.mean(down) - np.mean(up)) / 2.0
+
+
+def _solve_positions(by: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    """Readings (n, 3) of each position, of the same instants -> zero (ug), scale, base (arcsec)."""
+    half_sum, half_diff = np.empty((3, *by["x_down"].shape)), np.empty((3, *by["x_down"].shape))
+    for j, axis in enumerate(AXES):
+        down, up = by[f"{axis}_down"], by[f"{axis}_up"]
+        half_sum[j], half_diff[j] = (down + up) / 2.0, (down - up) / 2.0
+    scale = np.stack([half_diff[i, :, i] for i in range(3)], axis=1)
+    zero = np.stack([half_sum[i, :, i] for i in range(3)], axis=1) / scale * 1e6
+    base = np.moveaxis(half_diff, 0, 2) / scale[:, :, None] * ARCSEC  # (n, axis, towards)
+    base[:, range(3), range(3)] = 0.0
+    return zero, scale, base
+
+
+def _scatter_of(rows: Sequence[Recording]) -> Array:
+    sd = np.array([(r.sd_x_v, r.sd_y_v, r.sd_z_v) for r in rows])
+    return np.asarray(np.sqrt(np.mean(sd**2, axis=0)))
+
+
+def _history_of(rows: Sequence[Recording]) -> tuple[Array, Array]:
+    return np.array([r.t_s for r in rows]), np.array([r.case_degc for r in rows])
+
+
+# ---- the two methods
+
+
+def _soak_points(rows: Sequence[Recording]) -> Points:
+    """A point a temperature; those that lack a position are left out, with a note."""
+    level = _levelled(rows)
+    parts: dict[int, dict[str, int]] = {}
+    for k, r in enumerate(rows):
+        parts.setdefault(r.part, {})[r.position] = k
+    whole = {part: at for part, at in parts.items() if len(at) == len(POSITIONS)}
+    notes = [
+        f"soak, temperature {part + 1}: no {', '.join(p for p in POSITIONS if p not in at)}; left out"
+        for part, at in parts.items()
+        if part not in whole
+    ]
+    if not whole:
+        raise BadInput(expected("a temperature with all six positions", "none", "soak"))
+    by = {p: np.array([level[at[p]] for at in whole.values()]) for p in POSITIONS}
+    zero, scale, base = _solve_positions(by)
+    t_s, case_c = _history_of(rows)
+    each = [list(at.values()) for at in whole.values()]
+    return Points(
+        segment="soak",
+        t_s=np.array([t_s[k].mean() for k in each]),
+        case_c=np.array([case_c[k].mean() for k in each]),
+        zero_ug=zero,
+        scale_v_per_g=scale,
+        base_arcsec=base,
+        scatter_v=_scatter_of(rows),
+        interpolation_v=np.zeros(3),
+        interpolation_most_v=np.zeros(3),
+        history=(t_s, case_c),
+        notes=tuple(notes),
+    )
+
+
+def _sweep_points(rows: Sequence[Recording]) -> Points:
+    """A point a round, in its middle, where every position has been recorded before and after it."""
+    level, (t_s, case_c) = _levelled(rows), _history_of(rows)
+    name = rows[0].segment
+    visits = {p: [k for k, r in enumerate(rows) if r.position == p] for p in POSITIONS}
+    few = [p for p, at in visits.items() if len(at) < LEAST_VISITS]
+    if few:
+        raise BadInput(expected(f"{LEAST_VISITS} recordings of each position", f"fewer of {', '.join(few)}", name))
+    rounds: dict[int, list[int]] = {}
+    for k, r in enumerate(rows):
+        rounds.setdefault(r.part, []).append(k)
+    middle = np.array([(t_s[at[0]] + t_s[at[-1]]) / 2.0 for at in rounds.values()])
+    first, last = max(t_s[at[0]] for at in visits.values()), min(t_s[at[-1]] for at in visits.values())
+    middle = middle[(middle >= first) & (middle <= last)]
+    by = {p: interpolate_cubic(t_s[at], level[at], middle) for p, at in visits.items()}
+    zero, scale, base = _solve_positions(by)
+    scatter = _scatter_of(rows)
+    off = np.concatenate([left_out_error(t_s[at], level[at], scatter) for at in visits.values()])
+    return Points(
+        segment=name,
+        t_s=middle,
+        case_c=np.interp(middle, t_s, case_c),
+        zero_ug=zero,
+        scale_v_per_g=scale,
+        base_arcsec=base,
+        scatter_v=scatter,
+        interpolation_v=np.sqrt(np.mean(off**2, axis=0)),
+        interpolation_most_v=off.max(axis=0),
+        history=(t_s, case_c),
+    )
+
+
+def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
+    """Through the four nearest of the readings u (m, k) at t_s (m,); (n, k) at at_s (n,)."""
+    begin = np.clip(np.searchsorted(t_s, at_s) - 2, 0, len(t_s) - 4)
+    near = begin[:, None] + np.arange(4)
+    t = t_s[near]
+    weights = np.ones_like(t)
+    for j in range(4):
+        for m in range(4):
+            if m != j:
+                weights[:, j] *= (at_s - t[:, m]) / (t[:, j] - t[:, m])
+    return np.asarray(np.einsum("nj,njk->nk", weights, u[near]))
+
+
+def left_out_error(t_s: Array, u: Array, scatter_v: Array) -> Array:
+    """How far off an interpolation may be, (m - 2, k): each reading from its neighbours, a gap twice as long, without
+    what the scatter does to that; divided by LEFT_OUT."""
+    found = []
+    for k in range(1, len(t_s) - 1):
+        rest = np.arange(len(t_s)) != k
+        guess = interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0]
+        found.append((guess - u[k]) ** 2 - 1.64 * scatter_v**2)  # 1 + 2 (9/16)^2 + 2 (1/16)^2
+    return np.sqrt(np.maximum(np.array(found), 0.0)) / LEFT_OUT
+
+
+def up_leg(p: Points) -> Points:
+    """The part of a sweep before its hottest point."""
+    keep = p.t_s <= p.history[0][int(np.argmax(p.history[1]))]
+    cut = {n: getattr(p, n)[keep] for n in ("t_s", "case_c", "zero_ug", "scale_v_per_g", "base_arcsec")}
+    return replace(p, **cut)

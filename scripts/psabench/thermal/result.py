@@ -1,0 +1,288 @@
+"""What a thermal run finds: a compensation of each quantity by each method, their uncertainty, and why they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.budget.accuracy import BenchAccuracy
+from psabench.budget.gum import expand_estimate
+from psabench.errors import BadInput
+from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile
+from psabench.thermal.compensation import (
+    Compensation,
+    SweepCase,
+    element_temperature,
+    fit_soak,
+    fit_sweep,
+    turns_of,
+)
+from psabench.thermal.degree import DegreeRow, degree_rows
+from psabench.thermal.records import Recording
+from psabench.thermal.reduce import ARCSEC, AXES, Points, points_of, quantity_names, up_leg
+from psabench.thermal.schedule import Schedule, sweep_names
+
+Array = npt.NDArray[np.float64]
+
+NORMAL_C = 30.0  # the article's normal temperature: where a passport has its numbers
+TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
+SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec
+ENDS = 0.05  # of the range: what a loop is not taken from, at either end
+DEGREES = (1, 2, 3, 4, 5, 6, 7, 8)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fits:
+    """One quantity by one method."""
+
+    quantity: str
+    best: Compensation  # what a passport gets: with the lag where both legs are there
+    one_leg: Compensation | None = None  # of a sweep's way up, against the case
+    both_legs: Compensation | None = None  # the same of both legs, without a lag
+    largest: float = 0.0  # of the quantity: residuals are percents of it
+
+    def percent_of(self, residual: Array) -> float:
+        """The largest one, of the largest value (zero) or change (scale, base)."""
+        return 100.0 * float(np.abs(residual).max()) / self.largest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Method:
+    """A segment of the run and its fits."""
+
+    name: str  # soak; sweep-1
+    rate_k_per_min: float | None  # of a sweep
+    points: Points
+    fits: dict[str, Fits]
+
+    @property
+    def title(self) -> str:
+        return self.name if self.rate_k_per_min is None else f"sweep at {self.rate_k_per_min:g} K/min"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ThermalResult:
+    """Everything that a report shows; the truth has no part in it."""
+
+    schedule: Schedule
+    g_mps2: float
+    recordings: tuple[Recording, ...]
+    methods: tuple[Method, ...]
+    estimates: dict[str, tuple[Estimate, ...]]  # by method, at normal_c
+    normal_c: float
+    accuracy: BenchAccuracy
+    notes: tuple[str, ...]
+
+    def method(self, name: str) -> Method | None:
+        """None: the run has no such segment."""
+        return next((m for m in self.methods if m.name == name), None)
+
+    @property
+    def sweeps(self) -> list[Method]:
+        return [m for m in self.methods if m.rate_k_per_min is not None]
+
+
+def unit_of(quantity: str) -> str:
+    """By the name of the quantity."""
+    return {"zero": "µg", "scale": "V/g", "base": "″"}[quantity.partition("_")[0]]
+
+
+def symbol_of(quantity: str) -> str:
+    """As on pages."""
+    kind, axes = quantity.split("_")[:2]
+    return {"zero": f"g_t,{axes}", "scale": f"U_k,{axes}", "base": f"δ_{axes}"}[kind]
+
+
+def estimate_run(
+    recordings: Sequence[Recording], schedule: Schedule, g_mps2: float, accuracy: BenchAccuracy
+) -> ThermalResult:
+    """Pure. Raises BadInput where a method has too few recordings for its fits."""
+    rates = sweep_names(schedule)
+    methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings).items())
+    low = max(float(m.points.case_c.min()) for m in methods)
+    high = min(float(m.points.case_c.max()) for m in methods)
+    normal_c = min(max(NORMAL_C, low), high)
+    estimates = {m.name: tuple(estimate_at(m, q, normal_c, accuracy) for q in quantity_names()) for m in methods}
+    return ThermalResult(
+        schedule=schedule,
+        g_mps2=g_mps2,
+        recordings=tuple(recordings),
+        methods=methods,
+        estimates=estimates,
+        normal_c=normal_c,
+        accuracy=accuracy,
+        notes=tuple(note for m in methods for note in m.points.notes),
+    )
+
+
+def _method_of(p: Points, rate: float | None, schedule: Schedule) -> Method:
+    fits: dict[str, Fits] = {}
+    for q in quantity_names():
+        tau_s = None
+        if not q.startswith("zero"):  # the element is the same, and its zero shows the lag best
+            lag = fits[f"zero_{q.split('_')[1][0]}_ug"].best.lag
+            tau_s = lag.tau_s if lag else None
+        fits[q] = _fits_of(q, p, rate is not None, schedule.degree, tau_s)
+    return Method(name=p.segment, rate_k_per_min=rate, points=p, fits=fits)
+
+
+def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | None) -> Fits:
+    y = p.quantity(quantity)
+    largest = float(np.abs(y).max() if quantity.startswith("zero") else np.ptp(y))
+    if not sweep:
+        return Fits(quantity=quantity, best=fit_soak(quantity, p.case_c, y, degree), largest=largest)
+    up = up_leg(p)
+    one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
+    if turns_of(p.case_c) == 0:
+        return Fits(quantity=quantity, best=one_leg, one_leg=one_leg, largest=largest)
+    return Fits(
+        quantity=quantity,
+        best=fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s),
+        one_leg=one_leg,
+        both_legs=fit_soak(quantity, p.case_c, y, degree),
+        largest=largest,
+    )
+
+
+# ---- uncertainty
+
+
+def estimate_at(m: Method, quantity: str, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
+    """The quantity at a temperature of the element, with its budget."""
+    c = m.fits[quantity].best
+    sd = float(c.half_width([temp_c])[0]) / t_quantile(c.dof)
+    made = estimate(quantity, symbol_of(quantity), unit_of(quantity), float(c.value_at(temp_c)), sd, c.dof)
+    return expand_estimate(made, [part for part in _components(m, quantity, temp_c, accuracy) if part.u > 0.0])
+
+
+def _components(m: Method, quantity: str, temp_c: float, a: BenchAccuracy) -> list[Component]:
+    """What the scatter of the fit does not show, in the quantity's unit."""
+    kind, axes = quantity.split("_")[:2]
+    c, i = m.fits[quantity].best, AXES.index(axes[0])
+    scale = float(m.fits[f"scale_{axes[0]}_v_per_g"].best.value_at(temp_c))
+    per_v = {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}[kind]  # of a half sum or difference
+    slope = float(c.value_at(temp_c + 0.5) - c.value_at(temp_c - 0.5))  # a kelvin
+    board_k = abs(temp_c - 25.0)
+    found = [
+        Component(name="residual", u=c.rms),
+        Component(name="interpolation", u=float(m.points.interpolation_v[i]) / 2.0**0.5 * per_v),
+        Component(name="temperature", u=abs(slope) * TEMP_U_K),
+    ]
+    if kind == "scale":
+        found.append(Component(name="chain gain", u=scale * a.chain_gain_ppm * 1e-6))
+        found.append(Component(name="chain over temperature", u=scale * a.chain_gain_tc_ppm_per_k * board_k * 1e-6))
+    if kind == "zero":
+        found.append(Component(name="chain zero", u=a.chain_zero_uv * 1e-6 * per_v))
+        found.append(Component(name="chain over temperature", u=a.chain_zero_tc_uv_per_k * board_k * 1e-6 * per_v))
+    if kind == "base":
+        found.append(Component(name="scale of the head", u=SCALE_U_ARCSEC))
+        found.append(Component(name="circle", u=a.circle_arcsec / 2.0**0.5))
+        found.append(Component(name="mounting", u=a.mount_arcsec))
+    return found
+
+
+# ---- the two methods beside each other
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """How a sweep differs from the soak, and what the lags that were found make of the soak's curve."""
+
+    quantity: str
+    largest: float  # of the quantity
+    less_soak: float  # largest difference on the way up
+    less_soak_predicted: float
+    loop: float | None  # largest difference between the legs; None: one leg
+    loop_predicted: float | None
+
+    def percent(self, value: float) -> float:
+        return 100.0 * value / self.largest
+
+
+def difference_of(soak: Method, sweep: Method, quantity: str) -> Difference:
+    """Where both methods have the quantity."""
+    p, curve = sweep.points, soak.fits[quantity].best
+    measured, predicted = p.quantity(quantity), predicted_sweep(soak, sweep, quantity)
+    up = p.t_s <= p.history[0][int(np.argmax(p.history[1]))]
+    still = curve.value_at(p.case_c)
+    inside = up & (p.case_c >= curve.low_c) & (p.case_c <= curve.high_c)
+    loops = [_loop_of(p.case_c, y, up) for y in (measured, predicted)] if not up.all() else [None, None]
+    return Difference(
+        quantity=quantity,
+        largest=sweep.fits[quantity].largest,
+        less_soak=float(np.abs((measured - still)[inside]).max()),
+        less_soak_predicted=float(np.abs((predicted - still)[inside]).max()),
+        loop=loops[0],
+        loop_predicted=loops[1],
+    )
+
+
+def predicted_sweep(soak: Method, sweep: Method, quantity: str) -> Array:
+    """The soak's curve as a sweep shows it, (n,): by the lag and the column of the sweep's fit."""
+    p, curve, lag = sweep.points, soak.fits[quantity].best, sweep.fits[quantity].best.lag
+    if lag is None:
+        return curve.value_at(p.case_c)
+    element = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history).element_c(np.array([lag.tau_s]))[:, 0]
+    return np.asarray(curve.value_at(element) + lag.per_k * (p.case_c - element))
+
+
+def _loop_of(case_c: Array, y: Array, up: npt.NDArray[np.bool_]) -> float:
+    """Largest difference of the legs at the same temperature of the case, without the ends."""
+    margin = ENDS * float(np.ptp(case_c))
+    grid = np.linspace(float(case_c.min()) + margin, float(case_c.max()) - margin, 200)
+    legs = []
+    for leg in (up, ~up):
+        order = np.argsort(case_c[leg])
+        legs.append(np.interp(grid, case_c[leg][order], y[leg][order]))
+    return float(np.abs(legs[0] - legs[1]).max())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Residuals:
+    """Largest residuals of a quantity's fits, percent of its largest value; None: no such fit."""
+
+    one_leg: float | None
+    other_leg: float | None  # what the fit of the way up misses on the way down
+    both_legs: float | None
+    best: float
+
+
+def residuals_of(m: Method, quantity: str) -> Residuals:
+    """Of one method."""
+    f, p, y = m.fits[quantity], m.points, m.points.quantity(quantity)
+    element = p.case_c
+    if f.best.lag:
+        sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
+        element = sweep.element_c(np.array([f.best.lag.tau_s]))[:, 0]
+    up = up_leg(p)
+    down = p.t_s > up.t_s[-1]
+    one = f.one_leg
+    return Residuals(
+        one_leg=one and f.percent_of(up.quantity(quantity) - one.value_at(up.case_c)),
+        other_leg=f.percent_of((y - one.value_at(p.case_c))[down]) if one and down.any() else None,
+        both_legs=f.both_legs and f.percent_of(y - f.both_legs.value_at(p.case_c)),
+        best=f.percent_of(y - f.best.value_at(element, p.case_c - element)),
+    )
+
+
+def degrees_of(m: Method, quantity: str) -> list[DegreeRow]:
+    """Degrees that the points allow, on one leg or the soak."""
+    p = up_leg(m.points) if m.rate_k_per_min is not None else m.points
+    most = min(max(DEGREES), len(np.unique(p.case_c)) - 2)
+    try:
+        return degree_rows(quantity, p.case_c, p.quantity(quantity), [d for d in DEGREES if d <= most])
+    except BadInput:
+        return []
+
+
+def case_lag_s(recordings: Sequence[Recording], segment: str) -> float:
+    """Lag of the case behind what the chamber shows in a segment, s: the one with the least squares."""
+    rows = [r for r in recordings if r.segment == segment]
+    t_s = np.array([r.t_s for r in rows])
+    shown, case = np.array([r.chamber_degc for r in rows]), np.array([r.case_degc for r in rows])
+    scan = np.geomspace(1.0, 3600.0, 200)
+    off = element_temperature(t_s, shown, scan) - case[:, None]
+    return float(scan[int(np.argmin((off**2).sum(axis=0)))])

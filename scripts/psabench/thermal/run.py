@@ -1,0 +1,235 @@
+"""`psabench run thermal`: opens or continues a bench, measures, grades, reports.
+
+A run of ours on an emulator is resumed from its last checkpoint, at the same instant with the same noise: the digits
+are those of a run in one piece. On a bench that is there already time has passed, so an interrupted temperature or
+sweep begins again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.boards.registry import DBC_NODE
+from psabench.budget.accuracy import EXACT, BenchAccuracy
+from psabench.errors import BadInput, BenchError, expected
+from psabench.instruments import EXAMPLES
+from psabench.procedures.head_bench import Progress
+from psabench.procedures.result import fields_of, made_params
+from psabench.procedures.run_table import G_MPS2, SITE_G_MPS2
+from psabench.report import provenance
+from psabench.thermal.bench import WireThermal
+from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule
+from psabench.thermal.records import Recording, RunFolder
+from psabench.thermal.result import ThermalResult, estimate_run
+from psabench.thermal.schedule import Schedule, read_schedule, schedule_dict, schedule_of_dict
+
+SCENARIO = "quartz_run_in"
+FIXED = ("schedule", "scenario", "seed", "node", "gravity")  # of a run that is resumed: they are in its folder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThermalOptions:
+    """What the command line asked for."""
+
+    out: Path
+    schedule: str | None = None
+    resume: Path | None = None
+    can: str | None = None
+    head: str | None = None
+    chamber: str | None = None
+    control: Path | None = None
+    truth: Path | None = None
+    scenario: Path | None = None
+    node: int | None = None
+    seed: int | None = None
+    gravity: float | None = None
+    real_time: bool = False
+    params: dict[str, Any] = field(default_factory=dict)  # of BenchAccuracy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThermalRun:
+    """A run that is over."""
+
+    result: ThermalResult
+    folder: RunFolder
+    load_v_per_a: tuple[float, ...] | None  # of the axes, by the truth; None: no truth
+    facts: dict[str, str]
+
+
+def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
+    """Measure and estimate. Raises BadInput, BenchError; what was recorded stays."""
+    folder = RunFolder(options.resume or options.out)
+    setup = _resumed_setup(options, folder) if options.resume else _new_setup(options)
+    schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
+    with ExitStack() as stack:
+        session = _Session(options, setup, folder, schedule, stack)
+        recordings = session.measure(progress)
+        load = session.load_v_per_a()
+    accuracy = _accuracy_of(options, ours=bool(setup["ours"]) and not setup["scenario"])
+    result = estimate_run(recordings, schedule, float(setup["g_mps2"]), accuracy)
+    return ThermalRun(result=result, folder=folder, load_v_per_a=load, facts=_facts_of(setup))
+
+
+def _accuracy_of(options: ThermalOptions, *, ours: bool) -> BenchAccuracy:
+    """Nothing is hidden in the chain and the head of our own scenario; else what the user gives, or our figures."""
+    given = {**(EXACT if ours else {}), **fields_of(BenchAccuracy, options.params)}
+    return made_params(BenchAccuracy, "accuracy of the bench", given)
+
+
+def _is_there(options: ThermalOptions) -> bool:
+    """Whether the bench is there already; else an emulator is started."""
+    return bool(options.can or options.head or options.chamber or options.control)
+
+
+def _new_setup(options: ThermalOptions) -> dict[str, Any]:
+    schedule = read_schedule(options.schedule or "quick")
+    there = _is_there(options)
+    default_g = G_MPS2 if there or options.scenario else SITE_G_MPS2
+    return {
+        "name": schedule.name,
+        "schedule": schedule_dict(schedule),
+        "ours": not there,
+        "scenario": str(options.scenario) if options.scenario else "",
+        "seed": options.seed,
+        "node": options.node if options.node is not None else DBC_NODE if there else None,
+        "g_mps2": default_g if options.gravity is None else options.gravity,
+    }
+
+
+def _resumed_setup(options: ThermalOptions, folder: RunFolder) -> dict[str, Any]:
+    given = [f"--{name}" for name in FIXED if getattr(options, name) is not None]
+    if given:
+        raise BadInput(expected("no option that the run has already", ", ".join(given), "--resume"))
+    setup = folder.read_setup()
+    if setup["ours"] == _is_there(options):
+        what = "no addresses: its emulator is started again" if setup["ours"] else "the addresses of its bench"
+        raise BadInput(expected(what, "others", "--resume"))
+    return setup
+
+
+def _facts_of(setup: dict[str, Any]) -> dict[str, str]:
+    bench = setup["scenario"] or (SCENARIO if setup["ours"] else "a bench that was there")
+    return {"schedule": str(setup["name"]), "bench": str(bench), "g": f"{setup['g_mps2']:g} m/s²"}
+
+
+# ---- the bench
+
+
+class _Session:
+    """The bench of one run, its files, and what is kept of a run before."""
+
+    def __init__(
+        self, options: ThermalOptions, setup: dict[str, Any], folder: RunFolder, schedule: Schedule, stack: ExitStack
+    ) -> None:
+        self._setup, self._folder, self._schedule, self._stack = setup, folder, schedule, stack
+        self._kept: list[Recording] = []
+        if options.resume:
+            self._bench = self._continue_bench(options)
+        else:
+            self._bench = stack.enter_context(_opened_bench(options, setup, folder))
+        b = self._bench
+        self._wire = WireThermal(b.unit, b.head, b.chamber, schedule.samples_hz)
+        self._checkpoints = b.emulator is not None
+
+    def _continue_bench(self, options: ThermalOptions) -> Bench:
+        """At the last checkpoint, or from the beginning; the recordings up to there are kept."""
+        from psabench.thermal.records import read_recordings
+
+        rows = len(read_recordings(self._folder.data))
+        found = self._folder.last_checkpoint(rows) if self._setup["ours"] else None
+        if found:
+            bench = self._stack.enter_context(Bench.restore(found[1]))
+            self._kept = self._folder.keep_rows(found[0])
+            return bench
+        whole = 0 if self._setup["ours"] else _whole_rounds(read_recordings(self._folder.data))
+        bench = self._stack.enter_context(_opened_bench(options, self._setup, self._folder))
+        self._kept = self._folder.keep_rows(whole)
+        return bench
+
+    def _begun(self) -> RunStart:
+        """Prepare the unit; the run begins at a whole second, so that its times are exact."""
+        if self._kept and self._checkpoints:
+            self._wire.resume()
+            return RunStart(origin_s=float(self._setup["origin_s"]), chamber_degc=float(self._setup["start_degc"]))
+        self._wire.prepare()
+        start = RunStart(origin_s=float(int(self._wire.t_s) + 1), chamber_degc=self._wire.chamber_degc())
+        if self._kept:
+            raise BenchError(expected("a checkpoint", "none", self._folder.path))
+        self._setup |= {"origin_s": start.origin_s, "start_degc": start.chamber_degc}
+        self._folder.store_setup(self._setup)
+        return start
+
+    def measure(self, progress: Progress) -> list[Recording]:
+        start = self._begun()
+        with self._folder.open_series() as series, self._truth_store() as note_truth:
+
+            def store(r: Recording) -> None:
+                note_truth(r)
+                series.store_rows([_row_of(r)])
+
+            watch = ThermalWatch(store=store, checkpoint=self._checkpoint, progress=progress)
+            return measure_schedule(self._wire, self._schedule, start, watch, self._kept)
+
+    def _checkpoint(self, rows: int) -> None:
+        if self._checkpoints:
+            self._folder.store_checkpoint(rows, self._bench.snapshot)
+
+    @contextmanager
+    def _truth_store(self) -> Iterator[Any]:
+        """What the emulator knows at each recording, for graders."""
+        if self._bench.truth_path is None:
+            yield lambda r: None
+            return
+        with self._folder.open_truth() as series:
+            yield lambda r: series.store_rows([_truth_row(r, self._bench.truth_state(), self._setup["g_mps2"])])
+
+    def load_v_per_a(self) -> tuple[float, ...] | None:
+        """Loads of the axes by the truth, ohm."""
+        if self._bench.truth_path is None:
+            return None
+        axes = next(iter(self._bench.truth()["units"].values()))["axes"]
+        return tuple(float(axes[a]["afe"]["load_ohm"]) for a in "xyz")
+
+
+def _row_of(r: Recording) -> Sequence[object]:
+    from psabench.thermal.records import recording_row
+
+    return recording_row(r)
+
+
+def _truth_row(r: Recording, state: dict[str, Any], g_mps2: float) -> list[object]:
+    unit = state["unit"]
+    a = [-float(f) / g_mps2 for f in unit["f_mps2"]]
+    return [r.t_s, unit["case_degc"], unit["element_degc"], *a, *map(float, unit["sensor_a"])]
+
+
+def _whole_rounds(recordings: Sequence[Recording]) -> int:
+    return 0
+
+
+def _opened_bench(options: ThermalOptions, setup: dict[str, Any], folder: RunFolder) -> Bench:
+    if not setup["ours"]:
+        if not options.control and not (options.head and options.chamber):
+            raise BadInput(expected(f"the VISA addresses of --head and --chamber, as {EXAMPLES}", "not both", "run"))
+        given = {"head": options.head, "chamber": options.chamber}
+        scpi = {name: address for name, address in given.items() if address}
+        return Bench.connect(
+            options.can, scpi=scpi, control=options.control, truth=options.truth, node=int(setup["node"])
+        )
+    folder.path.mkdir(parents=True, exist_ok=True)
+    scenario = setup["scenario"] or SCENARIO
+    if setup["scenario"]:
+        provenance.note_file("scenario", Path(setup["scenario"]))
+    pace = "wall" if options.real_time else "step"
+    return Bench.start(scenario, pace=pace, seed=setup["seed"], node=setup["node"])
+
+
+def facts_dict(result: ThermalResult) -> dict[str, Any]:
+    """Accuracy as it was taken."""
+    return asdict(result.accuracy)
