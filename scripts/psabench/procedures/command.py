@@ -18,7 +18,7 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
-from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM
+from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, THERMAL
 from psabench.progress import Bar
 from psabench.shell import command_line
 
@@ -41,6 +41,12 @@ in OUT/PROCEDURE-CONDITION.csv. Exit status 1: a result is off by more than its 
 NOTES_PLATFORM = """
 Without --can or --control an emulator is started for each reading, with the scenario gyrocompass. Exit status 1:
 a result is off by more than its limits, or is doubtful; the reason is printed.
+"""
+
+NOTES_CHAMBER = """
+Without --head, --chamber or --control an emulator is started, with the scenario quartz_run_in, whose chain and head
+are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit status 1: a compensation is off the true
+outputs by more than its limits.
 """
 
 ALL = "all"
@@ -105,6 +111,12 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
         "help": "publish progress and results with LCM: udpm://GROUP:PORT, or file://PATH an event log",
     },
     "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
+}
+# Of the thermal run alone.
+IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
+    "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
+    "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
+    "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
 
@@ -196,7 +208,8 @@ def _parser_of(command: Command) -> Parser:
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        group.add_argument(*(["-v"] if option == "--verbose" else []), option, **COMMON[option])
+        how = COMMON.get(option) or IN_THE_CHAMBER[option]
+        group.add_argument(*(["-v"] if option == "--verbose" else []), option, **how)
     return p
 
 
@@ -339,6 +352,22 @@ def _gyro(args: argparse.Namespace) -> int:
     return 0 if gyro_grading.within_limits(sections) else 1
 
 
+def _thermal(args: argparse.Namespace) -> int:
+    """Hours in a chamber: what it records is kept as it comes, and it can be resumed."""
+    from psabench.report import thermal_grading, thermal_page
+    from psabench.thermal import run as thermal_run
+
+    done = thermal_run.run_thermal(of_fields(thermal_run.ThermalOptions, args, params=_params(args)), Bar())
+    truth = thermal_grading.read_truth(done.folder, done.result.recordings, done.load_v_per_a)
+    report = thermal_grading.graded_report(done.result, truth, done.facts)
+    page = thermal_page.write(done.folder.path, report)
+    if args.verbose:
+        print(thermal_grading.console_lines(report))
+    print(thermal_grading.verdict(report))
+    print(f"report: {page}")
+    return 0 if thermal_grading.within_limits(report) else 1
+
+
 # What each takes of COMMON.
 _STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
 _PLATFORM = (
@@ -346,6 +375,10 @@ _PLATFORM = (
     *("--record", "--replay", "--out", "--lcm", "--verbose"),
 )
 _HEAD = tuple(COMMON)
+_CHAMBER = (
+    *("--schedule", "--resume", "--can", "--head", "--chamber", "--control", "--truth", "--scenario", "--node"),
+    *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
+)
 
 _EXAMPLES: Mapping[str, str] = {
     "turns": """\
@@ -377,6 +410,11 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run heading-hold
   psabench run heading-hold --reading improved --hours 4 --speed-kmh 500 --track-deg 90   in flight to the east
 """,
+    THERMAL[0]: """\
+  psabench run thermal                       a quick look, on an emulator started for it
+  psabench run thermal --schedule full --out build/run/qa-0001
+  psabench run thermal --resume build/run/qa-0001
+""",
 }
 
 
@@ -405,6 +443,12 @@ def _of_the_platform(name: str) -> Parameters:
     return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass_params.READINGS)
 
 
+def _of_the_chamber() -> Parameters:
+    from psabench.budget.accuracy import BenchAccuracy
+
+    return Parameters(fields=BenchAccuracy.__dataclass_fields__)
+
+
 def _commands() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
@@ -420,6 +464,17 @@ def _commands() -> Iterator[Command]:
         )
     name, summary = COMPARE
     yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])
+    name, summary = THERMAL
+    yield Command(
+        name=name,
+        summary=summary,
+        handler=_thermal,
+        common=_CHAMBER,
+        load=_of_the_chamber,
+        examples=_EXAMPLES[name],
+        notes=NOTES_CHAMBER,
+        kept=f"{KEPT}; --resume continues the run",
+    )
     for name, summary in ON_THE_PLATFORM.items():
         yield Command(
             name=name,

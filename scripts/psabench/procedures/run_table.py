@@ -19,6 +19,10 @@ COMPARE = (
     "compare-converters",
     "one motion to every generation of converters: resolution, noise, drift, velocity error",
 )
+THERMAL = (
+    "thermal",
+    "accelerometers in a chamber, at points of temperature and during a sweep: scale, zero and base, compensated",
+)
 
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory

@@ -23,9 +23,10 @@ from psabench.thermal.schedule import POSITIONS, Position
 Array = npt.NDArray[np.float64]
 
 AXES = "xyz"
-ARCSEC = np.degrees(1.0) * 3600.0
+ARCSEC = float(np.degrees(1.0)) * 3600.0
 LEFT_OUT = 4.0  # a gap twice as long: four times the error, where the curve is smooth more
 LEAST_VISITS = 6  # of a position in a sweep
+TOP_K = 0.1  # noise of the chamber's reading
 SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
 
 
@@ -43,7 +44,13 @@ class Points:
     interpolation_v: Array  # (3,) of one position's reading, rms; 0 for a soak
     interpolation_most_v: Array  # (3,) the largest
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
+    turn_s: float  # when the chamber has reached the top of a sweep; the last instant of a soak
     notes: tuple[str, ...] = ()
+
+    @property
+    def up(self) -> npt.NDArray[np.bool_]:
+        """Which instants are on the way up, (n,)."""
+        return np.asarray(self.t_s <= self.turn_s)
 
     def quantity(self, name: str) -> Array:
         """By the name of its estimate, (n,): zero_x_ug, scale_x_v_per_g, base_xy_arcsec."""
@@ -156,6 +163,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         interpolation_v=np.zeros(3),
         interpolation_most_v=np.zeros(3),
         history=(t_s, case_c),
+        turn_s=float(t_s[-1]),
         notes=tuple(notes),
     )
 
@@ -189,7 +197,13 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         interpolation_v=np.sqrt(np.mean(off**2, axis=0)),
         interpolation_most_v=off.max(axis=0),
         history=(t_s, case_c),
+        turn_s=_turn_of(rows),
     )
+
+
+def _turn_of(rows: Sequence[Recording]) -> float:
+    shown = np.array([r.chamber_degc for r in rows])
+    return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
 def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
@@ -217,7 +231,6 @@ def left_out_error(t_s: Array, u: Array, scatter_v: Array) -> Array:
 
 
 def up_leg(p: Points) -> Points:
-    """The part of a sweep before its hottest point."""
-    keep = p.t_s <= p.history[0][int(np.argmax(p.history[1]))]
-    cut = {n: getattr(p, n)[keep] for n in ("t_s", "case_c", "zero_ug", "scale_v_per_g", "base_arcsec")}
+    """The part of a sweep on the way up."""
+    cut = {n: getattr(p, n)[p.up] for n in ("t_s", "case_c", "zero_ug", "scale_v_per_g", "base_arcsec")}
     return replace(p, **cut)

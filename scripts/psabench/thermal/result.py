@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.gum import expand_estimate
 from psabench.errors import BadInput
-from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile
+from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
 from psabench.thermal.compensation import (
     Compensation,
     SweepCase,
@@ -27,8 +27,12 @@ from psabench.thermal.schedule import Schedule, sweep_names
 
 Array = npt.NDArray[np.float64]
 
+START_C = 25.0  # of the chamber, before a run
 NORMAL_C = 30.0  # the article's normal temperature: where a passport has its numbers
 TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
+PLAY_K = 0.3  # limit of what the element's temperature leaves undecided, by the way on which it was reached (E0)
+CASE_TAU_S, ELEMENT_TAU_S = 180.0, 360.0  # lags where no sweep has found them (E0)
+SETTLE_STEP_S = 5.0
 SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec
 ENDS = 0.05  # of the range: what a loop is not taken from, at either end
 DEGREES = (1, 2, 3, 4, 5, 6, 7, 8)
@@ -57,6 +61,7 @@ class Method:
     rate_k_per_min: float | None  # of a sweep
     points: Points
     fits: dict[str, Fits]
+    settling_k: float = 0.0  # that the element may miss the case by, at the end of a dwell
 
     @property
     def title(self) -> str:
@@ -102,6 +107,7 @@ def estimate_run(
     """Pure. Raises BadInput where a method has too few recordings for its fits."""
     rates = sweep_names(schedule)
     methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings).items())
+    methods = tuple(replace(m, settling_k=_settling_k(methods, recordings, schedule)) for m in methods)
     low = max(float(m.points.case_c.min()) for m in methods)
     high = min(float(m.points.case_c.max()) for m in methods)
     normal_c = min(max(NORMAL_C, low), high)
@@ -127,6 +133,21 @@ def _method_of(p: Points, rate: float | None, schedule: Schedule) -> Method:
             tau_s = lag.tau_s if lag else None
         fits[q] = _fits_of(q, p, rate is not None, schedule.degree, tau_s)
     return Method(name=p.segment, rate_k_per_min=rate, points=p, fits=fits)
+
+
+def _settling_k(methods: Sequence[Method], recordings: Sequence[Recording], schedule: Schedule) -> float:
+    """What is left between case and element after the dwell that follows the longest way of a soak."""
+    if schedule.soak is None:
+        return 0.0
+    found = [m for m in methods if m.fits["zero_x_ug"].best.lag]
+    lags = [lag.tau_s for m in found for q in quantity_names()[:3] if (lag := m.fits[q].best.lag)]
+    element_s = float(np.median(lags)) if lags else ELEMENT_TAU_S
+    case_s = max(case_lag_s(recordings, m.name) for m in found) if found else CASE_TAU_S
+    way_k = float(np.abs(np.diff([START_C, *schedule.soak.temperatures_c])).max())
+    ramp_s = way_k / schedule.soak.ramp_k_per_min * 60.0
+    t_s = np.arange(0.0, ramp_s + schedule.soak.dwell_s + SETTLE_STEP_S, SETTLE_STEP_S)
+    case = element_temperature(t_s, np.minimum(t_s / ramp_s, 1.0) * way_k, case_s)
+    return float(abs(case - element_temperature(t_s, case, element_s))[-1])
 
 
 def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | None) -> Fits:
@@ -164,13 +185,17 @@ def _components(m: Method, quantity: str, temp_c: float, a: BenchAccuracy) -> li
     c, i = m.fits[quantity].best, AXES.index(axes[0])
     scale = float(m.fits[f"scale_{axes[0]}_v_per_g"].best.value_at(temp_c))
     per_v = {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}[kind]  # of a half sum or difference
-    slope = float(c.value_at(temp_c + 0.5) - c.value_at(temp_c - 0.5))  # a kelvin
+    inside_c = min(max(temp_c, c.low_c + 0.5), c.high_c - 0.5)
+    slope = float(c.value_at(inside_c + 0.5) - c.value_at(inside_c - 0.5))  # a kelvin
     board_k = abs(temp_c - 25.0)
     found = [
         Component(name="residual", u=c.rms),
         Component(name="interpolation", u=float(m.points.interpolation_v[i]) / 2.0**0.5 * per_v),
         Component(name="temperature", u=abs(slope) * TEMP_U_K),
+        within_limit("play", abs(slope) * PLAY_K),
     ]
+    if m.rate_k_per_min is None:
+        found.append(within_limit("settling", abs(slope) * m.settling_k))
     if kind == "scale":
         found.append(Component(name="chain gain", u=scale * a.chain_gain_ppm * 1e-6))
         found.append(Component(name="chain over temperature", u=scale * a.chain_gain_tc_ppm_per_k * board_k * 1e-6))
@@ -206,10 +231,9 @@ def difference_of(soak: Method, sweep: Method, quantity: str) -> Difference:
     """Where both methods have the quantity."""
     p, curve = sweep.points, soak.fits[quantity].best
     measured, predicted = p.quantity(quantity), predicted_sweep(soak, sweep, quantity)
-    up = p.t_s <= p.history[0][int(np.argmax(p.history[1]))]
     still = curve.value_at(p.case_c)
-    inside = up & (p.case_c >= curve.low_c) & (p.case_c <= curve.high_c)
-    loops = [_loop_of(p.case_c, y, up) for y in (measured, predicted)] if not up.all() else [None, None]
+    inside = p.up & (p.case_c >= curve.low_c) & (p.case_c <= curve.high_c)
+    loops = [_loop_of(p.case_c, y, p.up) for y in (measured, predicted)] if not p.up.all() else [None, None]
     return Difference(
         quantity=quantity,
         largest=sweep.fits[quantity].largest,
@@ -222,11 +246,18 @@ def difference_of(soak: Method, sweep: Method, quantity: str) -> Difference:
 
 def predicted_sweep(soak: Method, sweep: Method, quantity: str) -> Array:
     """The soak's curve as a sweep shows it, (n,): by the lag and the column of the sweep's fit."""
-    p, curve, lag = sweep.points, soak.fits[quantity].best, sweep.fits[quantity].best.lag
-    if lag is None:
-        return curve.value_at(p.case_c)
-    element = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history).element_c(np.array([lag.tau_s]))[:, 0]
-    return np.asarray(curve.value_at(element) + lag.per_k * (p.case_c - element))
+    p, curve, found = sweep.points, soak.fits[quantity].best, sweep.fits[quantity].best
+    element = element_of(p, found)
+    per_k = found.lag.per_k if found.lag else 0.0
+    return np.asarray(curve.value_at(element) + per_k * (p.case_c - element))
+
+
+def element_of(p: Points, c: Compensation) -> Array:
+    """Temperature of the element by the lag of a fit, (n,); that of the case where it has none."""
+    if c.lag is None:
+        return p.case_c
+    sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
+    return sweep.element_c(np.array([c.lag.tau_s]))[:, 0]
 
 
 def _loop_of(case_c: Array, y: Array, up: npt.NDArray[np.bool_]) -> float:
@@ -253,13 +284,8 @@ class Residuals:
 def residuals_of(m: Method, quantity: str) -> Residuals:
     """Of one method."""
     f, p, y = m.fits[quantity], m.points, m.points.quantity(quantity)
-    element = p.case_c
-    if f.best.lag:
-        sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
-        element = sweep.element_c(np.array([f.best.lag.tau_s]))[:, 0]
-    up = up_leg(p)
-    down = p.t_s > up.t_s[-1]
-    one = f.one_leg
+    element = element_of(p, f.best)
+    up, down, one = up_leg(p), ~p.up, f.one_leg
     return Residuals(
         one_leg=one and f.percent_of(up.quantity(quantity) - one.value_at(up.case_c)),
         other_leg=f.percent_of((y - one.value_at(p.case_c))[down]) if one and down.any() else None,

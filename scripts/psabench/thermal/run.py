@@ -29,7 +29,7 @@ from psabench.thermal.result import ThermalResult, estimate_run
 from psabench.thermal.schedule import Schedule, read_schedule, schedule_dict, schedule_of_dict
 
 SCENARIO = "quartz_run_in"
-FIXED = ("schedule", "scenario", "seed", "node", "gravity")  # of a run that is resumed: they are in its folder
+FIXED = ("schedule", "scenario", "seed", "gravity")  # of a run that is resumed: they are in its folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class ThermalOptions:
     control: Path | None = None
     truth: Path | None = None
     scenario: Path | None = None
-    node: int | None = None
+    node: int = DBC_NODE
     seed: int | None = None
     gravity: float | None = None
     real_time: bool = False
@@ -97,7 +97,7 @@ def _new_setup(options: ThermalOptions) -> dict[str, Any]:
         "ours": not there,
         "scenario": str(options.scenario) if options.scenario else "",
         "seed": options.seed,
-        "node": options.node if options.node is not None else DBC_NODE if there else None,
+        "node": options.node,
         "g_mps2": default_g if options.gravity is None else options.gravity,
     }
 

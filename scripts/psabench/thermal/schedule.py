@@ -119,6 +119,7 @@ class Sweep:
     rates_k_per_min: tuple[float, ...] = ()
     every_s: float = 60.0
     rest_s: float = 3600.0  # at the low end before it begins
+    turn_s: float = 0.0  # at the end of each leg: the element reaches the end of the range
     legs: str = "both"
     ramp_k_per_min: float = 2.0  # on the way to the low end
     warm_up: WarmUp | None = None  # gives the rate where none is given
@@ -134,6 +135,7 @@ class Sweep:
             raise ValueError(expected("rates, each once", list(self.rates()), "sweep: rates_k_per_min"))
         _check_between("sweep: ramp_k_per_min", self.ramp_k_per_min, LEAST_RATE, MOST_RATE, "K/min")
         _check_between("sweep: rest_s", self.rest_s, 60.0, 86400.0, "s")
+        _check_between("sweep: turn_s", self.turn_s, 0.0, 86400.0, "s")
 
     def rates(self) -> tuple[float, ...]:
         """Of the sweeps, one after the other, K/min: as given, else the mean one of the warm-up."""
@@ -269,6 +271,7 @@ class _Plan:
         begun_s, taken = self._t_s, 0
         for target_c in (s.high_c, s.low_c)[: 2 if sweep.legs == "both" else 1]:
             yield self._go_to(target_c, rate)
+            self._t_s += math.ceil(sweep.turn_s)
             while begun_s + (taken + 1) * sweep.every_s <= self._t_s:
                 at_s = begun_s + taken * sweep.every_s + HEAD_S
                 part, k = divmod(taken, len(self._positions))
