@@ -107,7 +107,10 @@ def output_text(path: Path, stored: Callable[[], str] = str, *, append: bool = F
     """
     owned = Owned(path)
     try:
-        with _opened(path, append) as raw, io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="") as file:
+        with (
+            _opened(path, append) as raw,
+            io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", newline="") as file,
+        ):
             yield file
             file.flush()
             if path.is_file():

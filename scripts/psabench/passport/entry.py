@@ -11,6 +11,7 @@ from psabench.errors import BadInput, expected
 from psabench.passport.store import Covariance, Measured, UnitRun
 from psabench.report.diff import read_result
 from psabench.report.provenance import KEY, json_digest
+from psabench.thermal.compensation import compensation_of_dict
 
 
 def runs_of_result(path: Path) -> list[UnitRun]:
@@ -43,6 +44,7 @@ def _run_of_section(section: Mapping[str, Any], origin: Mapping[str, Any]) -> Un
         data_sha256=json_digest(section),
         seed=seed if isinstance(seed, int) else None,
         within=all(judged) if judged else None,
+        range_c=_range_of(section),
         quantities=tuple(_measured_of(e) for e in estimates),
         covariance=_covariance_of(section, {e["name"]: float(e["sd"]) for e in estimates}),
         provenance=origin,
@@ -54,7 +56,20 @@ def _measured_of(estimate: Mapping[str, Any]) -> Measured:
     value, half = float(estimate["value"]), (high - low) / 2.0
     if not (math.isfinite(value) and math.isfinite(half)):
         raise ValueError(expected("a finite estimate", f"{value} +- {half}", estimate["name"]))
-    return Measured(name=str(estimate["name"]), unit=str(estimate["unit"]), value=value, half_width=half)
+    name, curve = str(estimate["name"]), estimate.get("compensation")
+    return Measured(
+        name=name,
+        unit=str(estimate["unit"]),
+        value=value,
+        half_width=half,
+        compensation=None if curve is None else compensation_of_dict(curve, name),
+    )
+
+
+def _range_of(section: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Temperatures for which a run is valid, degC; None: it was made at one."""
+    found = section.get("range_c")
+    return None if found is None else (float(found[0]), float(found[1]))
 
 
 def _covariance_of(section: Mapping[str, Any], sd: Mapping[str, float]) -> Covariance | None:

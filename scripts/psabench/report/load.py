@@ -48,6 +48,7 @@ UNITS: Mapping[str, str] = {
     "LSB": "LSB",
     "counts": "counts",
     "pulses": "pulses",
+    "g": "g",
     "deg/h": "deg/h",
     "V": "V",
 }

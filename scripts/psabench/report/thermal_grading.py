@@ -1,4 +1,4 @@
-"""A thermal run beside the truth, and the two methods beside each other: tables as data, for console, page, result.json.
+"""A thermal run beside the truth, and its methods beside each other: tables as data for console, page, result.json.
 
 The truth is what the emulator says of its sensors' outputs at each recording of the soak (`thermal-truth.csv`). A
 compensation is compared with it at the temperature of the element. No part of the procedure reads it.
@@ -76,7 +76,8 @@ def read_truth(
         return None
     if len(rows) < len(recordings):
         raise BadInput(expected(f"{len(recordings)} rows", len(rows), folder.truth))
-    true, element = [], {}
+    true: list[Recording] = []
+    element: dict[int, list[float]] = {}
     for r, row in zip(recordings, rows, strict=False):
         if r.segment == "soak":
             at = dict(zip(TRUTH_COLUMNS, map(float, row), strict=True))
@@ -120,7 +121,9 @@ def _graded_at(m: Method, element_c: Any, normal_c: float) -> list[int]:
     """Which temperatures of the soak, within what the fit's element has had."""
     c = m.fits["zero_x_ug"].best
     reached = [k for k, t in enumerate(element_c) if c.low_c - REACHED_K <= t <= c.high_c + REACHED_K]
-    return sorted({min(reached, key=lambda k: abs(element_c[k] - t)) for t in (c.low_c, normal_c, c.high_c)} if reached else ())
+    return sorted(
+        {min(reached, key=lambda k: abs(element_c[k] - t)) for t in (c.low_c, normal_c, c.high_c)} if reached else ()
+    )
 
 
 def within_limits(report: ThermalReport) -> bool:
@@ -137,8 +140,8 @@ def verdict(report: ThermalReport) -> str:
     beyond = sum(abs(g.en or 0.0) > 1.0 for g in report.graded)
     head, within = ("All", "within") if out == 0 else (f"{out} of", "not within")
     return (
-        f"{head} {n} values of the compensations at {temps} °C are {within} {LIMIT_CI:g} U of the sensors' true outputs "
-        f"in the soak, {beyond} are beyond U (expected: {(1.0 - COVERAGE) * n:.1f})."
+        f"{head} {n} values of the compensations at {temps} °C are {within} {LIMIT_CI:g} U of the sensors' true "
+        f"outputs in the soak, {beyond} are beyond U (expected: {(1.0 - COVERAGE) * n:.1f})."
     )
 
 

@@ -26,10 +26,11 @@ CAPTIONS = {
     "with it.",
 }
 WHY = (
-    "In the soak the element has the temperature of the case. During a sweep it runs after the case by rate times lag, so "
-    "the same zero is seen at a case that is warmer on the way up and colder on the way down: the curve is displaced by "
-    "rate times lag times its slope, and the loop is twice that. A play in the element's temperature adds its own width, "
-    "and the fit takes it for a longer lag."
+    "In the soak the element has the temperature of the case. During a sweep it runs after the case by rate times "
+    "lag: the same zero is seen at a case that is warmer on the way up and colder on the way down. The curve is "
+    "displaced by "
+    "rate times lag times its slope, and the loop is twice that. A play in the element's temperature adds its own "
+    "width, and the fit takes it for a longer lag."
 )
 
 
@@ -99,8 +100,8 @@ def _how_to_read(report: ThermalReport) -> str:
     notes = [*grading.interpolation_lines(report), *report.result.notes]
     return section(
         "How to read this",
-        "<p>U: expanded uncertainty, 95.45 %. E<sub>n</sub>: error/U. Percents of a zero signal are of its largest value, "
-        "those of scale and base of the largest change. The temperature is that of the sensor in the case.</p>",
+        "<p>U: expanded uncertainty, 95.45 %. E<sub>n</sub>: error/U. Percents of a zero signal are of its largest "
+        "value, those of scale and base of the largest change. The temperature is that of the sensor in the case.</p>",
         bullets([escape(n) for n in notes]),
         kind="method",
     )
@@ -175,7 +176,7 @@ def residual_figure(report: ThermalReport, m: Method) -> Figure:
     with plots.drawing(3.0, 1, 3, sharex=True, sharey=True) as (picture, axes):
         for ax, axis in zip(axes, "xyz", strict=True):
             f, y = m.fits[f"zero_{axis}_ug"], p.quantity(f"zero_{axis}_ug")
-            assert f.both_legs and f.best.lag
+            assert f.both_legs
             element = element_of(p, f.best)
             without = 100.0 * (y - f.both_legs.value_at(p.case_c)) / f.largest
             with_lag = 100.0 * (y - f.best.value_at(element, p.case_c - element)) / f.largest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -9,7 +10,7 @@ from psabench.procedures.head_bench import Progress, Silent
 from psabench.thermal.bench import CASE_CHANNEL, ThermalBench
 from psabench.thermal.follow import FollowCheck
 from psabench.thermal.records import Recording
-from psabench.thermal.schedule import Action, Schedule, Setting, Take, planned_actions
+from psabench.thermal.schedule import SOAK, Action, Schedule, Setting, Take, planned_actions
 
 
 def _drop(_: object) -> None:
@@ -102,6 +103,29 @@ def _after_takes(actions: Sequence[Action], takes: int) -> int:
         return 0
     at = [k for k, a in enumerate(actions) if isinstance(a, Take)]
     return at[takes - 1] + 1
+
+
+def whole_parts(actions: Sequence[Action], taken: int) -> int:
+    """How many of the first `taken` recordings are of temperatures and sweeps that are complete."""
+    takes = [a for a in actions if isinstance(a, Take)]
+    if taken == len(takes):
+        return taken
+    cut = takes[taken]
+    same = (t.segment == cut.segment and (t.part == cut.part or t.segment != SOAK) for t in takes)
+    return next(k for k, of_part in enumerate(same) if of_part)
+
+
+def restarted_origin(bench: ThermalBench, actions: Sequence[Action], kept: int) -> float:
+    """Where time has passed: the chamber is sent where the next action begins, and that has its usual time from when
+    the chamber is as near as it should be. The origin of the run's times."""
+    first = _after_takes(actions, kept)
+    next_setting = actions[first]
+    assert isinstance(next_setting, Setting)
+    before = next((a for a in reversed(actions[:first]) if isinstance(a, Setting)), next_setting)
+    to_c, ramp = next_setting.temp_degc, next_setting.ramp_k_per_min
+    further_k = abs(to_c - bench.chamber_degc()) - abs(to_c - before.temp_degc)
+    bench.set_chamber(to_c, ramp)
+    return math.ceil(bench.t_s + max(further_k, 0.0) / ramp * 60.0) + 1.0 - next_setting.at_s
 
 
 def _ends_round(actions: Sequence[Action], k: int) -> bool:

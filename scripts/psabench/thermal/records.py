@@ -1,4 +1,4 @@
-"""Recordings of a thermal run: one row of CSV each, appended and flushed as they come; a folder that a run continues in.
+"""Recordings of a thermal run: a row of CSV each, appended and flushed as they come; a folder that a run continues in.
 
 `thermal.csv` is what was measured, `thermal-truth.csv` what an emulator says beside it, for graders alone. A
 checkpoint is a snapshot of the emulator with the number of rows that it holds in its name: what is resumed from it is
@@ -154,6 +154,12 @@ class RunFolder:
         for k, past in old.items():
             if k != rows:
                 past.unlink(missing_ok=True)
+
+    def set_aside(self, rows: int) -> None:
+        """Recordings after so many, which are made again on a bench that has gone on: into a file of their own."""
+        lines = whole_lines(self.data)[rows + 1 :]
+        with SeriesFile(self.path / f"{NAME}-aside.csv", COLUMNS, append=True) as aside:
+            aside.store_rows(csv.reader(lines))
 
     def keep_rows(self, rows: int) -> list[Recording]:
         """Cut both series to so many rows, whole or not at all; what is kept. Raises BadInput, OutputError."""

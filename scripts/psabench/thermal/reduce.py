@@ -18,13 +18,13 @@ import numpy.typing as npt
 from psabench.errors import BadInput, expected
 from psabench.estimate.face import Face
 from psabench.thermal.records import Recording
-from psabench.thermal.schedule import POSITIONS, Position
+from psabench.thermal.schedule import POSITIONS, SOAK, Position
 
 Array = npt.NDArray[np.float64]
 
 AXES = "xyz"
 ARCSEC = float(np.degrees(1.0)) * 3600.0
-LEFT_OUT = 4.0  # a gap twice as long: four times the error, where the curve is smooth more
+LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 16 times
 LEAST_VISITS = 6  # of a position in a sweep
 TOP_K = 0.1  # noise of the chamber's reading
 SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
@@ -79,7 +79,7 @@ def points_of(recordings: Sequence[Recording]) -> dict[str, Points]:
     segments: dict[str, list[Recording]] = {}
     for r in recordings:
         segments.setdefault(r.segment, []).append(r)
-    found = {name: _soak_points(rows) if name == "soak" else _sweep_points(rows) for name, rows in segments.items()}
+    found = {name: _soak_points(rows) if name == SOAK else _sweep_points(rows) for name, rows in segments.items()}
     if not found:
         raise BadInput(expected("recordings", "none", "thermal run"))
     return found
@@ -147,13 +147,13 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         if part not in whole
     ]
     if not whole:
-        raise BadInput(expected("a temperature with all six positions", "none", "soak"))
+        raise BadInput(expected("a temperature with all six positions", "none", SOAK))
     by = {p: np.array([level[at[p]] for at in whole.values()]) for p in POSITIONS}
     zero, scale, base = _solve_positions(by)
     t_s, case_c = _history_of(rows)
     each = [list(at.values()) for at in whole.values()]
     return Points(
-        segment="soak",
+        segment=SOAK,
         t_s=np.array([t_s[k].mean() for k in each]),
         case_c=np.array([case_c[k].mean() for k in each]),
         zero_ug=zero,
@@ -227,7 +227,7 @@ def left_out_error(t_s: Array, u: Array, scatter_v: Array) -> Array:
         rest = np.arange(len(t_s)) != k
         guess = interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0]
         found.append((guess - u[k]) ** 2 - 1.64 * scatter_v**2)  # 1 + 2 (9/16)^2 + 2 (1/16)^2
-    return np.sqrt(np.maximum(np.array(found), 0.0)) / LEFT_OUT
+    return np.asarray(np.sqrt(np.maximum(np.array(found), 0.0)) / LEFT_OUT)
 
 
 def up_leg(p: Points) -> Points:

@@ -287,9 +287,9 @@ def residuals_of(m: Method, quantity: str) -> Residuals:
     element = element_of(p, f.best)
     up, down, one = up_leg(p), ~p.up, f.one_leg
     return Residuals(
-        one_leg=one and f.percent_of(up.quantity(quantity) - one.value_at(up.case_c)),
+        one_leg=f.percent_of(up.quantity(quantity) - one.value_at(up.case_c)) if one else None,
         other_leg=f.percent_of((y - one.value_at(p.case_c))[down]) if one and down.any() else None,
-        both_legs=f.both_legs and f.percent_of(y - f.both_legs.value_at(p.case_c)),
+        both_legs=f.percent_of(y - f.both_legs.value_at(p.case_c)) if f.both_legs else None,
         best=f.percent_of(y - f.best.value_at(element, p.case_c - element)),
     )
 

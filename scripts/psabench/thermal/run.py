@@ -7,26 +7,33 @@ sweep begins again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import EXACT, BenchAccuracy
-from psabench.errors import BadInput, BenchError, expected
+from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.run_table import G_MPS2, SITE_G_MPS2
 from psabench.report import provenance
 from psabench.thermal.bench import WireThermal
-from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule
-from psabench.thermal.records import Recording, RunFolder
+from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
+from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
 from psabench.thermal.result import ThermalResult, estimate_run
-from psabench.thermal.schedule import Schedule, read_schedule, schedule_dict, schedule_of_dict
+from psabench.thermal.schedule import (
+    Schedule,
+    Take,
+    planned_actions,
+    read_schedule,
+    schedule_dict,
+    schedule_of_dict,
+)
 
 SCENARIO = "quartz_run_in"
 FIXED = ("schedule", "scenario", "seed", "gravity")  # of a run that is resumed: they are in its folder
@@ -129,6 +136,7 @@ class _Session:
     ) -> None:
         self._setup, self._folder, self._schedule, self._stack = setup, folder, schedule, stack
         self._kept: list[Recording] = []
+        self._resumed = options.resume is not None
         if options.resume:
             self._bench = self._continue_bench(options)
         else:
@@ -138,40 +146,48 @@ class _Session:
         self._checkpoints = b.emulator is not None
 
     def _continue_bench(self, options: ThermalOptions) -> Bench:
-        """At the last checkpoint, or from the beginning; the recordings up to there are kept."""
-        from psabench.thermal.records import read_recordings
-
+        """Ours at its last checkpoint, or from the beginning; one that was there as it is now."""
         rows = len(read_recordings(self._folder.data))
         found = self._folder.last_checkpoint(rows) if self._setup["ours"] else None
-        if found:
-            bench = self._stack.enter_context(Bench.restore(found[1]))
-            self._kept = self._folder.keep_rows(found[0])
-            return bench
-        whole = 0 if self._setup["ours"] else _whole_rounds(read_recordings(self._folder.data))
-        bench = self._stack.enter_context(_opened_bench(options, self._setup, self._folder))
-        self._kept = self._folder.keep_rows(whole)
+        if found is None:
+            return self._stack.enter_context(_opened_bench(options, self._setup, self._folder))
+        bench = self._stack.enter_context(Bench.restore(found[1]))
+        self._kept = self._folder.keep_rows(found[0])
         return bench
 
-    def _begun(self) -> RunStart:
-        """Prepare the unit; the run begins at a whole second, so that its times are exact."""
-        if self._kept and self._checkpoints:
+    def _begun_run(self) -> RunStart:
+        """Prepare the unit, or go on. A run begins at a whole second, so that its times are exact."""
+        if self._kept:
             self._wire.resume()
             return RunStart(origin_s=float(self._setup["origin_s"]), chamber_degc=float(self._setup["start_degc"]))
         self._wire.prepare()
+        if self._resumed and not self._setup["ours"]:
+            return self._go_on_there()
         start = RunStart(origin_s=float(int(self._wire.t_s) + 1), chamber_degc=self._wire.chamber_degc())
-        if self._kept:
-            raise BenchError(expected("a checkpoint", "none", self._folder.path))
         self._setup |= {"origin_s": start.origin_s, "start_degc": start.chamber_degc}
         self._folder.store_setup(self._setup)
         return start
 
+    def _go_on_there(self) -> RunStart:
+        """On a bench that was there: complete temperatures and sweeps are kept, the one that was cut begins again."""
+        degc = float(self._setup["start_degc"])
+        actions = planned_actions(self._schedule, degc)
+        taken = len(read_recordings(self._folder.data))
+        whole = whole_parts(actions, taken)
+        if whole < taken:
+            self._folder.set_aside(whole)
+        self._kept = self._folder.keep_rows(whole)
+        if whole == sum(isinstance(a, Take) for a in actions):
+            return RunStart(origin_s=float(self._setup["origin_s"]), chamber_degc=degc)
+        return RunStart(origin_s=restarted_origin(self._wire, actions, whole), chamber_degc=degc)
+
     def measure(self, progress: Progress) -> list[Recording]:
-        start = self._begun()
+        start = self._begun_run()
         with self._folder.open_series() as series, self._truth_store() as note_truth:
 
             def store(r: Recording) -> None:
                 note_truth(r)
-                series.store_rows([_row_of(r)])
+                series.store_rows([recording_row(r)])
 
             watch = ThermalWatch(store=store, checkpoint=self._checkpoint, progress=progress)
             return measure_schedule(self._wire, self._schedule, start, watch, self._kept)
@@ -197,20 +213,10 @@ class _Session:
         return tuple(float(axes[a]["afe"]["load_ohm"]) for a in "xyz")
 
 
-def _row_of(r: Recording) -> Sequence[object]:
-    from psabench.thermal.records import recording_row
-
-    return recording_row(r)
-
-
 def _truth_row(r: Recording, state: dict[str, Any], g_mps2: float) -> list[object]:
     unit = state["unit"]
     a = [-float(f) / g_mps2 for f in unit["f_mps2"]]
     return [r.t_s, unit["case_degc"], unit["element_degc"], *a, *map(float, unit["sensor_a"])]
-
-
-def _whole_rounds(recordings: Sequence[Recording]) -> int:
-    return 0
 
 
 def _opened_bench(options: ThermalOptions, setup: dict[str, Any], folder: RunFolder) -> Bench:
@@ -228,8 +234,3 @@ def _opened_bench(options: ThermalOptions, setup: dict[str, Any], folder: RunFol
         provenance.note_file("scenario", Path(setup["scenario"]))
     pace = "wall" if options.real_time else "step"
     return Bench.start(scenario, pace=pace, seed=setup["seed"], node=setup["node"])
-
-
-def facts_dict(result: ThermalResult) -> dict[str, Any]:
-    """Accuracy as it was taken."""
-    return asdict(result.accuracy)

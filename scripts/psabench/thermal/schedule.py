@@ -1,4 +1,4 @@
-"""What a thermal run does, as data: temperatures, dwell, rates, positions, from a YAML file (docs/procedures/thermal.md).
+"""What a thermal run does, as data: temperatures, dwell, rates, positions of a YAML file (docs/procedures/thermal.md).
 
 `planned_actions` turns a schedule into a list of settings of the chamber and of recordings, each with its time, so a
 run that was interrupted continues where it was.
@@ -21,6 +21,7 @@ from psabench.thermal.compensation import DEGREE, MOST_DEGREE
 
 Part = TypeVar("Part")
 
+SOAK = "soak"  # segment of a run; the others are sweeps
 NAMED = ("quick", "full")  # of proto/schedules
 LOWEST_C, HIGHEST_C = -60.0, 85.0
 LEAST_RATE, MOST_RATE = 0.05, 60.0  # K/min; a chamber rejects what it cannot do
@@ -32,7 +33,7 @@ RISE = (0.1, 0.9)  # part of a warm-up in which its mean rate is taken
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Position:
-    """How the unit lies: the face of the mount and the angle of the head; an axis along gravity (down) or against it."""
+    """How the unit lies: the face of the mount and the angle of the head; an axis along gravity (down) or against."""
 
     name: str
     axis: int  # that is vertical
@@ -186,8 +187,8 @@ class Schedule:
             got = f"{min(self.soak.temperatures_c):g} to {max(self.soak.temperatures_c):g}"
             raise ValueError(expected(f"within {self.low_c:g} to {self.high_c:g} degC", got, "soak: temperatures_c"))
         if self.soak and len(self.soak.temperatures_c) < self.degree + 2:
-            least, got = f"{self.degree + 2} temperatures for degree {self.degree}", len(self.soak.temperatures_c)
-            raise ValueError(expected(least, got, "soak: temperatures_c"))
+            least = f"{self.degree + 2} temperatures for degree {self.degree}"
+            raise ValueError(expected(least, len(self.soak.temperatures_c), "soak: temperatures_c"))
         if self.sweep:
             least_s = HEAD_S + self.record_s
             _check_between("sweep: every_s", self.sweep.every_s, least_s, 3600.0, "s")
@@ -260,7 +261,7 @@ class _Plan:
             yield self._go_to(temp_c, soak.ramp_k_per_min)
             self._t_s += math.ceil(soak.dwell_s)
             for position in self._positions:
-                yield Take(at_s=self._t_s, segment="soak", part=part, position=position)
+                yield Take(at_s=self._t_s, segment=SOAK, part=part, position=position)
                 self._t_s += each_s
 
     def sweep_actions(self, name: str, rate: float) -> Iterator[Action]:

@@ -1,0 +1,316 @@
+"""Thermal runs on a bench in memory: what they find of a unit that is known, what they refuse, how they go on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from psabench.boards.psa2.frames import KELVIN_DEGC, TEMP_CODES_PER_K, Frames
+from psabench.budget.accuracy import EXACT, BenchAccuracy
+from psabench.errors import BadInput, BenchError, LinkError
+from psabench.passport.entry import runs_of_result
+from psabench.report import thermal_grading, thermal_page
+from psabench.thermal.bench import CASE_CHANNEL, sample_of_frames
+from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
+from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
+from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
+from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
+from psabench.thermal.schedule import Schedule, Setting, Soak, Take, planned_actions, schedule_of_dict
+
+from tests.py.support.thermal_bench import UNITS, FakeThermalBench
+
+START = RunStart(origin_s=0.0, chamber_degc=25.0)
+# The article's range, ten times as fast, for lags of a tenth.
+WHOLE = schedule_of_dict(
+    {
+        "degree": 6,
+        "soak": {
+            "temperatures_c": [-60, -45, -30, -15, 0, 15, 30, 45, 60, 75, 85],
+            "ramp_k_per_min": 40,
+            "dwell_s": 400,
+        },
+        "sweep": {"rates_k_per_min": [5], "every_s": 6, "rest_s": 400, "turn_s": 240, "ramp_k_per_min": 40},
+    },
+    "test",
+    "whole",
+)
+SHORT = schedule_of_dict(
+    {
+        "low_c": 20,
+        "high_c": 50,
+        "degree": 1,
+        "soak": {"temperatures_c": [20, 35, 50], "ramp_k_per_min": 20, "dwell_s": 200},
+        "sweep": {"rates_k_per_min": [10], "every_s": 6, "rest_s": 200, "ramp_k_per_min": 20},
+    },
+    "test",
+    "short",
+)
+
+SLOW = replace(SHORT, soak=Soak(temperatures_c=(20.0, 35.0, 50.0), ramp_k_per_min=20.0, dwell_s=3000.0))
+
+
+def found_by(recordings: Sequence[Recording], schedule: Schedule) -> ThermalResult:
+    return estimate_run(recordings, schedule, 9.81, BenchAccuracy(**EXACT))
+
+
+@pytest.fixture(scope="module")
+def whole() -> ThermalResult:
+    return found_by(measure_schedule(FakeThermalBench(), WHOLE, START, ThermalWatch()), WHOLE)
+
+
+@pytest.fixture(scope="module")
+def short() -> list[Recording]:
+    return measure_schedule(FakeThermalBench(), SHORT, START, ThermalWatch())
+
+
+# ---- what is found
+
+
+@pytest.mark.parametrize("name", ["soak", "sweep-1"])
+def test_both_methods_find_the_units_that_are_there(whole: ThermalResult, name: str) -> None:
+    found = {e.name: e for e in whole.estimates[name]}
+    for axis, unit in zip("xyz", UNITS, strict=True):
+        zero = found[f"zero_{axis}_ug"]
+        assert abs(zero.value - float(unit.zero_ug(np.array(30.0)))) <= zero.ci_half
+        assert found[f"scale_{axis}_v_per_g"].value == pytest.approx(1.19, abs=2e-6)
+    for name_of, e in found.items():
+        if name_of.startswith("base"):
+            want = 5.0 if name_of in ("base_xy_arcsec", "base_yz_arcsec", "base_zx_arcsec") else 0.0
+            assert abs(e.value - want) <= e.ci_half
+
+
+def test_one_leg_is_good_both_need_the_lag(whole: ThermalResult) -> None:
+    (sweep,) = whole.sweeps
+    for axis in "xyz":
+        r = residuals_of(sweep, f"zero_{axis}_ug")
+        assert r.one_leg is not None
+        assert r.other_leg is not None
+        assert r.both_legs is not None
+        assert r.one_leg <= 0.7  # the article
+        assert r.best <= 0.7
+        assert 8.0 < r.other_leg < 16.0  # the fact sheet: 11.7 in the median of units with a play
+        assert 4.0 < r.both_legs < 8.0
+
+
+def test_the_lags_are_found(whole: ThermalResult) -> None:
+    (sweep,) = whole.sweeps
+    assert case_lag_s(whole.recordings, "sweep-1") == pytest.approx(18.0, rel=0.1)
+    for axis in "xyz":
+        lag = sweep.fits[f"zero_{axis}_ug"].best.lag
+        assert lag is not None
+        assert lag.tau_s == pytest.approx(36.0, rel=0.05)
+        assert lag.per_k == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_lag_predicts_how_the_methods_differ(whole: ThermalResult) -> None:
+    soak, (sweep,) = whole.method("soak"), whole.sweeps
+    assert soak is not None
+    for axis in "xyz":
+        d = difference_of(soak, sweep, f"zero_{axis}_ug")
+        assert d.loop is not None
+        assert d.less_soak == pytest.approx(d.less_soak_predicted, rel=0.1)
+        assert d.loop == pytest.approx(d.loop_predicted, rel=0.1)
+        assert d.loop == pytest.approx(2 * d.less_soak, rel=0.25)
+
+
+def test_what_the_scale_of_the_head_shows_is_taken_out() -> None:
+    bench = FakeThermalBench(head_arcsec=60.0)
+    points = points_of(measure_schedule(bench, SHORT, START, ThermalWatch()))["soak"]
+    assert np.abs(points.base_arcsec[:, 0, 1] - 5.0).max() < 0.5
+    assert np.abs(points.base_arcsec[:, 0, 2]).max() < 0.5
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("every_s", [20.0, 36.0, 60.0])
+def test_interpolation_is_not_worse_than_it_says(every_s: float, phase: float) -> None:
+    """Where a sweep turns, the worst place."""
+    bench = FakeThermalBench(start_c=0.0)
+    bench.set_chamber(60.0, 5.0)
+    element = []
+    for second in range(1500):
+        if second == 720:
+            bench.set_chamber(0.0, 5.0)
+        bench.wait_until(float(second))
+        element.append(bench.element_c)
+    every = np.array(element)[:, None]
+    taken = np.arange(phase * every_s, 1499.0, every_s).astype(int)
+    inside = np.arange(taken[1], taken[-2])
+    off = np.abs(interpolate_cubic(taken.astype(float), every[taken], inside.astype(float)) - every[inside])
+    said = left_out_error(taken.astype(float), every[taken], np.zeros(1))
+    assert off.max() <= said.max()
+    assert said.max() <= 10 * off.max()
+    assert np.sqrt(np.mean(off**2)) <= np.sqrt(np.mean(said**2))
+
+
+# ---- what stops a run
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"rate_part": 0.5}, "it does not follow"),
+        ({"rate_part": 1e-6}, "it does not follow"),
+        ({"readout_k": 4.0}, "or reads wrong"),
+        ({"case_tau_s": 1e6}, "case: expected 33.9 to 51.0 degC .* got 25.1"),
+    ],
+)
+def test_a_chamber_that_does_not_follow_ends_the_run(fault: dict[str, Any], says: str) -> None:
+    seen: list[Recording] = []
+    with pytest.raises(BenchError, match=says) as e:
+        measure_schedule(FakeThermalBench(**fault), SLOW, START, ThermalWatch(store=seen.append))
+    assert seen  # what was recorded before is kept
+    assert "\n" not in str(e.value)
+
+
+def frames_of(**columns: np.ndarray) -> Frames:
+    n = 200
+    some, none_s = np.zeros(n, dtype=np.int64), np.zeros(n)
+    codes = np.full(n, round((20.0 - KELVIN_DEGC) * TEMP_CODES_PER_K))
+    given = {"u_v": np.ones((n, 3)), "temp_code": codes, "temp_channel": np.arange(n) % 4, "clipped": some > 0}
+    given |= {"settled": some == 0} | columns
+    return Frames(t_rx_s=none_s, t_sample_s=none_s, seq=some, **given)
+
+
+def test_a_recording_is_the_means_of_its_frames() -> None:
+    s = sample_of_frames(frames_of(), 7.0, 2.0)
+    assert s.u_v.tolist() == [0.5, 0.5, 0.5]
+    assert s.temps_degc == pytest.approx([20.0] * 4, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        ({"temp_code": np.where(np.arange(200) % 4 == CASE_CHANNEL, 0, 19000)}, "channel case: .* 0 K: it is open"),
+        ({"temp_code": np.full(200, 30000)}, "sensor of channel x: expected -90 to 130 degC, got 184"),
+        ({"temp_channel": np.zeros(200, dtype=np.int64)}, "channel y: expected readings, got none in 200 samples"),
+        ({"clipped": np.ones(200, dtype=bool)}, "channel x: expected readings within its range, got one at its limit"),
+        ({"settled": np.zeros(200, dtype=bool)}, "expected settled readings, got 200 that are not"),
+    ],
+)
+def test_a_sensor_that_gives_nothing_is_named(columns: dict[str, np.ndarray], says: str) -> None:
+    with pytest.raises(LinkError, match=says):
+        sample_of_frames(frames_of(**columns), 0.0, 1.0)
+
+
+def test_a_position_that_is_missing_is_named(short: list[Recording]) -> None:
+    cut = [r for r in short if not (r.segment == "soak" and r.part == 1 and r.position == "z_up")]
+    points = points_of(cut)["soak"]
+    assert points.notes == ("soak, temperature 2: no z_up; left out",)
+    assert len(points.t_s) == 2
+    with pytest.raises(BadInput, match="recordings of each position, got fewer of y_down"):
+        points_of([r for r in short if r.segment != "soak" and (r.position != "y_down" or r.part < 3)])
+
+
+# ---- files
+
+
+def stored_in(tmp_path: Path, recordings: Sequence[Recording]) -> RunFolder:
+    folder = RunFolder(tmp_path)
+    with folder.open_series() as series:
+        series.store_rows(map(recording_row, recordings))
+    return folder
+
+
+def test_recordings_are_read_as_they_were_stored_without_the_row_that_was_cut(
+    short: list[Recording], tmp_path: Path
+) -> None:
+    folder = stored_in(tmp_path, short[:5])
+    with folder.data.open("a") as f:
+        f.write("77.1,soak,0,x_do")
+    assert read_recordings(folder.data) == short[:5]
+    assert folder.keep_rows(3) == short[:3]
+    with folder.open_series() as series:
+        series.store_rows(map(recording_row, short[3:5]))
+    assert read_recordings(folder.data) == short[:5]
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "says"),
+    [
+        (0, "t_s,segment", "thermal.csv:1: expected the columns"),
+        (2, "1,soak,0,x_over,9", "thermal.csv:3: expected a recording"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_its_line(
+    short: list[Recording], tmp_path: Path, line: int, text: str, says: str
+) -> None:
+    folder = stored_in(tmp_path, short[:5])
+    lines = folder.data.read_text().splitlines()
+    lines[line] = text
+    folder.data.write_text("\n".join(lines) + "\n")
+    with pytest.raises(BadInput, match=says):
+        read_recordings(folder.data)
+
+
+def test_the_last_whole_checkpoint_counts(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    assert folder.last_checkpoint(10) is None
+    folder.store_checkpoint(6, lambda p: p.write_text("six"))
+    folder.store_checkpoint(12, lambda p: p.write_text("twelve"))
+    (tmp_path / "checkpoint-18.part").write_text("half")
+    assert folder.last_checkpoint(13) == (12, tmp_path / "checkpoint-12.snapshot")
+    assert folder.last_checkpoint(11) is None  # 6 went when 12 was there
+    with pytest.raises(ZeroDivisionError):
+        folder.store_checkpoint(18, lambda p: 1 // 0)
+    assert folder.last_checkpoint(99) == (12, tmp_path / "checkpoint-12.snapshot")
+
+
+def test_a_run_goes_on_where_it_was_interrupted(short: list[Recording]) -> None:
+    bench, seen = FakeThermalBench(), []
+
+    def store(r: Recording) -> None:
+        seen.append(r)
+        if len(seen) == 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        measure_schedule(bench, SHORT, START, ThermalWatch(store=store))
+    again = measure_schedule(bench, SHORT, START, ThermalWatch(), seen)
+    assert again == short
+
+
+def test_on_a_bench_that_has_gone_on_the_part_that_was_cut_begins_again(short: list[Recording]) -> None:
+    actions = planned_actions(SHORT, 25.0)
+    takes = [a for a in actions if isinstance(a, Take)]
+    soak = sum(t.segment == "soak" for t in takes)
+    wholes = [whole_parts(actions, n) for n in (0, 5, 6, 11, soak, soak + 7, len(takes))]
+    assert wholes == [0, 0, 6, 6, soak, soak, len(takes)]
+    bench = FakeThermalBench(start_c=5.0, t_s=5000.0)  # it has cooled meanwhile: 30 K up to 35 in place of 15
+    origin_s = restarted_origin(bench, actions, 6)
+    (first,) = [a for a in actions[6:8] if isinstance(a, Setting)]
+    assert origin_s + first.at_s == 5000.0 + 15.0 / 20.0 * 60.0 + 1.0
+    kept = [replace(r, t_s=r.t_s - 9e3) for r in short[:6]]
+    again = measure_schedule(bench, SHORT, RunStart(origin_s=origin_s, chamber_degc=25.0), ThermalWatch(), kept)
+    assert len(again) == len(short)
+    assert again[6].case_degc == pytest.approx(35.0, abs=0.1)
+
+
+# ---- the report
+
+
+def test_a_passport_takes_the_curves_of_a_report(whole: ThermalResult, tmp_path: Path) -> None:
+    report = thermal_grading.graded_report(whole, None, {"schedule": "whole"})
+    page = thermal_page.write(tmp_path, report)
+    assert "figure 7" in page.read_text()
+    soak, sweep = runs_of_result(tmp_path)
+    assert (soak.method, sweep.method) == ("thermal soak", "thermal sweep-1")
+    curve = {q.name: q.compensation for q in sweep.quantities}["zero_x_ug"]
+    fitted = whole.sweeps[0].fits["zero_x_ug"].best
+    assert curve is not None
+    assert curve.lag == fitted.lag
+    assert float(curve.value_at(20.0)) == float(fitted.value_at(20.0))
+    assert sweep.range_c is not None
+    assert sweep.range_c == pytest.approx((-60.0, 85.0), abs=1.0)
+    sections = json.loads((tmp_path / "result.json").read_text())["sections"]
+    assert [len(s["differences"]) for s in sections] == [0, 12]
+
+
+def test_a_report_without_truth_says_so(whole: ThermalResult) -> None:
+    report = thermal_grading.graded_report(whole, None, {})
+    assert thermal_grading.verdict(report) == "No truth given: the compensations stand alone."
+    assert "sweep at 5 K/min" in thermal_grading.console_lines(report)
