@@ -28,6 +28,7 @@ LEAST_RATE, MOST_RATE = 0.05, 60.0  # K/min; a chamber rejects what it cannot do
 HEAD_S = 5.0  # for a turn of the head and the converter's filter, before a recording
 READY_S = 1.0  # from the origin of a run to its first setting
 DATA_HZ = (250, 500, 1000)
+ENDS = 5  # rounds of a leg more than the degree: the ends have incomplete ones, and what is left out has neighbours
 RISE = (0.1, 0.9)  # part of a warm-up in which its mean rate is taken
 
 
@@ -110,7 +111,7 @@ class Soak:
         if len(set(self.temperatures_c)) != len(self.temperatures_c) or not self.temperatures_c:
             raise ValueError(expected("temperatures, each once", list(self.temperatures_c), "soak: temperatures_c"))
         _check_between("soak: ramp_k_per_min", self.ramp_k_per_min, LEAST_RATE, MOST_RATE, "K/min")
-        _check_between("soak: dwell_s", self.dwell_s, 60.0, 86400.0, "s")
+        _check_between("soak: dwell_s", self.dwell_s, 1.0, 86400.0, "s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +136,7 @@ class Sweep:
         if len(set(self.rates())) != len(self.rates()):
             raise ValueError(expected("rates, each once", list(self.rates()), "sweep: rates_k_per_min"))
         _check_between("sweep: ramp_k_per_min", self.ramp_k_per_min, LEAST_RATE, MOST_RATE, "K/min")
-        _check_between("sweep: rest_s", self.rest_s, 60.0, 86400.0, "s")
+        _check_between("sweep: rest_s", self.rest_s, 1.0, 86400.0, "s")
         _check_between("sweep: turn_s", self.turn_s, 0.0, 86400.0, "s")
 
     def rates(self) -> tuple[float, ...]:
@@ -194,8 +195,8 @@ class Schedule:
             _check_between("sweep: every_s", self.sweep.every_s, least_s, 3600.0, "s")
             for rate in self.sweep.rates():
                 cycles = self._leg_s(rate) / self.sweep.every_s / len(POSITIONS)
-                if cycles < self.degree + 2:
-                    least = f"{self.degree + 2} rounds of the positions a leg for degree {self.degree}"
+                if cycles < self.degree + ENDS:
+                    least = f"{self.degree + ENDS} rounds of the positions a leg for degree {self.degree}"
                     raise ValueError(expected(least, f"{cycles:.1f} at {rate:g} K/min", "sweep: every_s"))
 
     def _leg_s(self, rate: float) -> float:

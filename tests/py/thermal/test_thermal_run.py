@@ -12,14 +12,16 @@ import numpy as np
 import pytest
 from psabench.boards.psa2.frames import KELVIN_DEGC, TEMP_CODES_PER_K, Frames
 from psabench.budget.accuracy import EXACT, BenchAccuracy
-from psabench.errors import BadInput, BenchError, LinkError
+from psabench.errors import BadInput, BenchError, LinkError, OutputError
 from psabench.passport.entry import runs_of_result
+from psabench.procedures.head_bench import Silent
 from psabench.report import thermal_grading, thermal_page
 from psabench.thermal.bench import CASE_CHANNEL, sample_of_frames
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
 from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
 from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
+from psabench.thermal.run import ThermalOptions, run_thermal
 from psabench.thermal.schedule import Schedule, Setting, Soak, Take, planned_actions, schedule_of_dict
 
 from tests.py.support.thermal_bench import UNITS, FakeThermalBench
@@ -45,7 +47,7 @@ SHORT = schedule_of_dict(
         "high_c": 50,
         "degree": 1,
         "soak": {"temperatures_c": [20, 35, 50], "ramp_k_per_min": 20, "dwell_s": 200},
-        "sweep": {"rates_k_per_min": [10], "every_s": 6, "rest_s": 200, "ramp_k_per_min": 20},
+        "sweep": {"rates_k_per_min": [8], "every_s": 6, "rest_s": 200, "ramp_k_per_min": 20},
     },
     "test",
     "short",
@@ -258,6 +260,33 @@ def test_the_last_whole_checkpoint_counts(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError):
         folder.store_checkpoint(18, lambda p: 1 // 0)
     assert folder.last_checkpoint(99) == (12, tmp_path / "checkpoint-12.snapshot")
+
+
+def test_a_full_disk_ends_a_run_in_one_line(short: list[Recording], tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    folder.data.symlink_to("/dev/full")
+    with pytest.raises(OutputError, match=r"thermal\.csv: No space left on device; stored 0 recordings"):
+        folder.open_series()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (None, "expected a folder of psabench run thermal, with thermal-run.json, got none"),
+        ("{", "thermal-run.json: expected the set-up of a run"),
+        ('{"format": 2}', "expected the set-up of a run, format 1"),
+    ],
+)
+def test_a_folder_without_a_run_is_not_resumed(text: str | None, says: str, tmp_path: Path) -> None:
+    if text is not None:
+        (tmp_path / "thermal-run.json").write_text(text)
+    with pytest.raises(BadInput, match=says):
+        run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path), Silent())
+
+
+def test_what_a_run_has_already_is_not_given_again(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="--resume: expected no option that the run has already, got --seed"):
+        run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path, seed=3), Silent())
 
 
 def test_a_run_goes_on_where_it_was_interrupted(short: list[Recording]) -> None:

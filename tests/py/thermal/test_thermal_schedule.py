@@ -80,7 +80,7 @@ def test_the_rate_of_service_is_that_of_the_middle_of_a_warm_up() -> None:
         ({"sweep": SWEEP | {"every_s": 3}}, "sweep: every_s: expected 6 to 3600 s, got 3"),
         (
             {"sweep": SWEEP | {"every_s": 120}},
-            "expected 4 rounds of the positions a leg for degree 2, got 2.5 at 1 K/min",
+            "expected 7 rounds of the positions a leg for degree 2, got 2.5 at 1 K/min",
         ),
         ({"sweep": SWEEP | {"legs": "down"}}, "sweep: legs: expected both or up, got down"),
         (
