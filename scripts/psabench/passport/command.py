@@ -19,7 +19,7 @@ STORE = Path("build/passports.sqlite")
 EPILOG = """\
 A unit is known by its serial number. `add` enters the sections of a calibration's result.json, a run of the unit each;
 a run of the same method that began later supersedes the one before, which stays. What is there already is not entered
-twice. `header` is for runs that a program has entered with a curve (docs/procedures/compensation.md).
+twice. `header` is for runs with curves against temperature, as of `psabench run thermal`.
 
 examples:
   psabench run turns --out build/a

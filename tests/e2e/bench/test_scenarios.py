@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import socket
 from contextlib import closing
 from pathlib import Path
@@ -164,6 +165,22 @@ def test_quartz_chamber_has_three_of_a_batch_for_each_seed() -> None:
             assert again["quartz"] == x["quartz"]
             assert 0 < abs(again["sensor_a"] / x["sensor_a"] - 1) < 6 * 2**0.5 * (12.6 + 18.7) * 1e-6
     assert passports[0] == passports[1] != passports[2]
+
+
+def test_quartz_run_in_has_what_ten_cycles_leave() -> None:
+    """The same units as those of quartz_chamber, but for the stress of the glue: a thousandth of it and less."""
+    found = []
+    for name in ("quartz_chamber", "quartz_run_in"):
+        with Bench.start(name) as b:
+            found.append(next(iter(b.truth()["units"].values()))["axes"]["x"])
+    welded, run_in = (x["quartz"] for x in found)
+    assert {**run_in, "cycles": 0} == welded
+    assert run_in["cycles"] == 10
+    assert welded["glue_keep"] ** 10 < 0.01
+    # With y up at 0 deg the base error takes its part of -1 g.
+    lost_ug = welded["glue_ug"] - math.radians(welded["glue_arcsec"] / 3600) * 1e6
+    changed_ug = (found[1]["sensor_a"] - found[0]["sensor_a"]) / welded["scale_a_per_g"] * 1e6
+    assert changed_ug == pytest.approx(-lost_ug * (1 - welded["glue_keep"] ** 10), rel=0.01)
 
 
 @pytest.mark.parametrize(("name", "hz", "low", "high"), [("stream", 1000, 0.0, 1.0), ("fast", 4000, 0.44, 0.54)])

@@ -349,7 +349,7 @@ static void the_shipped_scenarios_and_profiles_load(void **state)
     (void)state;
     static const char *const scenarios[] = {"converters", "calibrate",     "quiet",         "stream",        "fast",
                                             "multi",      "brownout",      "chamber_sweep", "faults",        "fleet64",
-                                            "fleet1000",  "six_positions", "table_rate",    "quartz_chamber"};
+                                            "fleet1000",  "six_positions", "table_rate",    "quartz_chamber", "quartz_run_in"};
     static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16",  "lab32",
                                            "psa1",    "psd1",   "pmka",    "pik", "pik5", "pik6"};
     if (access("proto/scenarios", R_OK) != 0) skip();
@@ -413,7 +413,7 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     assert_string_equal(why, "nope: expected a path or a name from proto/scenarios: "
                              "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
                              "gyrocompass, gyrocompass_ideal, "
-                             "multi, quartz_chamber, quiet, realistic, six_positions, stream, table_rate");
+                             "multi, quartz_chamber, quartz_run_in, quiet, realistic, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
