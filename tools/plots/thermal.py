@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draw docs/img/thermal_zero.svg and thermal_scale.svg: both methods over the article's range, through the wire.
+"""Draw docs/img/thermal_zero.svg and thermal_scale.svg: both methods over the range of the article.
 
-The unit of examples/thermal: a tenth of the usual lags, ten times the rate. Minutes of computing; same seed, same bytes.
+The unit of examples/thermal: a tenth of the usual lags, ten times the rate. Takes minutes; same seed, same bytes.
 
     tools/plots/thermal.py [docs/img]
 """

@@ -352,7 +352,7 @@ def _gyro(args: argparse.Namespace) -> int:
     return 0 if gyro_grading.within_limits(sections) else 1
 
 
-def _thermal(args: argparse.Namespace) -> int:
+def _run_thermal(args: argparse.Namespace) -> int:
     """Hours in a chamber: what it records is kept as it comes, and it can be resumed."""
     from psabench.report import thermal_grading, thermal_page
     from psabench.thermal import run as thermal_run
@@ -360,10 +360,10 @@ def _thermal(args: argparse.Namespace) -> int:
     done = thermal_run.run_thermal(of_fields(thermal_run.ThermalOptions, args, params=_params(args)), Bar())
     truth = thermal_grading.read_truth(done.folder, done.result.recordings, done.load_v_per_a)
     report = thermal_grading.graded_report(done.result, truth, done.facts)
-    page = thermal_page.write(done.folder.path, report)
+    page = thermal_page.write_page(done.folder.path, report)
     if args.verbose:
         print(thermal_grading.console_lines(report))
-    print(thermal_grading.verdict(report))
+    print(thermal_grading.state_verdict(report))
     print(f"report: {page}")
     return 0 if thermal_grading.within_limits(report) else 1
 
@@ -468,7 +468,7 @@ def _commands() -> Iterator[Command]:
     yield Command(
         name=name,
         summary=summary,
-        handler=_thermal,
+        handler=_run_thermal,
         common=_CHAMBER,
         load=_of_the_chamber,
         examples=_EXAMPLES[name],

@@ -131,7 +131,7 @@ def within_limits(report: ThermalReport) -> bool:
     return all(g.within is not False for g in report.graded)
 
 
-def verdict(report: ThermalReport) -> str:
+def state_verdict(report: ThermalReport) -> str:
     """What was compared with what, and how it came out."""
     if not report.graded:
         return "No truth given: the compensations stand alone."
@@ -178,12 +178,12 @@ def residuals_table(report: ThermalReport, kinds: Sequence[str] = ("zero", "scal
         for q in (q for q in quantity_names() if q.split("_")[0] in kinds):
             r, lag = residuals_of(m, q), m.fits[q].best.lag
             one = r.best if r.one_leg is None else r.one_leg
-            cells = [_percent(x) for x in (one, r.other_leg, r.both_legs, r.best if lag else None)]
+            cells = [_percent_text(x) for x in (one, r.other_leg, r.both_legs, r.best if lag else None)]
             rows.append((q, m.title, *cells, f"{lag.tau_s:.0f}" if lag else ""))
     return rows
 
 
-def _percent(x: float | None) -> str:
+def _percent_text(x: float | None) -> str:
     return "" if x is None else f"{x:.2f} %"
 
 
@@ -196,7 +196,7 @@ def difference_table(report: ThermalReport, sweep: str, kinds: Sequence[str] = (
             scale, unit = _shown_unit(d.quantity)
             cells = ["" if v is None else f"{v * scale:.3g}" for v in values]
             loop = None if d.loop is None else d.percent(d.loop)
-            rows.append((d.quantity, *cells, unit, _percent(d.percent(d.less_soak)), _percent(loop)))
+            rows.append((d.quantity, *cells, unit, _percent_text(d.percent(d.less_soak)), _percent_text(loop)))
     return rows
 
 
@@ -214,7 +214,7 @@ def rates_table(report: ThermalReport) -> Table:
             max((x for x in column if x is not None), default=None)
             for column in zip(*((r.one_leg, r.other_leg, r.both_legs, r.best) for r in found), strict=True)
         ]
-        rows.append((f"{m.rate_k_per_min:g}", *map(_percent, worst)))
+        rows.append((f"{m.rate_k_per_min:g}", *map(_percent_text, worst)))
     return rows
 
 
@@ -222,7 +222,7 @@ def degree_table(method: Method, quantity: str) -> Table:
     """Residual, AIC and BIC of each degree."""
     rows: Table = [("degree", "largest residual", "rms", "AIC", "BIC")]
     for d in degrees_of(method, quantity):
-        rows.append((str(d.degree), _percent(d.most_percent), f"{d.rms:.3g}", f"{d.aic:.1f}", f"{d.bic:.1f}"))
+        rows.append((str(d.degree), _percent_text(d.most_percent), f"{d.rms:.3g}", f"{d.aic:.1f}", f"{d.bic:.1f}"))
     return rows
 
 

@@ -21,7 +21,7 @@ CAPTIONS = {
     "scale": "Scale factor by both methods (the article's figure 6), as its change from the value at the normal "
     "temperature. Points: soak. Lines: the legs of the sweep against the temperature of the case. Below: the same less "
     "the soak's curve; dashed, what that curve becomes with the lag that the sweep's fit has found.",
-    "zero": "Zero signal by both methods (the article's figure 7), likewise.",
+    "zero": "Zero signal by both methods (the article's figure 7), in the same way.",
     "residual": "What the fits of the zero signal leave on both legs, percent of the largest zero: without a lag, and "
     "with it.",
 }
@@ -34,7 +34,7 @@ WHY = (
 )
 
 
-def write(folder: Path, report: ThermalReport) -> Path:
+def write_page(folder: Path, report: ThermalReport) -> Path:
     """Both files into `folder`, each whole or not at all; returns the page. Raises as write_report."""
     return write_report(folder, grading.result_dict(report), html_page(report))
 
@@ -42,16 +42,16 @@ def write(folder: Path, report: ThermalReport) -> Path:
 def html_page(report: ThermalReport) -> str:
     """The whole page. Same input, same bytes."""
     body = [
-        verdict_line(grading.verdict(report), grading.within_limits(report) if report.graded else None),
-        *_comparison(report),
-        section("Largest residuals", table(grading.residuals_table(report)), *_rates(report)),
+        verdict_line(grading.state_verdict(report), grading.within_limits(report) if report.graded else None),
+        *_compare_methods(report),
+        section("Largest residuals", table(grading.residuals_table(report)), *_rate_parts(report)),
         *(_method_section(report, m, f"m{k}") for k, m in enumerate(report.result.methods)),
         _how_to_read(report),
     ]
     return whole_page(TITLE, report.facts, body)
 
 
-def _comparison(report: ThermalReport) -> Iterator[str]:
+def _compare_methods(report: ThermalReport) -> Iterator[str]:
     pictures = [
         figure(plots.svg(curve_figure(report, kind), kind), escape(CAPTIONS[kind])) for kind in ("scale", "zero")
     ]
@@ -64,7 +64,7 @@ def _comparison(report: ThermalReport) -> Iterator[str]:
     yield section("The two methods", *pictures, *tables, *why)
 
 
-def _rates(report: ThermalReport) -> Iterator[str]:
+def _rate_parts(report: ThermalReport) -> Iterator[str]:
     if report.result.sweeps:
         yield f"<h2>Zero signals against the rate</h2>{table(grading.rates_table(report))}"
     warm_up = report.result.schedule.sweep and report.result.schedule.sweep.warm_up

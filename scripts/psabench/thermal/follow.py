@@ -51,7 +51,9 @@ class FollowCheck:
         want = self.expected_degc(t_s)
         if abs(shown_degc - want) > RAMP_K:
             after = f"{(t_s - self._at_s) / 60.0:.3g} min after it was set to {self._setting.temp_degc:g}"
-            raise BenchError(expected(f"{want:.1f} degC {after}", f"{shown_degc:.1f}: it does not follow or reads wrong", "chamber"))
+            raise BenchError(
+                expected(f"{want:.1f} degC {after}", f"{shown_degc:.1f}: it does not follow or reads wrong", "chamber")
+            )
         # The case is a mean of what the air has been, so it is between the extremes, but for what is older.
         recent = [t for _, t in self._readings]
         low = min(recent) - CASE_K - LEFT * (min(recent) - self._low)

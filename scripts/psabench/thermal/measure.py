@@ -13,7 +13,7 @@ from psabench.thermal.records import Recording
 from psabench.thermal.schedule import SOAK, Action, Schedule, Setting, Take, planned_actions
 
 
-def _drop(_: object) -> None:
+def _drop_it(_: object) -> None:
     """No one wants it."""
 
 
@@ -22,8 +22,8 @@ class ThermalWatch:
     """Who follows a run. store: gets each recording as soon as it exists; checkpoint: after each round of positions,
     with the number of recordings."""
 
-    store: Callable[[Recording], object] = _drop
-    checkpoint: Callable[[int], object] = _drop
+    store: Callable[[Recording], object] = _drop_it
+    checkpoint: Callable[[int], object] = _drop_it
     progress: Progress = field(default_factory=Silent)
 
 

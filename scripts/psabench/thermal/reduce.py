@@ -88,13 +88,13 @@ def points_of(recordings: Sequence[Recording]) -> dict[str, Points]:
 # ---- positions
 
 
-def _volts(r: Recording) -> Array:
+def _volts_of(r: Recording) -> Array:
     return np.array([r.x_v, r.y_v, r.z_v])
 
 
-def _levelled(rows: Sequence[Recording]) -> Array:
+def _level_rows(rows: Sequence[Recording]) -> Array:
     """Readings as if the head had met each position, (n, 3): what its scale shows beside it is taken out."""
-    u = np.array([_volts(r) for r in rows])
+    u = np.array([_volts_of(r) for r in rows])
     at = [POSITIONS[r.position] for r in rows]
     scale = np.array([_rough_scale(u, at, i) for i in range(3)])
     off = [gravity_at(p, r.alpha_deg) - p.sign * np.eye(3)[p.axis] for p, r in zip(at, rows, strict=True)]
@@ -136,7 +136,7 @@ def _history_of(rows: Sequence[Recording]) -> tuple[Array, Array]:
 
 def _soak_points(rows: Sequence[Recording]) -> Points:
     """A point a temperature; those that lack a position are left out, with a note."""
-    level = _levelled(rows)
+    level = _level_rows(rows)
     parts: dict[int, dict[str, int]] = {}
     for k, r in enumerate(rows):
         parts.setdefault(r.part, {})[r.position] = k
@@ -170,7 +170,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
 
 def _sweep_points(rows: Sequence[Recording]) -> Points:
     """A point a round, in its middle, where every position has been recorded before and after it."""
-    level, (t_s, case_c) = _levelled(rows), _history_of(rows)
+    level, (t_s, case_c) = _level_rows(rows), _history_of(rows)
     name = rows[0].segment
     visits = {p: [k for k, r in enumerate(rows) if r.position == p] for p in POSITIONS}
     few = [p for p, at in visits.items() if len(at) < LEAST_VISITS]

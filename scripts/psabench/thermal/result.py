@@ -176,10 +176,10 @@ def estimate_at(m: Method, quantity: str, temp_c: float, accuracy: BenchAccuracy
     c = m.fits[quantity].best
     sd = float(c.half_width([temp_c])[0]) / t_quantile(c.dof)
     made = estimate(quantity, symbol_of(quantity), unit_of(quantity), float(c.value_at(temp_c)), sd, c.dof)
-    return expand_estimate(made, [part for part in _components(m, quantity, temp_c, accuracy) if part.u > 0.0])
+    return expand_estimate(made, [part for part in _type_b_parts(m, quantity, temp_c, accuracy) if part.u > 0.0])
 
 
-def _components(m: Method, quantity: str, temp_c: float, a: BenchAccuracy) -> list[Component]:
+def _type_b_parts(m: Method, quantity: str, temp_c: float, a: BenchAccuracy) -> list[Component]:
     """What the scatter of the fit does not show, in the quantity's unit."""
     kind, axes = quantity.split("_")[:2]
     c, i = m.fits[quantity].best, AXES.index(axes[0])

@@ -337,7 +337,7 @@ def _made_part(kind: type[Part], values: Mapping[str, Any]) -> Part:
     made = {}
     for name, value in values.items():
         declared = str(kind.__dataclass_fields__[name].type)  # type: ignore[attr-defined]
-        made[name] = _converted(name, value, declared)
+        made[name] = _convert_value(name, value, declared)
     missing = [n for n, f in kind.__dataclass_fields__.items() if n not in made and _has_no_default(f)]  # type: ignore[attr-defined]
     if missing:
         raise ValueError(expected(", ".join(missing), "none", kind.__name__.lower()))
@@ -350,7 +350,7 @@ def _has_no_default(f: Any) -> bool:
     return f.default is MISSING and f.default_factory is MISSING
 
 
-def _converted(name: str, value: Any, declared: str) -> Any:
+def _convert_value(name: str, value: Any, declared: str) -> Any:
     if declared.startswith("tuple"):
         if not isinstance(value, Sequence) or isinstance(value, str):
             raise ValueError(expected("a list", value, name))

@@ -12,8 +12,7 @@ import numpy as np
 from psabench.estimate.face import Face
 from psabench.thermal.bench import Sample
 from psabench.thermal.schedule import Position
-
-from tests.py.support.quartz_units import QuartzUnit
+from quartz_units import QuartzUnit
 
 UNITS = (
     QuartzUnit(zero=100.0, hump=-300.0, centre_c=10.0, width_k=57.0, slope_per_k=0.1),

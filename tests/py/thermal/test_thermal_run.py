@@ -23,8 +23,7 @@ from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
 from psabench.thermal.run import ThermalOptions, run_thermal
 from psabench.thermal.schedule import Schedule, Setting, Soak, Take, planned_actions, schedule_of_dict
-
-from tests.py.support.thermal_bench import UNITS, FakeThermalBench
+from thermal_bench import UNITS, FakeThermalBench
 
 START = RunStart(origin_s=0.0, chamber_degc=25.0)
 # The article's range, ten times as fast, for lags of a tenth.
@@ -324,7 +323,7 @@ def test_on_a_bench_that_has_gone_on_the_part_that_was_cut_begins_again(short: l
 
 def test_a_passport_takes_the_curves_of_a_report(whole: ThermalResult, tmp_path: Path) -> None:
     report = thermal_grading.graded_report(whole, None, {"schedule": "whole"})
-    page = thermal_page.write(tmp_path, report)
+    page = thermal_page.write_page(tmp_path, report)
     assert "figure 7" in page.read_text()
     soak, sweep = runs_of_result(tmp_path)
     assert (soak.method, sweep.method) == ("thermal soak", "thermal sweep-1")
@@ -341,5 +340,5 @@ def test_a_passport_takes_the_curves_of_a_report(whole: ThermalResult, tmp_path:
 
 def test_a_report_without_truth_says_so(whole: ThermalResult) -> None:
     report = thermal_grading.graded_report(whole, None, {})
-    assert thermal_grading.verdict(report) == "No truth given: the compensations stand alone."
+    assert thermal_grading.state_verdict(report) == "No truth given: the compensations stand alone."
     assert "sweep at 5 K/min" in thermal_grading.console_lines(report)

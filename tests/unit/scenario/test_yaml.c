@@ -347,9 +347,10 @@ static void cut_off_anywhere_a_scenario_is_refused_or_sound(void **state)
 static void the_shipped_scenarios_and_profiles_load(void **state)
 {
     (void)state;
-    static const char *const scenarios[] = {"converters", "calibrate",     "quiet",         "stream",        "fast",
-                                            "multi",      "brownout",      "chamber_sweep", "faults",        "fleet64",
-                                            "fleet1000",  "six_positions", "table_rate",    "quartz_chamber", "quartz_run_in"};
+    static const char *const scenarios[] = {"converters", "calibrate",      "quiet",        "stream",
+                                            "fast",       "multi",          "brownout",     "chamber_sweep",
+                                            "faults",     "fleet64",        "fleet1000",    "six_positions",
+                                            "table_rate", "quartz_chamber", "quartz_run_in"};
     static const char *const profiles[] = {"article", "intent", "ungated", "w24", "w16",  "lab32",
                                            "psa1",    "psd1",   "pmka",    "pik", "pik5", "pik6"};
     if (access("proto/scenarios", R_OK) != 0) skip();
@@ -410,10 +411,11 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
 {
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
-    assert_string_equal(why, "nope: expected a path or a name from proto/scenarios: "
-                             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
-                             "gyrocompass, gyrocompass_ideal, "
-                             "multi, quartz_chamber, quartz_run_in, quiet, realistic, six_positions, stream, table_rate");
+    assert_string_equal(why,
+                        "nope: expected a path or a name from proto/scenarios: "
+                        "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
+                        "gyrocompass, gyrocompass_ideal, "
+                        "multi, quartz_chamber, quartz_run_in, quiet, realistic, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
