@@ -358,7 +358,7 @@ def _run_thermal(args: argparse.Namespace) -> int:
     from psabench.thermal import run as thermal_run
 
     done = thermal_run.run_thermal(of_fields(thermal_run.ThermalOptions, args, params=_params(args)), Bar())
-    truth = thermal_grading.read_truth(done.folder, done.result.recordings, done.load_v_per_a)
+    truth = thermal_grading.read_truth(done.folder, done.result.recordings)
     report = thermal_grading.graded_report(done.result, truth, done.facts)
     page = thermal_page.write_page(done.folder.path, report)
     if args.verbose:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,12 +68,10 @@ class ThermalReport:
     facts: Mapping[str, str]
 
 
-def read_truth(
-    folder: RunFolder, recordings: Sequence[Recording], load_v_per_a: Sequence[float] | None
-) -> ThermalTruth | None:
+def read_truth(folder: RunFolder, recordings: Sequence[Recording]) -> ThermalTruth | None:
     """None: nothing is known, or the run has no soak. Raises BadInput for a file of other recordings."""
-    rows = list(csv.reader(whole_lines(folder.truth)))[1:]
-    if load_v_per_a is None or not rows or not any(r.segment == "soak" for r in recordings):
+    rows = _truth_rows(folder.truth)
+    if not rows or not any(r.segment == "soak" for r in recordings):
         return None
     if len(rows) < len(recordings):
         raise BadInput(expected(f"{len(recordings)} rows", len(rows), folder.truth))
@@ -80,18 +79,36 @@ def read_truth(
     element: dict[int, list[float]] = {}
     for r, row in zip(recordings, rows, strict=False):
         if r.segment == "soak":
-            at = dict(zip(TRUTH_COLUMNS, map(float, row), strict=True))
-            true.append(_true_recording(r, at, load_v_per_a))
-            element.setdefault(r.part, []).append(at["element_degc"])
+            true.append(_true_recording(r, row))
+            element.setdefault(r.part, []).append(row["element_degc"])
     return ThermalTruth(points=points_of(true)["soak"], element_c=np.array([np.mean(t) for t in element.values()]))
 
 
-def _true_recording(r: Recording, at: Mapping[str, float], load_v_per_a: Sequence[float]) -> Recording:
+def _truth_rows(path: Path) -> list[dict[str, float]]:
+    """By column. Raises BadInput for a file of another form."""
+    rows = list(csv.reader(whole_lines(path)))
+    if rows and tuple(rows[0]) != TRUTH_COLUMNS:
+        raise BadInput(expected(f"the columns {','.join(TRUTH_COLUMNS)}", ",".join(rows[0]), f"{path}:1"))
+    try:
+        return [dict(zip(TRUTH_COLUMNS, map(float, row), strict=True)) for row in rows[1:]]
+    except ValueError as e:
+        raise BadInput(expected("numbers in each column", e, path)) from e
+
+
+def _true_recording(r: Recording, at: Mapping[str, float]) -> Recording:
     """What it should have been: true outputs at the loads, the head's true angle."""
     across = at["a_z_g"] if POSITIONS[r.position].face in SIDE_FACES else at["a_y_g"]
-    x, y, z = (at[f"out_{a}_a"] * load for a, load in zip("xyz", load_v_per_a, strict=True))
     alpha_deg = float(np.degrees(np.arctan2(-at["a_x_g"], -across)))
-    return replace(r, alpha_deg=alpha_deg, x_v=x, y_v=y, z_v=z, sd_x_v=0.0, sd_y_v=0.0, sd_z_v=0.0)
+    return replace(
+        r,
+        alpha_deg=alpha_deg,
+        x_v=at["out_x_v"],
+        y_v=at["out_y_v"],
+        z_v=at["out_z_v"],
+        sd_x_v=0.0,
+        sd_y_v=0.0,
+        sd_z_v=0.0,
+    )
 
 
 def graded_report(result: ThermalResult, truth: ThermalTruth | None, facts: Mapping[str, str]) -> ThermalReport:

@@ -51,7 +51,7 @@ class Recording:
 
 COLUMNS = tuple(f.name for f in fields(Recording))
 TEXTS, WHOLE = ("segment", "position"), ("part",)
-TRUTH_COLUMNS = ("t_s", "case_degc", "element_degc", *(f"a_{c}_g" for c in "xyz"), *(f"out_{c}_a" for c in "xyz"))
+TRUTH_COLUMNS = ("t_s", "case_degc", "element_degc", *(f"a_{c}_g" for c in "xyz"), *(f"out_{c}_v" for c in "xyz"))
 
 
 def recording_row(r: Recording) -> list[object]:

@@ -7,7 +7,8 @@ sweep begins again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -65,7 +66,6 @@ class ThermalRun:
 
     result: ThermalResult
     folder: RunFolder
-    load_v_per_a: tuple[float, ...] | None  # of the axes, by the truth; None: no truth
     facts: dict[str, str]
 
 
@@ -74,13 +74,13 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
     folder = RunFolder(options.resume or options.out)
     setup = _resumed_setup(options, folder) if options.resume else _new_setup(options)
     schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
-    with ExitStack() as stack:
-        session = _Session(options, setup, folder, schedule, stack)
-        recordings = session.measure(progress)
-        load = session.load_v_per_a()
+    recordings = _whole_recordings(setup, folder, schedule) if options.resume else None
+    if recordings is None:
+        with ExitStack() as stack:
+            recordings = _Session(options, setup, folder, schedule, stack).measure_rest(progress)
     accuracy = _accuracy_of(options, ours=bool(setup["ours"]) and not setup["scenario"])
     result = estimate_run(recordings, schedule, float(setup["g_mps2"]), accuracy)
-    return ThermalRun(result=result, folder=folder, load_v_per_a=load, facts=_facts_of(setup))
+    return ThermalRun(result=result, folder=folder, facts=_facts_of(setup))
 
 
 def _accuracy_of(options: ThermalOptions, *, ours: bool) -> BenchAccuracy:
@@ -181,7 +181,7 @@ class _Session:
             return RunStart(origin_s=float(self._setup["origin_s"]), chamber_degc=degc)
         return RunStart(origin_s=restarted_origin(self._wire, actions, whole), chamber_degc=degc)
 
-    def measure(self, progress: Progress) -> list[Recording]:
+    def measure_rest(self, progress: Progress) -> list[Recording]:
         start = self._begun_run()
         with self._folder.open_series() as series, self._truth_store() as note_truth:
 
@@ -202,21 +202,25 @@ class _Session:
         if self._bench.truth_path is None:
             yield lambda r: None
             return
-        with self._folder.open_truth() as series:
-            yield lambda r: series.store_rows([_truth_row(r, self._bench.truth_state(), self._setup["g_mps2"])])
-
-    def load_v_per_a(self) -> tuple[float, ...] | None:
-        """Loads of the axes by the truth, ohm."""
-        if self._bench.truth_path is None:
-            return None
         axes = next(iter(self._bench.truth()["units"].values()))["axes"]
-        return tuple(float(axes[a]["afe"]["load_ohm"]) for a in "xyz")
+        load_ohm = [float(axes[a]["afe"]["load_ohm"]) for a in "xyz"]
+        with self._folder.open_truth() as series:
+            yield lambda r: series.store_rows([_truth_row(r, self._bench.truth_state(), load_ohm)])
 
 
-def _truth_row(r: Recording, state: dict[str, Any], g_mps2: float) -> list[object]:
+def _truth_row(r: Recording, state: dict[str, Any], load_ohm: Sequence[float]) -> list[object]:
     unit = state["unit"]
+    g_mps2 = math.hypot(*unit["f_mps2"])
     a = [-float(f) / g_mps2 for f in unit["f_mps2"]]
-    return [r.t_s, unit["case_degc"], unit["element_degc"], *a, *map(float, unit["sensor_a"])]
+    out_v = [float(i) * load for i, load in zip(unit["sensor_a"], load_ohm, strict=True)]
+    return [r.t_s, unit["case_degc"], unit["element_degc"], *a, *out_v]
+
+
+def _whole_recordings(setup: dict[str, Any], folder: RunFolder, schedule: Schedule) -> list[Recording] | None:
+    """Of a run that needs only its report; None: something is missing."""
+    found = read_recordings(folder.data)
+    actions = planned_actions(schedule, float(setup["start_degc"]))
+    return found if len(found) == sum(isinstance(a, Take) for a in actions) else None
 
 
 def _opened_bench(options: ThermalOptions, setup: dict[str, Any], folder: RunFolder) -> Bench:

@@ -74,11 +74,16 @@ class FakeThermalBench:
         self.wait_until(self.t_s + seconds)
         return made
 
-    def true_v(self) -> np.ndarray:
-        """Volts at the loads, here and now."""
+    def gravity_g(self) -> np.ndarray:
+        """On the axes of the unit."""
         a = np.zeros(3)
         along, across = GRAVITY[self._face]
         a[along], a[across] = -np.sin(np.radians(self._angle_deg)), -np.cos(np.radians(self._angle_deg))
+        return a
+
+    def true_v(self) -> np.ndarray:
+        """Volts at the loads, here and now."""
+        a = self.gravity_g()
         base = np.radians(self.base_arcsec / 3600.0)
         zero_g = np.array([float(u.zero_ug(np.array(self.element_c))) for u in UNITS]) * 1e-6
         zero_g += 1e-6 * (self.case_c - self.element_c)  # 1 ug/K of gradient

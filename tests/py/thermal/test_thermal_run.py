@@ -338,6 +338,36 @@ def test_a_passport_takes_the_curves_of_a_report(whole: ThermalResult, tmp_path:
     assert [len(s["differences"]) for s in sections] == [0, 12]
 
 
+@pytest.mark.parametrize(("wrong_ug", "says"), [(0.0, "All 72 values"), (30.0, "18 of 72 values")])
+def test_compensations_are_compared_with_the_truth(wrong_ug: float, says: str, tmp_path: Path) -> None:
+    bench, folder = FakeThermalBench(noise_v=0.0), RunFolder(tmp_path)
+    with folder.open_truth() as truth:
+
+        def note_truth(r: Recording) -> None:
+            v = bench.true_v() + wrong_ug * 1e-6 * bench.scale_v_per_g
+            a = bench.gravity_g()
+            truth.store_rows([[r.t_s, bench.case_c, bench.element_c, *map(float, a), *map(float, v)]])
+
+        recordings = measure_schedule(bench, WHOLE, START, ThermalWatch(store=note_truth))
+    result = found_by(recordings, WHOLE)
+    report = thermal_grading.graded_report(result, thermal_grading.read_truth(folder, recordings), {})
+    assert thermal_grading.state_verdict(report).startswith(says)
+    assert thermal_grading.within_limits(report) == (wrong_ug == 0.0)
+
+
+def test_a_truth_of_another_form_is_refused(short: list[Recording], tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    assert thermal_grading.read_truth(folder, short) is None
+    folder.truth.write_text("t_s\n1\n")
+    with pytest.raises(BadInput, match=r"thermal-truth\.csv:1: expected the columns"):
+        thermal_grading.read_truth(folder, short)
+    folder.truth.unlink()
+    with folder.open_truth() as truth:
+        truth.store_rows([[0.0] * 9])
+    with pytest.raises(BadInput, match=f"expected {len(short)} rows, got 1"):
+        thermal_grading.read_truth(folder, short)
+
+
 def test_a_report_without_truth_says_so(whole: ThermalResult) -> None:
     report = thermal_grading.graded_report(whole, None, {})
     assert thermal_grading.state_verdict(report) == "No truth given: the compensations stand alone."
