@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -28,8 +28,12 @@ COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole num
 Table = Mapping[str, np.ndarray[Any, np.dtype[Any]]]  # columns by what the CSV calls them
 
 
-def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> FrameReader | ReadingReader:
+def decode_can(
+    path: Path, node: int, out: IO[str], board: str = "psa2", more: Callable[[Frames], Table] | None = None
+) -> FrameReader | ReadingReader:
     """Frames (of other boards: readings) of one node from a log. Nothing is written before the first.
+
+    more: further columns of frames.
 
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
@@ -37,7 +41,7 @@ def decode_can(path: Path, node: int, out: IO[str], board: str = "psa2") -> Fram
     check_readable(path)
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
-    if not _write(out, (_of_frames(f) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
+    if not _write(out, (_of_frames(f, more) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
         raise BadInput(expected(f"frames of node {node}", _no_frame(node, _senders(ids, board)), path))
     return reader
 
@@ -76,9 +80,9 @@ def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> I
     yield reader.take()
 
 
-def _of_frames(f: Frames) -> Table:
+def _of_frames(f: Frames, more: Callable[[Frames], Table] | None) -> Table:
     x_v, y_v, z_v = f.u_v.T
-    return {
+    columns = {
         "t_rx_s": f.t_rx_s,
         "t_sample_s": f.t_sample_s,
         "x_v": x_v,
@@ -90,6 +94,7 @@ def _of_frames(f: Frames) -> Table:
         "clipped": f.clipped.astype(int),
         "temp_degc": np.round(f.temp_degc, TEMP_DECIMALS),
     }
+    return columns | dict(more(f)) if more else columns
 
 
 def _of_readings(r: Readings) -> Table:

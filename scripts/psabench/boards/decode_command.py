@@ -6,16 +6,21 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from psabench.errors import BadInput, expected
 from psabench.link.own import output_text
 from psabench.options import LINE_HZ, Parser, add_board, node_of, positive
+from psabench.passport.command import STORE
+
+if TYPE_CHECKING:
+    from psabench.thermal.apply import Compensator
 
 EPILOG = """\
 examples:
   psabench decode run.log --out run.csv        frames of node 5: time of reception and of sampling, volts at the load
   psabench decode run.blf --node 7 | head
+  psabench decode run.log --passport QA-0001   with specific force, by the curves of a passport
   psabench decode --line capture.bin           words from INT/DATA/CLK samples; capture: cat LINK > capture.bin
 
 Counters on stderr at the end: frames, lost, torn (CAN); also late, early, gaps with --line.
@@ -36,12 +41,20 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--line", action="store_true", help="read INT/DATA/CLK samples, one byte each")
     p.add_argument("--word-bits", type=int, default=32, help="word width on the line: 16, 24 or 32 (%(default)s)")
     p.add_argument("--sample-hz", type=positive, default=LINE_HZ, help="sample rate of the capture (%(default)g)")
+    p.add_argument(
+        "--passport",
+        metavar="SERIAL[@NUMBER]",
+        help="specific force as well, by the curves of this unit (of its latest run)",
+    )
+    p.add_argument("--store", type=Path, default=STORE, help="store of passports (%(default)s)")
     return p.parse_args(words)
 
 
 def _decode(args: argparse.Namespace) -> int:
     if args.line and args.board != "psa2":
         raise BadInput(expected("a CAN log for this board (leave --line out)", args.board, "--line"))
+    if args.passport and (args.line or args.board != "psa2"):
+        raise BadInput(expected("a CAN log of a PSA-2", "--line" if args.line else args.board, "--passport"))
     if args.out and args.out.exists() and args.file.exists() and args.out.samefile(args.file):
         raise BadInput(expected("another file than the one that is read", args.out, "--out"))
     with output_text(args.out) if args.out else _Stdout() as out:
@@ -63,9 +76,21 @@ def _decode_line(args: argparse.Namespace, out: Any) -> int:
 def _decode_can(args: argparse.Namespace, out: Any) -> int:
     from psabench.boards.decode import decode_can
 
-    c = decode_can(args.file, node_of(args), out, args.board).counters
+    compensator = _open_compensator(args.store, args.passport) if args.passport else None
+    c = decode_can(args.file, node_of(args), out, args.board, compensator.columns if compensator else None).counters
     print(f"frames {c.frames}, lost {c.lost}, torn {c.torn}", file=sys.stderr)
+    if compensator and compensator.clamped:
+        what = "frames at temperatures outside of the compensation; taken at the end of its range"
+        print(f"{compensator.clamped} {what}", file=sys.stderr)
     return 0
+
+
+def _open_compensator(store_path: Path, name: str) -> Compensator:
+    from psabench.passport.store import PassportStore, find_run
+    from psabench.thermal.apply import Compensator, has_every_curve
+
+    with PassportStore(store_path, read_only=True) as store:
+        return Compensator(find_run(store, name, has_every_curve, "a run of psabench run thermal").curves)
 
 
 class _Stdout:

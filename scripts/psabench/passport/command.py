@@ -6,13 +6,8 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from psabench.options import Parser
-
-if TYPE_CHECKING:
-    from psabench.passport.store import UnitRun
-    from psabench.thermal.compensation import Compensation
 
 STORE = Path("build/passports.sqlite")
 
@@ -132,19 +127,14 @@ def _write_header(args: argparse.Namespace) -> int:
         run = find_run(
             store,
             args.serial,
-            lambda run: args.quantity in _fitted_curves(run),
+            lambda run: args.quantity in run.curves,
             f"a run with a curve of {args.quantity}",
         )
-    fitted = _fitted_curves(run)
-    if args.quantity not in fitted:
-        known = ", ".join(fitted) or "a run with a curve"
+    if args.quantity not in run.curves:
+        known = ", ".join(run.curves) or "a run with a curve"
         raise BadInput(expected(known, args.quantity, f"{args.serial}: run {run.number}"))
-    made = fixed_point(fitted[args.quantity], args.step)
+    made = fixed_point(run.curves[args.quantity], args.step)
     return _write_text(c_header(made, args.name or args.quantity), args.out)
-
-
-def _fitted_curves(run: UnitRun) -> dict[str, Compensation]:
-    return {q.name: q.compensation for q in run.quantities if q.compensation}
 
 
 def _write_text(text: str, path: Path | None) -> int:

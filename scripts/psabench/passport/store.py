@@ -97,6 +97,11 @@ class UnitRun:
     number: int = 0  # the store gives it
     supersedes: int | None = None  # number of the run that this one replaces; the store gives it
 
+    @property
+    def curves(self) -> dict[str, Compensation]:
+        """What was fitted against temperature, by the quantity's name."""
+        return {q.name: q.compensation for q in self.quantities if q.compensation}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Passport:

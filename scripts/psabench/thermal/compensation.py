@@ -86,12 +86,12 @@ def scale_temperature(t_c: npt.ArrayLike, low_c: float, high_c: float) -> Array:
     return np.asarray((2.0 * np.asarray(t_c, np.float64) - low_c - high_c) / (high_c - low_c))
 
 
-def element_temperature(t_s: Array, case_c: Array, tau_s: npt.ArrayLike) -> Array:
+def element_temperature(t_s: Array, case_c: Array, tau_s: npt.ArrayLike, began_k: float = 0.0) -> Array:
     """Temperature of an element that follows the case, Te' = (Tc - Te) / tau; exact for a case that moves on straight
-    lines between the instants; the two are equal at the first. t_s, case_c: (n,), ascending; tau_s: () or (k,), the
-    result (n,) or (n, k)."""
+    lines between the instants; began_k: case less element at the first. t_s, case_c: (n,), ascending; tau_s: () or
+    (k,), the result (n,) or (n, k)."""
     tau = np.asarray(tau_s, np.float64)
-    behind = np.zeros((len(t_s), *tau.shape))  # case less element
+    behind = np.full((len(t_s), *tau.shape), began_k)  # case less element
     step_s = np.diff(t_s)
     # On a ramp the element runs after the case by rate times tau; what differs from that at the start decays.
     for k, (step, rise) in enumerate(zip(step_s, np.diff(case_c), strict=True)):

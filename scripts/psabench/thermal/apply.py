@@ -1,0 +1,107 @@
+"""Compensations at work: readings of a unit as specific force, by the curves of its passport.
+
+With f the specific force along the axes of the case, g, an axis of the unit reads
+
+    u_i = K_i(T) (f_i + z_i(T) + sum over j of b_ij(T) f_j),    j other than i
+
+K the scale, z the zero, b the base error (`psabench.thermal.reduce` finds them so). Each curve takes the temperature of
+its element: where it has a lag, that of an element which follows the case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from psabench.boards.psa2.frames import Frames
+from psabench.errors import BadInput, expected
+from psabench.passport.store import UnitRun
+from psabench.thermal.bench import CASE_CHANNEL
+from psabench.thermal.compensation import Array, Compensation, element_temperature
+from psabench.thermal.reduce import ARCSEC, AXES, quantity_names
+
+Case = tuple[Array, Array]  # instants, s, and temperatures of the case, degC; (m,) each
+
+
+def has_every_curve(run: UnitRun) -> bool:
+    """Whether readings can be compensated by it."""
+    return run.curves.keys() >= set(quantity_names())
+
+
+@dataclass(frozen=True, slots=True)
+class _Followed:
+    """A case so far, and how far behind it an element of each time constant is."""
+
+    t_s: float
+    case_c: float
+    behind_k: Mapping[float, float]
+
+
+class Compensator:
+    """Takes the readings of one log, some at a time; clamped: how many were outside of a curve's range."""
+
+    def __init__(self, curves: Mapping[str, Compensation]) -> None:
+        missing = [name for name in quantity_names() if name not in curves]
+        if missing:
+            raise BadInput(expected("curves of zero, scale and base of each axis", f"none of {missing[0]}", "passport"))
+        self._curves = curves
+        self._taus = {c.lag.tau_s for c in curves.values() if c.lag}
+        self._past: _Followed | None = None
+        self.clamped = 0
+
+    def forces_g(self, frames: Frames) -> Array:
+        """Specific force along the axes of the case, g, (n, 3); NaN up to the first temperature of the case.
+
+        Raises BadInput for frames whose form has no temperatures.
+        """
+        t_s = np.where(np.isnan(frames.t_sample_s), frames.t_rx_s, frames.t_sample_s)
+        case = self._case_of(t_s, frames)
+        if case is None:
+            return np.full((len(frames), 3), np.nan)
+        return self._solve(frames.u_v, self._values_at(t_s, case))
+
+    def columns(self, frames: Frames) -> dict[str, Array]:
+        """For a table."""
+        return dict(zip(("f_x_g", "f_y_g", "f_z_g"), self.forces_g(frames).T, strict=True))
+
+    def _case_of(self, t_s: Array, frames: Frames) -> Case | None:
+        """From what is known of before; None: nothing yet."""
+        if len(frames) and not np.any(frames.temp_code):
+            raise BadInput(expected("frames with temperatures (form 1 carries them)", "none", "--passport"))
+        told = (frames.temp_channel == CASE_CHANNEL) & np.isfinite(frames.temp_degc)
+        known_t, known_c = t_s[told], frames.temp_degc[told]
+        if self._past is not None:
+            known_t, known_c = np.append(self._past.t_s, known_t), np.append(self._past.case_c, known_c)
+        later = np.diff(known_t, prepend=-np.inf) > 0.0  # frames of a block may have arrived in one instant
+        return (known_t[later], known_c[later]) if len(known_t) else None
+
+    def _values_at(self, t_s: Array, case: Case) -> dict[str, Array]:
+        """Each curve at each reading, (n,)."""
+        behind = {tau: self._behind_k(case, tau) for tau in self._taus}
+        case_c = np.interp(t_s, *case)
+        outside, values = np.zeros(len(t_s), np.bool_), {}
+        for name, curve in self._curves.items():
+            late_k = np.interp(t_s, case[0], behind[curve.lag.tau_s]) if curve.lag else np.zeros(len(t_s))
+            element_c = case_c - late_k
+            outside |= (element_c < curve.low_c) | (element_c > curve.high_c)
+            values[name] = curve.value_at(element_c, late_k)
+        self.clamped += int(np.count_nonzero(outside))
+        self._past = _Followed(float(case[0][-1]), float(case[1][-1]), {tau: float(b[-1]) for tau, b in behind.items()})
+        return values
+
+    def _behind_k(self, case: Case, tau_s: float) -> Array:
+        began_k = self._past.behind_k[tau_s] if self._past else 0.0
+        return np.asarray(case[1] - element_temperature(*case, tau_s, began_k))
+
+    @staticmethod
+    def _solve(u_v: Array, values: Mapping[str, Array]) -> Array:
+        read_g = np.empty_like(u_v)
+        mixing = np.tile(np.eye(3), (len(u_v), 1, 1))
+        for i, a in enumerate(AXES):
+            read_g[:, i] = u_v[:, i] / values[f"scale_{a}_v_per_g"] - values[f"zero_{a}_ug"] * 1e-6
+            for j, b in enumerate(AXES):
+                if i != j:
+                    mixing[:, i, j] = values[f"base_{a}{b}_arcsec"] / ARCSEC
+        return np.asarray(np.linalg.solve(mixing, read_g[:, :, None])[:, :, 0])
