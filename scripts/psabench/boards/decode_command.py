@@ -16,11 +16,12 @@ from psabench.passport.command import STORE
 if TYPE_CHECKING:
     from psabench.thermal.apply import Compensator
 
+ARTICLE_CONFIG0 = 0x56
 EPILOG = """\
 examples:
   psabench decode run.log --out run.csv        frames of node 5: time of reception and of sampling, volts at the load
   psabench decode run.blf --node 7 | head
-  psabench decode run.log --passport QA-0001   with specific force, by the curves of a passport
+  psabench decode run.log --passport QA-0001   with acceleration, by the curves of a passport
   psabench decode --line capture.bin           words from INT/DATA/CLK samples; capture: cat LINK > capture.bin
 
 Counters on stderr at the end: frames, lost, torn (CAN); also late, early, gaps with --line.
@@ -44,10 +45,27 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument(
         "--passport",
         metavar="SERIAL[@NUMBER]",
-        help="specific force as well, by the curves of this unit (of its latest run)",
+        help="acceleration as well, by the curves of this unit (of its latest run)",
+    )
+    p.add_argument(
+        "--config0",
+        type=_register_value,
+        default=ARTICLE_CONFIG0,
+        metavar="VALUE",
+        help="for --passport: CONFIG0 of the converters, whose filter has a known gain (0x56, the article's)",
     )
     p.add_argument("--store", type=Path, default=STORE, help="store of passports (%(default)s)")
     return p.parse_args(words)
+
+
+def _register_value(text: str) -> int:
+    try:
+        value = int(text, 0)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= 0xFF:
+        raise argparse.ArgumentTypeError(expected("a byte as 0x56", repr(text)))
+    return value
 
 
 def _decode(args: argparse.Namespace) -> int:
@@ -76,7 +94,7 @@ def _decode_line(args: argparse.Namespace, out: Any) -> int:
 def _decode_can(args: argparse.Namespace, out: Any) -> int:
     from psabench.boards.decode import decode_can
 
-    compensator = _open_compensator(args.store, args.passport) if args.passport else None
+    compensator = _open_compensator(args) if args.passport else None
     c = decode_can(args.file, node_of(args), out, args.board, compensator.columns if compensator else None).counters
     print(f"frames {c.frames}, lost {c.lost}, torn {c.torn}", file=sys.stderr)
     if compensator and compensator.clamped:
@@ -85,12 +103,14 @@ def _decode_can(args: argparse.Namespace, out: Any) -> int:
     return 0
 
 
-def _open_compensator(store_path: Path, name: str) -> Compensator:
+def _open_compensator(args: argparse.Namespace) -> Compensator:
+    from psabench.boards.psa2.device import filter_gain_of
     from psabench.passport.store import PassportStore, find_run
     from psabench.thermal.apply import Compensator, has_every_curve
 
-    with PassportStore(store_path, read_only=True) as store:
-        return Compensator(find_run(store, name, has_every_curve, "a run of psabench run thermal").curves)
+    with PassportStore(args.store, read_only=True) as store:
+        run = find_run(store, args.passport, has_every_curve, "a run of psabench run thermal")
+    return Compensator(run.curves, filter_gain_of(args.config0))
 
 
 class _Stdout:

@@ -1,8 +1,8 @@
-"""Compensations at work: readings of a unit as specific force, by the curves of its passport.
+"""Compensations at work: readings of a unit as acceleration, by the curves of its passport.
 
-With f the specific force along the axes of the case, g, an axis of the unit reads
+With a the acceleration along the axes of the case, g, +1 where gravity is along the axis, an axis of the unit reads
 
-    u_i = K_i(T) (f_i + z_i(T) + sum over j of b_ij(T) f_j),    j other than i
+    u_i = K_i(T) (a_i + z_i(T) + sum over j of b_ij(T) a_j),    j other than i
 
 K the scale, z the zero, b the base error (`psabench.thermal.reduce` finds them so). Each curve takes the temperature of
 its element: where it has a lag, that of an element which follows the case.
@@ -40,19 +40,22 @@ class _Followed:
 
 
 class Compensator:
-    """Takes the readings of one log, some at a time; clamped: how many were outside of a curve's range."""
+    """Takes the readings of one log, some at a time; clamped: how many were outside of a curve's range.
 
-    def __init__(self, curves: Mapping[str, Compensation]) -> None:
+    filter_gain: of the converters at DC, which a thermal run takes out of its readings, too (`Psa2.filter_gain`).
+    """
+
+    def __init__(self, curves: Mapping[str, Compensation], filter_gain: float = 1.0) -> None:
         missing = [name for name in quantity_names() if name not in curves]
         if missing:
             raise BadInput(expected("curves of zero, scale and base of each axis", f"none of {missing[0]}", "passport"))
-        self._curves = curves
+        self._curves, self._gain = curves, filter_gain
         self._taus = {c.lag.tau_s for c in curves.values() if c.lag}
         self._past: _Followed | None = None
         self.clamped = 0
 
-    def forces_g(self, frames: Frames) -> Array:
-        """Specific force along the axes of the case, g, (n, 3); NaN up to the first temperature of the case.
+    def accelerations_g(self, frames: Frames) -> Array:
+        """Along the axes of the case, g, (n, 3); NaN up to the first temperature of the case.
 
         Raises BadInput for frames whose form has no temperatures.
         """
@@ -60,11 +63,11 @@ class Compensator:
         case = self._case_of(t_s, frames)
         if case is None:
             return np.full((len(frames), 3), np.nan)
-        return self._solve(frames.u_v, self._values_at(t_s, case))
+        return self._solve(frames.u_v / self._gain, self._values_at(t_s, case))
 
     def columns(self, frames: Frames) -> dict[str, Array]:
         """For a table."""
-        return dict(zip(("f_x_g", "f_y_g", "f_z_g"), self.forces_g(frames).T, strict=True))
+        return dict(zip(("a_x_g", "a_y_g", "a_z_g"), self.accelerations_g(frames).T, strict=True))
 
     def _case_of(self, t_s: Array, frames: Frames) -> Case | None:
         """From what is known of before; None: nothing yet."""

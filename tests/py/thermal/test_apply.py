@@ -1,4 +1,4 @@
-"""Readings as specific force: a unit that is drawn, read in a chamber that moves, gives back what it felt."""
+"""Readings as acceleration: a unit that is drawn, read in a chamber that moves, gives back what it felt."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def drawn_curves() -> dict[str, Compensation]:
     return {n: curve(n, rng, Lag(tau_s=TAU_S, per_k=2.0) if n.startswith("zero") else None) for n in quantity_names()}
 
 
-def frames_of(curves: dict[str, Compensation], force_g: np.ndarray, low_c: float = 10.0) -> Frames:
+def frames_of(curves: dict[str, Compensation], felt_g: np.ndarray, low_c: float = 10.0) -> Frames:
     """A case that goes up by 40 K and back, read as codes; its channel is told in every fourth frame."""
     n = int(RATE_HZ * READ_S)
     t_s = np.arange(n) / RATE_HZ
@@ -56,8 +56,8 @@ def frames_of(curves: dict[str, Compensation], force_g: np.ndarray, low_c: float
         value[name] = c.value_at(case_c - late_k, late_k)
     u_v = np.empty((n, 3))
     for i, a in enumerate(AXES):
-        across = sum(value[f"base_{a}{b}_arcsec"] / ARCSEC * force_g[j] for j, b in enumerate(AXES) if j != i)
-        u_v[:, i] = value[f"scale_{a}_v_per_g"] * (force_g[i] + value[f"zero_{a}_ug"] * 1e-6 + across)
+        across = sum(value[f"base_{a}{b}_arcsec"] / ARCSEC * felt_g[j] for j, b in enumerate(AXES) if j != i)
+        u_v[:, i] = value[f"scale_{a}_v_per_g"] * (felt_g[i] + value[f"zero_{a}_ug"] * 1e-6 + across)
     absent = np.zeros(n, np.int64)
     return Frames(
         t_rx_s=t_s,
@@ -80,24 +80,24 @@ def part(f: Frames, begin: int, end: int) -> Frames:
     return Frames(**{n: getattr(f, n)[begin:end] for n in names})
 
 
-FORCE_G = np.array([0.3, -0.9, 0.2])
+FELT_G = np.array([0.3, -0.9, 0.2])
 
 
 def test_what_a_unit_felt_comes_back_at_any_temperature() -> None:
     curves = drawn_curves()
-    found = Compensator(curves).forces_g(frames_of(curves, FORCE_G))
-    assert np.abs(found - FORCE_G).max() < 1e-11
-    plain = frames_of(curves, FORCE_G).u_v / 1.2
-    assert np.abs(plain - FORCE_G).max() > 1e-4  # what it is worth
+    found = Compensator(curves).accelerations_g(frames_of(curves, FELT_G))
+    assert np.abs(found - FELT_G).max() < 1e-11
+    plain = frames_of(curves, FELT_G).u_v / 1.2
+    assert np.abs(plain - FELT_G).max() > 1e-4  # what it is worth
 
 
 def test_in_parts_as_in_one_piece() -> None:
     curves = drawn_curves()
     whole, in_parts = Compensator(curves), Compensator(curves)
-    f = frames_of(curves, FORCE_G)
-    once = whole.forces_g(f)
+    f = frames_of(curves, FELT_G)
+    once = whole.accelerations_g(f)
     ends = [0, 1, 2, 700, 701, 3000, len(f)]
-    pieces = [in_parts.forces_g(part(f, a, b)) for a, b in pairwise(ends)]
+    pieces = [in_parts.accelerations_g(part(f, a, b)) for a, b in pairwise(ends)]
     joined = np.concatenate(pieces)
     assert np.all(np.isnan(joined[: CASE_CHANNEL - 1]))  # no temperature yet
     assert np.nanmax(np.abs(joined[CASE_CHANNEL:] - once[CASE_CHANNEL:])) < 2e-6  # the case is held up to the next part
@@ -107,17 +107,17 @@ def test_in_parts_as_in_one_piece() -> None:
 def test_readings_outside_of_the_range_are_counted_and_clamped() -> None:
     curves = drawn_curves()
     compensator = Compensator(curves)
-    found = compensator.forces_g(frames_of(curves, FORCE_G, low_c=30.0))
+    found = compensator.accelerations_g(frames_of(curves, FELT_G, low_c=30.0))
     assert np.all(np.isfinite(found))
     assert 0 < compensator.clamped < len(found)
 
 
 def test_frames_without_temperatures_and_half_a_passport_are_refused() -> None:
     curves = drawn_curves()
-    f = frames_of(curves, FORCE_G)
+    f = frames_of(curves, FELT_G)
     bare = Frames(**{n: getattr(f, n) for n in f.__slots__} | {"temp_code": np.zeros(len(f), np.int64)})
     with pytest.raises(BadInput, match="expected frames with temperatures"):
-        Compensator(curves).forces_g(bare)
+        Compensator(curves).accelerations_g(bare)
     del curves["base_xz_arcsec"]
     with pytest.raises(BadInput, match="base_xz_arcsec"):
         Compensator(curves)

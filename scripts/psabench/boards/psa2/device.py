@@ -28,6 +28,11 @@ CODE_V, WORD_V = 10.0 / 2**23, 10.0 / 2**30  # resolution at the load: of a code
 SETTLE_PERIODS = 64  # 62.98 data periods and 468 clocks from a step to a settled word, rounded up
 
 
+def filter_gain_of(config0: int) -> float:
+    """Gain at DC of the filter that this value of CONFIG0 selects."""
+    return 1.0 if config0 & 3 == SINC_ONLY else FIR_GAIN[config0 >> 2 & 1]
+
+
 class Psa2(Unit):
     """One unit on the bus.
 
@@ -54,8 +59,7 @@ class Psa2(Unit):
     @property
     def filter_gain(self) -> float:
         """Gain of the converters' filter at DC, from CONFIG0: known, and in every code and word."""
-        config0 = self.register("x", CONFIG0)
-        return 1.0 if config0 & 3 == SINC_ONLY else FIR_GAIN[config0 >> 2 & 1]
+        return filter_gain_of(self.register("x", CONFIG0))
 
     @property
     def form(self) -> Form:
