@@ -61,7 +61,7 @@ def frames_of(curves: dict[str, Compensation], felt_g: np.ndarray, low_c: float 
     absent = np.zeros(n, np.int64)
     return Frames(
         t_rx_s=t_s,
-        t_sample_s=t_s,
+        t_sample_s=t_s % 0.25,  # as the board's stamps do
         seq=absent,
         u_v=u_v,
         temp_code=code,
