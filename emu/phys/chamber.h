@@ -8,6 +8,7 @@
  * both in closed form over the straight pieces of the air's course: temperatures are functions of time, independent of
  * how often they are read. So is how many thermal cycles a body has had: an element that has been cold and then is hot, powered
  * or not; on its way up, the part of a cycle. The few kelvin that an element overshoots after a command count for nothing.
+ * And so is what follows an element with play: a fold over the element's extremes, which a command finds beforehand.
  * A command updates every body in the chamber. Plain structs, one thread; commands in order of
  * time; an instant before the latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_CHAMBER_H
@@ -41,13 +42,31 @@ struct chamber_cycles {
     double part; /* of the next one: how far up it has been */
 };
 
+/* What follows an element with play: it stays where it is until the element is half_k away. Embedded in its owner. */
+struct chamber_play {
+    double half_k;
+    double felt_degc; /* at the chamber's latest command */
+    struct chamber_play *next;
+};
+
+/* Straight pieces of the air's course after a command, the last without an end; and where an element turns on them. */
+#define CHAMBER_LEGS  3u
+#define CHAMBER_TURNS (3u * CHAMBER_LEGS)
+
 /* Something in the chamber; embedded in its owner, not to be moved after chamber_put_in(). */
 struct chamber_body {
     double tau_case_s, tau_element_s;
-    double case_degc, element_degc;         /* at the chamber's latest command */
-    double case_end_degc, element_end_degc; /* at the end of its ramp */
-    struct chamber_cycles cycles;           /* up to the latest command */
+    double case_degc[CHAMBER_LEGS], element_degc[CHAMBER_LEGS]; /* where each leg begins */
+    double turn_s[CHAMBER_TURNS], turn_degc[CHAMBER_TURNS];     /* the element's extremes, since the command */
+    unsigned turns;
+    struct chamber_cycles cycles; /* up to the latest command */
+    struct chamber_play *plays;
     struct chamber_body *next;
+};
+
+struct chamber_leg {
+    double from_s; /* since the command */
+    double air_degc, slope_kps;
 };
 
 struct chamber {
@@ -55,11 +74,11 @@ struct chamber {
     double ramp_k_per_min;
     double rate_part;    /* of a faulty one: part of its ramp that the air makes; 1: all of it */
     double misreading_k; /* of a faulty thermometer */
+    double overshoot_k;  /* of a faulty controller: how far past the set point the air goes; 0: not at all */
     double set_degc;
-    int64_t from_ns;   /* of the latest command */
-    double from_degc;  /* of the air, then */
-    double slope_kps;  /* of the air, until it is at the set point */
-    double duration_s; /* of the ramp */
+    int64_t from_ns; /* of the latest command */
+    struct chamber_leg leg[CHAMBER_LEGS];
+    unsigned legs; /* the last is at the set point */
     struct chamber_body *bodies;
 };
 
@@ -77,8 +96,13 @@ enum chamber_result chamber_set(struct chamber *c, double degc, int64_t t_ns);
 /* New ramp, from CHAMBER_RAMP_MIN_K_PER_MIN up to the greater of the two limits; one that is under way goes on with it. */
 enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_ns);
 
-/* Faults: the air makes this part of its ramp from now on (above 0; 1: none); the thermometer reads so much more (0: none). */
+/* It follows the element of a body from power-on, where it is as warm; half_k at least 0. */
+void chamber_play_add(struct chamber_body *b, struct chamber_play *p, double half_k);
+
+/* Faults: the air makes this part of its ramp from now on (above 0; 1: none); it goes so far past its set point, but no farther
+ * than the step and -100 to 200 degC, and comes back with its ramp (0: none); the thermometer reads so much more (0: none). */
 void chamber_hinder(struct chamber *c, double rate_part, int64_t t_ns);
+void chamber_overshoot(struct chamber *c, double overshoot_k, int64_t t_ns);
 void chamber_mislead(struct chamber *c, double misreading_k);
 
 double chamber_ramp_max_k_per_min(const struct chamber *c);
@@ -90,6 +114,8 @@ int64_t chamber_stable_ns(const struct chamber *c);               /* since or fr
 
 double chamber_case_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
 double chamber_element_degc(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);
+double chamber_felt_degc(const struct chamber *c, const struct chamber_body *b, const struct chamber_play *p,
+                         int64_t t_ns);
 
 /* Thermal cycles since it was put in, with the part of the present one. */
 double chamber_body_cycles(const struct chamber *c, const struct chamber_body *b, int64_t t_ns);

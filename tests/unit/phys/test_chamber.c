@@ -1,6 +1,7 @@
 /* Thermal chamber: ramps, limits, and bodies that follow. tests/py/lab/test_physics.py integrates the lags by itself. */
 #include "rig.h"
 
+#include "base/rng.h"
 #include "base/sched.h"
 #include "phys/chamber.h"
 
@@ -173,6 +174,71 @@ static void air_alone_makes_no_cycle(void **state)
     near(chamber_body_cycles(&c, &b, ns(1e6)), 0.0, 0.0);
 }
 
+/* What is felt, of a random life in the chamber: the fold over steps of 1 s misses what the element moves in a second. Lags of
+ * any ratio, also none and equal ones; commands at random instants, an overshoot now and then. */
+static void play_follows_the_extremes(void **state)
+{
+    (void)state;
+    const uint64_t seed = rig_seed(5);
+    struct rng r = rng_stream(seed, 0, "play");
+    static const struct {
+        unsigned every_s;
+        double k_per_min;
+    } rows[] = {{1500, 1.0}, {400, 3.0}, {100, 5.0}};
+    unsigned turned = 0;
+    for (unsigned life = 0; life < 32; life++) {
+        const double lags_s[] = {0.0, 1e-9, 60.0, 180.0, 180.0, 180.0000001, 360.0, 2000.0};
+        struct chamber c = up(lags_s[rng_u64(&r) % COUNT(lags_s)], lags_s[rng_u64(&r) % COUNT(lags_s)]);
+        c.ramp_k_per_min = rows[life % COUNT(rows)].k_per_min;
+        struct chamber_body b;
+        struct chamber_play play[2];
+        double felt[2], last = 25.0, way = 0.0;
+        chamber_put_in(&c, &b, 0, 0);
+        for (unsigned i = 0; i < 2; i++) {
+            chamber_play_add(&b, &play[i], i * 3.0 * rng_uniform(&r));
+            felt[i] = last;
+        }
+        for (int t_s = 0; t_s < 10000; t_s++) {
+            const double element = chamber_element_degc(&c, &b, ns(t_s));
+            if (way * (element - last) < 0.0) turned++;
+            if (element != last) way = element - last;
+            last = element;
+            for (unsigned i = 0; i < 2; i++) {
+                felt[i] = fmin(fmax(felt[i], element - play[i].half_k), element + play[i].half_k);
+                const double got = chamber_felt_degc(&c, &b, &play[i], ns(t_s));
+                if (fabs(got - felt[i]) > (play[i].half_k > 0.0 ? c.ramp_k_per_min / 60.0 : 0.0))
+                    fail_msg("TEST_SEED=%llu: life %u, %d s: felt %.9g, want %.9g", (unsigned long long)seed, life, t_s,
+                             got, felt[i]);
+            }
+            if (rng_u64(&r) % rows[life % COUNT(rows)].every_s) continue;
+            chamber_overshoot(&c, rng_u64(&r) % 2 ? 0.0 : 8.0 * rng_uniform(&r), ns(t_s));
+            assert_int_equal(chamber_set(&c, -60.0 + 145.0 * rng_uniform(&r), ns(t_s)), CHAMBER_OK);
+        }
+    }
+    assert_true(turned > 100);
+}
+
+/* 5 K past the set point and back with the ramp the other way; no farther past it than the step was; stable when it is back. */
+static void a_faulty_controller_overshoots(void **state)
+{
+    (void)state;
+    struct chamber c = up(0, 0);
+    c.ramp_k_per_min = 5.0; /* cooling no faster than 3 */
+    chamber_overshoot(&c, 5.0, 0);
+    near(chamber_air_degc(&c, ns(600)), 25.0, 0.0);
+    assert_int_equal(chamber_set(&c, 45.0, ns(600)), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(600 + 240)), 45.0, 1e-9);
+    near(chamber_air_degc(&c, ns(600 + 300)), 50.0, 1e-9);
+    near(chamber_air_degc(&c, ns(600 + 360)), 47.0, 1e-9);
+    assert_int_equal(chamber_stable_ns(&c), ns(600 + 400));
+    near(chamber_air_degc(&c, ns(1e6)), 45.0, 0.0);
+    assert_int_equal(chamber_set(&c, 43.0, ns(2e6)), CHAMBER_OK);
+    near(chamber_air_degc(&c, ns(2e6 + 80)), 41.0, 1e-9);
+    chamber_overshoot(&c, 0.0, ns(2e6 + 80)); /* mended: straight back */
+    near(chamber_air_degc(&c, ns(2e6 + 80 + 24)), 43.0, 1e-9);
+    assert_int_equal(chamber_stable_ns(&c), ns(2e6 + 80 + 24));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -185,6 +251,8 @@ int main(void)
         cmocka_unit_test(temperatures_do_not_depend_on_how_often_the_course_is_cut),
         cmocka_unit_test(a_cycle_is_cold_then_hot_and_a_part_of_one_stays),
         cmocka_unit_test(air_alone_makes_no_cycle),
+        cmocka_unit_test(play_follows_the_extremes),
+        cmocka_unit_test(a_faulty_controller_overshoots),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

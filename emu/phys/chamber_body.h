@@ -1,0 +1,14 @@
+/* What chamber.c and chamber_body.c have in common. */
+#ifndef PSABENCH_PHYS_CHAMBER_BODY_H
+#define PSABENCH_PHYS_CHAMBER_BODY_H
+
+#include "phys/chamber.h"
+
+/* Number of the leg that the air is on. */
+unsigned chamber_leg_at(const struct chamber *c, double t_s);
+
+/* A command is about to come: the body as it is then. And has come: what it will do. */
+void chamber_body_arrive(const struct chamber *c, struct chamber_body *b, int64_t t_ns);
+void chamber_body_plan(const struct chamber *c, struct chamber_body *b);
+
+#endif
