@@ -24,8 +24,12 @@ struct board_io {
      * sample_until() before an abrupt change of the physics. */
     void (*accel)(void *ctx, unsigned axis, const struct looks *at, double *out);
     /* What such an output stays within up to until_ns, looks every_ns apart. *why, where that is not known or the output depends on
-     * more of the past than the converters look at. NULL: nothing is known. */
+     * more of the past than accel_past_ns() says. NULL: nothing is known. */
     struct looks_range (*accel_range)(void *ctx, unsigned axis, int64_t every_ns, int64_t until_ns, const char **why);
+    /* An output follows from the looks since so long before it, to the bit; 0: from its own instant. skip_accel: as if the last look had
+     * been at t_ns. Where accel_range is. */
+    int64_t (*accel_past_ns)(void *ctx, unsigned axis);
+    void (*skip_accel)(void *ctx, unsigned axis, int64_t t_ns);
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
     void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
     void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */

@@ -30,19 +30,29 @@ static bool feels_steps(const struct unit *u, unsigned axis)
     return is_quartz(u, axis) || m->u0_tc_v_per_k != 0.0 || m->k_tc_per_k != 0.0;
 }
 
-/* Temperature of the sensor's element, as of the latest whole step, however often it is read. Without a chamber a quartz's case is
- * as warm as its element. */
-static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
+/* What a chamber does to a quartz sensor beyond its element. Without one its case is as warm as that, and nothing moves. */
+static void warm_quartz(struct unit *u, unsigned axis, int64_t t_ns)
 {
     struct quartz *q = &u->quartz[axis];
     const struct chamber *c = &u->lab->chamber;
+    if (!c->cfg.present) {
+        q->case_degc = q->felt_degc = q->element_degc;
+        return;
+    }
+    q->case_degc = chamber_case_degc(c, &u->body, t_ns);
+    q->felt_degc = chamber_felt_degc(c, &u->body, &u->play[axis], t_ns);
+    q->cycles = chamber_body_cycles(c, &u->body, t_ns);
+}
+
+/* Temperature of the sensor's element, as of the latest whole step, however often it is read. */
+static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
+{
     const int64_t step = t_ns / WARM_STEP_NS;
     if (step == u->warm_step[axis]) return;
     u->warm_step[axis] = step;
     const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
-    u->mems[axis].temp_degc = q->element_degc = element_degc;
-    q->case_degc = c->cfg.present ? chamber_case_degc(c, &u->body, step * WARM_STEP_NS) : element_degc;
-    if (c->cfg.present && is_quartz(u, axis)) q->cycles = chamber_body_cycles(c, &u->body, step * WARM_STEP_NS);
+    u->mems[axis].temp_degc = u->quartz[axis].element_degc = element_degc;
+    if (is_quartz(u, axis)) warm_quartz(u, axis, step * WARM_STEP_NS);
 }
 
 /* What the sensor of a channel measures at a row of instants, a = -f on its own axes: at rest the projections of gravity. The face
@@ -139,18 +149,32 @@ static bool feels_gravity(const struct unit *u, unsigned axis)
 
 #define ROUNDED 1.001 /* turns leave a vector's length as it is, but for the last bits */
 
-/* A sensor whose output follows from the instant alone. */
+/* A sensor whose output follows from the instant, or from looks not long ago. */
 static struct looks_range accel_range(void *ctx, unsigned axis, int64_t every_ns, int64_t until_ns, const char **why)
 {
     const struct unit *u = ctx;
     const struct unit_axis_cfg *c = &u->cfg.axis[axis];
+    const double a_max_mps2 = ROUNDED * u->lab->site.g_mps2;
     if (c->sensor == UNIT_NO_SENSOR) return (struct looks_range){0.0, 0.0};
     if (c->series.sample) *why = "a sensor is driven from a file";
-    else if (c->sensor != UNIT_MEMS) *why = "a quartz sensor remembers";
+    else if (is_quartz(u, axis) && quartz_past_ns(&u->quartz[axis]) < 0) *why = "the loop of a quartz sensor remembers long";
     else if (u->sensor_faults[axis]) *why = "a sensor has a fault";
-    else if (u->mems[axis].slow.moves) *why = "a sensor has slow noise";
+    else if (!is_quartz(u, axis) && u->mems[axis].slow.moves) *why = "a sensor has slow noise";
     else if (!feels_gravity(u, axis)) *why = "its mount accelerates it";
-    return mems_range_v(&u->mems[axis], ROUNDED * u->lab->site.g_mps2, every_ns, until_ns);
+    if (is_quartz(u, axis)) return quartz_range_a(&u->quartz[axis], a_max_mps2, every_ns);
+    return mems_range_v(&u->mems[axis], a_max_mps2, every_ns, until_ns);
+}
+
+static int64_t accel_past_ns(void *ctx, unsigned axis)
+{
+    const struct unit *u = ctx;
+    return is_quartz(u, axis) ? ns_later(quartz_past_ns(&u->quartz[axis]), 0) : 0;
+}
+
+static void skip_accel(void *ctx, unsigned axis, int64_t t_ns)
+{
+    struct unit *u = ctx;
+    if (is_quartz(u, axis)) quartz_skip(&u->quartz[axis], t_ns);
 }
 
 static bool is_recorded(const struct unit *u)
@@ -262,6 +286,8 @@ static void init_board(struct unit *u, struct sched *s)
     struct board_io io = {
         .ctx = u, .accel = accel_row, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
     io.accel_range = accel_range;
+    io.accel_past_ns = accel_past_ns;
+    io.skip_accel = skip_accel;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;
@@ -304,6 +330,8 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         u->sin_alpha0[i] = alpha0.sin;
     }
     chamber_put_in(&lab->chamber, &u->body, cfg->tau_case_s, cfg->tau_element_s);
+    for (unsigned i = 0; i < UNIT_AXES; i++)
+        if (is_quartz(u, i)) chamber_play_add(&u->body, &u->play[i], cfg->axis[i].quartz.play_k);
     init_board(u, s);
 }
 

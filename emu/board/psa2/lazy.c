@@ -9,10 +9,17 @@
 
 #define WAKE_FRAMES  4  /* from the frame in which it wakes up to the look, and the one under way */
 #define VALID_FRAMES 2  /* from there until the latest frame, registers and lines are true */
-#define SLEEP_MIN    80 /* frames; waking up costs as much as 66; and from one question whether it may to the next */
+#define SLEEP_MIN    14 /* frames more than waking up costs; and from one question whether it may to the next */
+#define MEMORY       66 /* frames that waking up costs where no sensor remembers */
 
 /* Drifts are bounded for so long; then the board wakes up as if someone looked. */
 #define BOUND_NS (INT64_C(86400) * NS_PER_S)
+
+/* Data periods before those of the filters that have to be computed, so that the sensors know what they remember. */
+static int64_t more_periods(const struct psa2 *b)
+{
+    return b->lazy.past_ns > 0 ? b->lazy.past_ns / b->period_ns + 1 : 0;
+}
 
 /* ---- whether ---- */
 
@@ -22,7 +29,7 @@ static bool in_step(const struct psa2 *b)
     const struct ads1282 *x = &b->adc[0];
     for (unsigned i = 0; i < 3; i++) {
         const struct ads1282 *a = &b->adc[i];
-        if (!ads1282_rests(a) || a->due.due_ns != x->due.due_ns || a->period != x->period ||
+        if (!ads1282_rests(a, more_periods(b)) || a->due.due_ns != x->due.due_ns || a->period != x->period ||
             a->sync_count != x->sync_count)
             return false;
     }
@@ -128,7 +135,8 @@ static void fill_filters(struct psa2 *b)
     void *const ctx = b->base.io.ctx;
     int64_t from = 0, before_ns;
     for (unsigned i = 0; i < 3; i++) {
-        from = ads1282_resume(&b->adc[i], &before_ns);
+        from = ads1282_resume(&b->adc[i], more_periods(b), &before_ns);
+        if (b->lazy.past_ns > 0) b->base.io.skip_accel(ctx, i, before_ns);
         afe_skip(&b->base.afe[i], before_ns);
     }
     for (int64_t p = from; p < b->adc[0].period; p++) {
@@ -173,7 +181,7 @@ static int64_t not_before_temp_ns(const struct psa2 *b, int64_t t_ns)
 static void look_for_sleep(struct psa2 *b, int64_t t_ns)
 {
     if (t_ns < b->lazy.ask_ns || is_watched(b) || !is_steady(b) || span_ns(b, t_ns) >= b->period_ns) return;
-    const int64_t least_ns = t_ns + SLEEP_MIN * b->period_ns;
+    const int64_t least_ns = t_ns + (MEMORY + more_periods(b) + SLEEP_MIN) * b->period_ns;
     b->lazy.bound_ns = t_ns + BOUND_NS;
     if (wake_ns(b) < least_ns) return;
     if (psa2_why_eager(b, t_ns)) b->lazy.ask_ns = least_ns;
@@ -205,6 +213,9 @@ static void skip_again(void *ctx, int64_t t_ns)
 
 void psa2_lazy_init(struct psa2 *b)
 {
+    const struct board_io *io = &b->base.io;
+    for (unsigned i = 0; io->accel_past_ns && i < 3; i++)
+        b->lazy.past_ns = ns_later(b->lazy.past_ns, io->accel_past_ns(io->ctx, i));
     sched_ev_inner(&b->lazy.again, skip_again, b);
 }
 
@@ -212,5 +223,5 @@ void psa2_lazy_stop(struct psa2 *b)
 {
     sched_cancel(b->base.sched, &b->lazy.again);
     b->base.sched->asleep -= b->lazy.sleep != PSA2_AWAKE;
-    b->lazy = (struct psa2_lazy){.sleep = PSA2_AWAKE, .again = b->lazy.again};
+    b->lazy = (struct psa2_lazy){.sleep = PSA2_AWAKE, .again = b->lazy.again, .past_ns = b->lazy.past_ns};
 }

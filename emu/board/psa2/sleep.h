@@ -27,6 +27,7 @@ enum psa2_sleep { PSA2_AWAKE, PSA2_ASLEEP, PSA2_WAKING };
 struct psa2_lazy {
     enum psa2_sleep sleep;
     unsigned left;           /* WAKING: frames until all is as if it had never slept */
+    int64_t past_ns;         /* of what the sensors remember most; 0: nothing */
     int64_t span_ns;         /* ASLEEP: from data-ready to the end of its frame, at most */
     int64_t ask_ns;          /* AWAKE: not before is it asked whether it may sleep */
     int64_t bound_ns;        /* ASLEEP: not known to be harmless for longer */

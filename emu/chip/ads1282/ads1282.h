@@ -70,14 +70,15 @@ void ads1282_play(struct ads1282 *a, const struct ads1282_recording *r, int64_t 
 /* Why each word has to be computed, for volts at the input within a range; NULL: it need not. A sentence's end. */
 const char *ads1282_why_eager(const struct ads1282 *a, struct looks_range vin_v);
 
-bool ads1282_rests(const struct ads1282 *a); /* settled, its last word read, nothing under way: put_off() may come */
+/* Settled, its last word read, nothing under way: put_off() may come. more_periods: as of ads1282_resume(). */
+bool ads1282_rests(const struct ads1282 *a, int64_t more_periods);
 
 void ads1282_put_off(struct ads1282 *a);          /* words are 0 from here on, no samples are taken */
 void ads1282_skip(struct ads1282 *a, uint32_t n); /* n data periods pass, each word read in time; between two ends */
 
-/* Words are computed again. The samples that the filter still holds are to be taken by ads1282_sample_until() the ends of
+/* Words are computed again. The samples that the filter still holds, and those of more_periods before, are to be taken by ads1282_sample_until() the ends of
  * the data periods from the returned one to the last; *before_ns: of the sample before these. */
-int64_t ads1282_resume(struct ads1282 *a, int64_t *before_ns);
+int64_t ads1282_resume(struct ads1282 *a, int64_t more_periods, int64_t *before_ns);
 int64_t ads1282_end_ns(const struct ads1282 *a, int64_t period); /* DRDY falls, if the word is settled */
 
 /* CONFIG0 gives one settled FIR word a data period and nothing else: pulse sync, sinc + FIR, a published rate. What a

@@ -31,11 +31,11 @@ const char *ads1282_why_eager(const struct ads1282 *a, struct looks_range vin_v)
 }
 
 /* The read is over or, when the next word comes, given up. */
-bool ads1282_rests(const struct ads1282 *a)
+bool ads1282_rests(const struct ads1282 *a, int64_t more_periods)
 {
     return a->due.queued && a->due.due_ns - a->sclk_ns >= a->rest_ns && a->rdatac && !a->rdata_due && a->drdy &&
            !a->unread && !a->op && a->spi.bits == 0 && !a->pulse.queued && !a->watch.queued &&
-           a->period > a->timing.settle + 2 * MEMORY_PERIODS;
+           a->period > a->timing.settle + 2 * MEMORY_PERIODS + more_periods;
 }
 
 int64_t ads1282_end_ns(const struct ads1282 *a, int64_t p)
@@ -52,12 +52,13 @@ void ads1282_skip(struct ads1282 *a, uint32_t n)
     sched_at(a->sched, &a->due, clk_on(a->ended, &a->period_step).t_ns);
 }
 
-int64_t ads1282_resume(struct ads1282 *a, int64_t *before_ns)
+int64_t ads1282_resume(struct ads1282 *a, int64_t more_periods, int64_t *before_ns)
 {
     const struct ads1282_timing *t = &a->timing;
     const int64_t taken = (ads1282_due_tclk(a, a->period - 1) - t->origin_tclk) / t->step_tclk + 1;
-    const int64_t index = (taken / ADS1282_BLOCKS - MEMORY_PERIODS) * ADS1282_BLOCKS;
+    const int64_t periods = MEMORY_PERIODS + more_periods;
+    const int64_t index = (taken / ADS1282_BLOCKS - periods) * ADS1282_BLOCKS;
     *before_ns = clk_edge_ns(&a->clk, a->sync_count + t->origin_tclk + (index - 1) * t->step_tclk);
     ads1282_chain_resume(a, index);
-    return a->period - MEMORY_PERIODS - 2;
+    return a->period - periods - 2;
 }

@@ -6,11 +6,13 @@
  *
  *   y(T) = y(30) + curve x exp((1 - x^2) / 2) + slope (T - 30),   x = (T - centre) / width,
  *
- * T with a play; the zero has a part for case - element besides. A positive curve is the article's group (a), a negative one its
+ * T with a play, which its owner has (chamber.h); the zero has a part for case - element besides. A positive curve is the article's group (a), a negative one its
  * group (b). Two causes move all three from start to start: the residual stress of the glue, of which each thermal cycle leaves
  * a part, and the position of the pendulum, sealed in for good but for a scatter that is drawn at each start.
  *
- * The loop answers as one oscillator of second order, exactly for an input held since the look before. Deflected, the pendulum
+ * The loop answers as one oscillator of second order, exactly for an input held since the look before. What it holds of the past
+ * is finite: it is started anew, in balance, at the first look of each period of a fixed grid, and answers in the next period;
+ * what it did not know then has decayed by exp(-40). Two pasts that agree for two periods have the same answer to the bit. Deflected, the pendulum
  * feels the acceleration along y (vibropendulous error). Then the white noise, one draw for each instant (looks.h), and the
  * limits. a = projection of gravity on the sensor's axes as in mems.h, m/s^2; output in amperes. Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_QUARTZ_H
@@ -53,25 +55,32 @@ struct quartz_g {
 
 /* What temperature, cycles and starts make of a unit, and for which of them it holds. */
 struct quartz_terms {
-    double felt_degc, element_degc, case_degc, cycles; /* felt: element with play */
+    double felt_degc, element_degc, case_degc, cycles;
     int64_t start;
     double scale_a_per_g, zero_ug, tilt_y_mrad;
+};
+
+struct quartz_loop {
+    double input_g;
+    double off_g[2]; /* deflection off the input, and its rate times the step's unit */
 };
 
 struct quartz {
     struct quartz_g cfg; /* with what follows from its pendulum */
     double g_mps2;
-    double case_degc, element_degc; /* its owner keeps them up; the reference temperature from quartz_init() on */
+    /* Its owner keeps them up; the reference temperature from quartz_init() on. felt: element with play. */
+    double case_degc, element_degc, felt_degc;
     double cycles;                  /* thermal cycles since then, as chamber_body_cycles() counts them; its owner too */
     uint32_t starts;                /* since then: quartz_start() */
     struct quartz_terms terms;      /* of the last look */
     struct draws noise, scatter;
-    int64_t t_ns;     /* of the last look; -1 before the first */
-    int64_t dt_ns;    /* for which the coefficients of the loop hold */
-    double loop_g[2]; /* deflection off the present input, and its rate times the step's unit */
-    double input_g;
-    double step[2][2]; /* (deviation, rate / w) of the loop over dt_ns */
-    double held_a;     /* of the last look, without noise */
+    int64_t t_ns;               /* of the last look; -1 before the first */
+    int64_t dt_ns;              /* for which the coefficients of the loop hold */
+    int64_t every_ns;           /* period of the loop's grid; 0: its memory is too long for one */
+    int64_t end_ns;             /* of the present period; 0: a look is the first */
+    struct quartz_loop loop[2]; /* that answers now, and that will in the next period */
+    double step[2][2];          /* (deviation, rate / w) of the loop over dt_ns */
+    double held_a;              /* of the last look, without noise */
 };
 
 /* Plausible figures (E0): 1.28 mA/g, 350 Hz with 0.7, zero 60 ug with a curve of 300 ug, 55 K wide about 12 degC. Of the two
@@ -99,5 +108,14 @@ void quartz_out_row_a(struct quartz *q, const double *a_mps2, unsigned felt, con
 
 /* Its pickoff at the last look: truth. False: nothing is known of its pendulum. */
 bool quartz_pickoff(const struct quartz *q, struct pickoff *out);
+
+/* How much of the past an output shows: looks since then decide it to the bit. -1: no one knows. */
+int64_t quartz_past_ns(const struct quartz *q);
+
+/* Whatever was before: as if the last look had been at t_ns. Outputs are true quartz_past_ns() after the next one. */
+void quartz_skip(struct quartz *q, int64_t t_ns);
+
+/* What its outputs stay within for accelerations of at most a_max, looks every_ns apart, at -100 to 200 degC. */
+struct looks_range quartz_range_a(const struct quartz *q, double a_max_mps2, int64_t every_ns);
 
 #endif
