@@ -11,6 +11,7 @@
 #define VALID_FRAMES 2  /* from there until the latest frame, registers and lines are true */
 #define SLEEP_MIN    14 /* frames more than waking up costs; and from one question whether it may to the next */
 #define MEMORY       66 /* frames that waking up costs where no sensor remembers */
+#define BEFORE       4  /* and the two in which it reads what is older still, and the one under way */
 
 /* Drifts are bounded for so long; then the board wakes up as if someone looked. */
 #define BOUND_NS (INT64_C(86400) * NS_PER_S)
@@ -83,6 +84,7 @@ static void fall_asleep(struct psa2 *b, int64_t t_ns)
     b->lazy.sleep = PSA2_ASLEEP;
     b->lazy.span_ns = span_ns(b, t_ns);
     b->lazy.temp_ns = 0;
+    b->lazy.held_ns = t_ns + (MEMORY + more_periods(b) + BEFORE) * b->period_ns;
     psa2_cycle_begin(b);
     b->base.sched->asleep++;
 }
@@ -172,10 +174,11 @@ static int64_t wake_ns(const struct psa2 *b)
     return ns_earlier(look_ns, b->lazy.bound_ns) - WAKE_FRAMES * b->period_ns;
 }
 
-/* Later, where temperature conversions have been skipped beyond: an unexpected look. */
-static int64_t not_before_temp_ns(const struct psa2 *b, int64_t t_ns)
+/* Later, where temperature conversions have been skipped beyond, or where the filters would reach back to before it fell asleep,
+ * when the world was not yet what it is: an unexpected look. */
+static int64_t not_before_ns(const struct psa2 *b, int64_t t_ns)
 {
-    return ns_later(t_ns, b->lazy.temp_ns);
+    return ns_later(ns_later(t_ns, b->lazy.temp_ns), b->lazy.held_ns);
 }
 
 static void look_for_sleep(struct psa2 *b, int64_t t_ns)
@@ -193,7 +196,7 @@ void psa2_lazy_sleep(struct psa2 *b)
     if (b->lazy.sleep != PSA2_ASLEEP || !is_steady(b)) return;
     const int64_t look_ns = wake_ns(b);
     psa2_temp_skip(b, look_ns);
-    const int64_t own_ns = next_own_ns(b), until_ns = not_before_temp_ns(b, look_ns);
+    const int64_t own_ns = next_own_ns(b), until_ns = not_before_ns(b, look_ns);
     skip_frames(b, ns_earlier(own_ns, until_ns));
 }
 
@@ -201,7 +204,7 @@ void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)
 {
     if (b->lazy.sleep == PSA2_WAKING) end_waking(b);
     else if (b->lazy.sleep == PSA2_AWAKE) look_for_sleep(b, t_ns);
-    else if (t_ns >= not_before_temp_ns(b, wake_ns(b))) wake_up(b);
+    else if (t_ns >= not_before_ns(b, wake_ns(b))) wake_up(b);
     psa2_lazy_sleep(b);
 }
 

@@ -31,6 +31,7 @@ struct psa2_lazy {
     int64_t span_ns;         /* ASLEEP: from data-ready to the end of its frame, at most */
     int64_t ask_ns;          /* AWAKE: not before is it asked whether it may sleep */
     int64_t bound_ns;        /* ASLEEP: not known to be harmless for longer */
+    int64_t held_ns;         /* ASLEEP: does not wake up before */
     int64_t temp_ns;         /* ASLEEP: until then codes of conversions that were skipped are left */
     struct psa2_cycle cycle; /* ASLEEP */
     struct sched_ev again;   /* ASLEEP: more conversions may be skipped */

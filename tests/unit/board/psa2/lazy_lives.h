@@ -93,12 +93,40 @@ static const struct psa2_profile *random_profile(struct life *l)
     return &p;
 }
 
+/* Of the article, or any other; every fifth has a loop that is too slow to sleep. */
+static struct quartz_g random_quartz(struct life *l)
+{
+    struct quartz_g q = quartz_default();
+    q.pendulum_given = choose(l, 2);
+    q.natural_hz = (double[]){0.0, 3000.0, 350.0, 100.0, 30.0}[choose(l, 5)];
+    q.damping = uniform(l, 0.5, 0.99);
+    q.zero_ug = uniform(l, -150.0, 150.0);
+    q.curve_ug = uniform(l, -500.0, 500.0);
+    q.scale_curve_ppm = q.scale_tc_ppm_per_k = uniform(l, -100.0, 100.0);
+    q.play_k = choose(l, 3) ? uniform(l, 0.0, 5.0) : 0.0;
+    q.glue_ug = uniform(l, 0.0, 400.0);
+    q.start_ug = choose(l, 2) ? 12.6 : 0.0;
+    q.pendulous_ug_per_g2 = choose(l, 2) ? uniform(l, -200.0, 200.0) : 0.0;
+    q.tilt_y_mrad = uniform(l, -2.0, 2.0);
+    q.noise_a_rthz = choose(l, 2) ? 4e-10 : 0.0;
+    q.limit_a = choose(l, 3) ? 0.0 : 1.1e-3; /* now and then in force */
+    return q;
+}
+
+static enum unit_sensor random_sensor(struct life *l, bool quartz)
+{
+    if (choose(l, 20) == 0) return UNIT_NO_SENSOR;
+    return quartz == (choose(l, 10) > 0) ? UNIT_QUARTZ : UNIT_MEMS;
+}
+
 static struct unit_cfg random_unit(struct life *l)
 {
+    const bool quartz = choose(l, 3) == 0;
     struct unit_cfg c = unit_default("a");
     c.board.seed = rng_u64(&l->r);
     for (unsigned i = 0; i < UNIT_AXES; i++) {
-        c.axis[i].sensor = choose(l, 20) ? UNIT_MEMS : choose(l, 2) ? UNIT_NO_SENSOR : UNIT_QUARTZ;
+        c.axis[i].sensor = random_sensor(l, quartz);
+        c.axis[i].quartz = random_quartz(l);
         c.axis[i].mems = (struct mems_g){.u0_v = choose(l, 30) ? uniform(l, -0.5, 2.5) : 9.5,
                                          .kx_v_per_g = 1.2,
                                          .ky_v_per_g = 0.01,
@@ -143,7 +171,8 @@ static void begin(struct life *l, uint64_t seed, const struct board_type *beside
     world.chamber.present = choose(l, 2);
     world.chamber.ramp_k_per_min = world.chamber.heating_max_k_per_min = world.chamber.cooling_max_k_per_min = 600.0;
     world.chamber.tau_case_s = 0.5;
-    world.head = (struct head_cfg){.turn_s = uniform(l, 0.0, 0.3)};
+    world.chamber.tau_element_s = choose(l, 2) ? 0.3 : 360.0;
+    world.head = (struct head_cfg){.turn_s = uniform(l, 0.0, choose(l, 2) ? 0.3 : 2.0)};
     lab_init(&l->lab, &world, 1);
     const struct unit_cfg c = random_unit(l);
     unit_init(&l->u, &c, &l->lab, &l->s);
@@ -182,6 +211,7 @@ static void heat(struct life *l)
     if (!l->lab.chamber.cfg.present) return;
     unit_sample_until(&l->u, l->s.now_ns);
     if (l->beside) unit_sample_until(&l->other, l->s.now_ns);
+    if (choose(l, 3) == 0) chamber_overshoot(&l->lab.chamber, uniform(l, 0.0, 10.0), l->s.now_ns);
     (void)chamber_set(&l->lab.chamber, uniform(l, -50.0, 80.0), l->s.now_ns);
 }
 
@@ -304,6 +334,15 @@ static void add_chip(struct sha256 *h, const struct ads1282 *a)
     sha256_add(h, &a->rest_periods, sizeof a->rest_periods);
 }
 
+static void add_quartz(struct sha256 *h, const struct quartz *q)
+{
+    sha256_add(h, &q->terms, sizeof q->terms);
+    sha256_add(h, &q->t_ns, sizeof q->t_ns);
+    sha256_add(h, &q->end_ns, sizeof q->end_ns);
+    sha256_add(h, q->loop, sizeof q->loop);
+    sha256_add(h, &q->held_a, sizeof q->held_a);
+}
+
 static void add_board(struct sha256 *h, struct psa2 *b)
 {
     b->base.type->digest(&b->base, h);
@@ -317,6 +356,7 @@ static void add_board(struct sha256 *h, struct psa2 *b)
     sha256_add(h, &b->board_degc, sizeof b->board_degc);
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         add_chip(h, &b->adc[i]);
+        add_quartz(h, &life.u.quartz[i]);
         sha256_add(h, &b->base.afe[i].state_v, sizeof b->base.afe[i].state_v);
         sha256_add(h, &b->base.afe[i].t_ns, sizeof b->base.afe[i].t_ns);
     }
