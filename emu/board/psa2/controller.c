@@ -403,5 +403,6 @@ bool psa2_ready(const struct psa2 *b)
 
 void psa2_sample_until(struct psa2 *b, int64_t t_ns)
 {
+    psa2_lazy_change(b, t_ns);
     for (unsigned i = 0; i < 3; i++) ads1282_sample_until(&b->adc[i], t_ns);
 }

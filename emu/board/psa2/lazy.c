@@ -208,6 +208,13 @@ void psa2_lazy_frame(struct psa2 *b, int64_t t_ns)
     psa2_lazy_sleep(b);
 }
 
+/* What does not hold now may hold from here on. The filters have to forget what came before: a fault may be in them. */
+void psa2_lazy_change(struct psa2 *b, int64_t t_ns)
+{
+    if (b->mode != PSA2_RUN || b->lazy.sleep == PSA2_ASLEEP || !psa2_why_eager(b, t_ns)) return;
+    b->lazy.ask_ns = ns_later(b->lazy.ask_ns, t_ns + (MEMORY + more_periods(b) + BEFORE) * b->period_ns);
+}
+
 static void skip_again(void *ctx, int64_t t_ns)
 {
     (void)t_ns;
