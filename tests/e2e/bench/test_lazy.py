@@ -14,10 +14,12 @@ def future(bench: Bench) -> list[tuple[int, ...]]:
     return [tuple(int(v * 1e12) for v in readings.axis(a)) for a in "xyz"]
 
 
-def life(tmp_path: Path, name: str, *extra: str) -> tuple[str, list[list[tuple[int, ...]]]]:
+def life(tmp_path: Path, scenario: str, name: str, *extra: str) -> tuple[str, list[list[tuple[int, ...]]]]:
     """The snapshot's text, then what comes after it: here, in a fork, restored."""
     path = tmp_path / name
-    with Bench.start("calibrate", extra=extra) as bench:
+    with Bench.start(scenario, extra=extra) as bench:
+        if scenario == "quartz_chamber":
+            bench.chamber.set(-20.0)
         bench.run_for(3.2104567)
         bench.head.turn(70.0)
         bench.run_for(1.7001)
@@ -33,15 +35,17 @@ def life(tmp_path: Path, name: str, *extra: str) -> tuple[str, list[list[tuple[i
     return path.read_text(), [here, forked, restored]
 
 
-def test_lazy_and_eager_go_on_to_the_same_bytes(tmp_path: Path) -> None:
-    lazy, futures = life(tmp_path, "lazy.snapshot")
-    eager, others = life(tmp_path, "eager.snapshot", "--eager")
+@pytest.mark.parametrize("scenario", ["calibrate", "quartz_chamber"])
+def test_lazy_and_eager_go_on_to_the_same_bytes(tmp_path: Path, scenario: str) -> None:
+    lazy, futures = life(tmp_path, scenario, "lazy.snapshot")
+    eager, others = life(tmp_path, scenario, "eager.snapshot", "--eager")
     assert lazy == eager
     assert all(f == futures[0] for f in [*futures, *others])
 
 
 SENSOR = "{sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0}"
 LONE = f"axes: {{x: {SENSOR}, y: {SENSOR}, z: {SENSOR}}}"
+SLOW = "{sensor: quartz, afe: {input: current}, quartz: {natural_hz: 20}}"
 PSD1 = "skipping its read cycles is not built, and its gyros integrate step by step"
 UNITS = {
     "still": ("on: fixed", None),
@@ -51,6 +55,7 @@ UNITS = {
     "slow": ("adc_chain: modulator", "a converter's filter has no finite memory"),
     "warm": ("profile: ungated", "bursts for the temperature converter reach the others"),
     "psd": ("board: psd1", PSD1),
+    "loop": (f"on: fixed, axes: {{x: {SLOW}}}", "the loop of a quartz sensor remembers long"),
     "pmka": ("board: pmka", "its integrators hold the past"),
 }
 
@@ -58,7 +63,7 @@ UNITS = {
 def test_units_say_why_they_do_not_sleep(tmp_path: Path) -> None:
     path = tmp_path / "units.yaml"
     units = "".join(
-        f"  - {{name: {n}, node: {k}, serial: {k}, {said}, {LONE}}}\n"
+        f"  - {{name: {n}, node: {k}, serial: {k}, {said}{'' if 'axes' in said else ', ' + LONE}}}\n"
         for k, (n, (said, _)) in enumerate(UNITS.items(), 5)
     )
     path.write_text(f"units:\n{units}")
