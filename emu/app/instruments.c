@@ -1,6 +1,7 @@
 #include "app/instruments.h"
 
 #include "base/why.h"
+#include "fault/scpi.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -8,15 +9,72 @@
 
 /* ---- sessions */
 
+/* An answer that comes later. */
+struct late {
+    struct sched_ev ev; /* first */
+    struct session *session;
+    struct late *next;
+    size_t n;
+    char text[SCPI_OUT_MAX];
+};
+
 struct session {
     struct scpi scpi; /* first */
     struct instruments *all;
     struct scpi_peer *peer;
+    struct late *late; /* in order */
 };
+
+static struct fault_scpi faults_of(const struct session *s)
+{
+    return fault_scpi_of(s->all->control->bench->faults, s->scpi.kind->name);
+}
+
+static void on_late(void *ctx, int64_t t_ns)
+{
+    struct late *l = ctx;
+    (void)t_ns;
+    l->session->late = l->next;
+    scpi_port_reply(l->session->peer, l->text, l->n);
+    free(l);
+}
+
+/* After those that are late already. */
+static bool put_off(struct session *s, const char *text, size_t n, int64_t late_ns)
+{
+    struct late *l = calloc(1, sizeof *l), **at = &s->late;
+    int64_t due_ns = s->all->sched->now_ns + late_ns;
+    if (!l) return false;
+    for (; *at; at = &(*at)->next) due_ns = ns_later(due_ns, (*at)->ev.due_ns);
+    *at = l;
+    l->session = s;
+    l->n = n;
+    memcpy(l->text, text, n);
+    sched_ev_inner(&l->ev, on_late, l);
+    sched_at(s->all->sched, &l->ev, due_ns);
+    return true;
+}
+
+static void drop_late(struct session *s)
+{
+    while (s->late) {
+        struct late *l = s->late;
+        s->late = l->next;
+        sched_cancel(s->all->sched, &l->ev);
+        free(l);
+    }
+}
 
 static void on_reply(void *ctx, const char *text, size_t n)
 {
-    scpi_port_reply(((struct session *)ctx)->peer, text, n);
+    struct session *s = ctx;
+    char sent[SCPI_OUT_MAX];
+    const struct fault_scpi f = faults_of(s);
+    if (f.silent) return;
+    memcpy(sent, text, n);
+    fault_scpi_garble(&f, sent, n);
+    if ((f.late_ns > 0 || s->late) && put_off(s, sent, n, f.late_ns)) return;
+    scpi_port_reply(s->peer, sent, n);
 }
 
 static void *on_opened(void *ctx, struct scpi_peer *peer)
@@ -44,12 +102,14 @@ static void on_closed(void *ctx)
     while (*p != &s->scpi) p = &(*p)->next;
     *p = s->scpi.next;
     scpi_close(&s->scpi);
+    drop_late(s);
     free(s);
 }
 
 static void on_line(void *ctx, const char *line, size_t len, int64_t t_ns)
 {
     struct session *s = ctx;
+    if (faults_of(s).silent) return;
     scpi_line(&s->scpi, line, len, t_ns);
     instruments_look(s->all, t_ns);
 }

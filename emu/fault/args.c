@@ -43,6 +43,9 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_RATE_PART] = {"rate_part", CONTROL_REAL, true, NULL, 1e-6, 0.99, .what = "part of the chamber's ramp that the air makes; 1e-6: it sticks"},
     [FAULT_READOUT_K] = {"readout_k", CONTROL_REAL, true, "K", -200, 200, .what = "error of the chamber's thermometer", .least = 0.1},
     [FAULT_RIPPLE_DPS] = {"ripple_dps", CONTROL_REAL, true, "deg/s", 1e-3, 100, .what = "amplitude of the rate of a table's axis"},
+    [FAULT_OVERSHOOT_K] = {"overshoot_k", CONTROL_REAL, true, "K", 0.1, 50, .what = "how far the chamber's air goes past its set point"},
+    [FAULT_SLIP_DEG] = {"slip_deg", CONTROL_REAL, true, "deg", -10, 10, .what = "by which each turn leaves the mount short of the head's scale", .least = 1e-3},
+    [FAULT_LATE_S] = {"late_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "delay of an instrument's answers, simulated time"},
 };
 // clang-format on
 _Static_assert(FAULT_ARGS <= CONTROL_ARGS_MAX, "all values of a command fit");

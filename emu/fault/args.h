@@ -50,6 +50,9 @@ enum fault_arg {
     FAULT_RATE_PART,
     FAULT_READOUT_K,
     FAULT_RIPPLE_DPS,
+    FAULT_OVERSHOOT_K,
+    FAULT_SLIP_DEG,
+    FAULT_LATE_S,
     FAULT_ARGS
 };
 

@@ -1,4 +1,4 @@
-/* Faults of the instruments: the supply; the chamber; an axis of the table; of the gyro-stabilised platform the torquers and
+/* Faults of the instruments: the supply; the chamber; the dividing head; an axis of the table; of the gyro-stabilised platform the torquers and
  * the drift of an axis, and the gimbal's angle sensor. */
 #include "fault/internal.h"
 
@@ -89,16 +89,35 @@ static void refresh_sensor(struct fault *f, int64_t t_ns)
 static void refresh_chamber(struct fault *f, int64_t t_ns)
 {
     struct chamber *c = &f->engine->bench->lab->chamber;
-    double part = 1.0, misreading_k = 0.0;
+    double part = 1.0, misreading_k = 0.0, overshoot_k = 0.0;
     for (unsigned i = 0; i < FAULTS_MAX; i++) {
         const struct fault *other = &f->engine->fault[i];
         if (!fault_lasts_at(f, other)) continue;
         if (fault_given(other, FAULT_RATE_PART)) part *= other->value[FAULT_RATE_PART];
         if (fault_given(other, FAULT_READOUT_K)) misreading_k += other->value[FAULT_READOUT_K];
+        if (fault_given(other, FAULT_OVERSHOOT_K)) overshoot_k += other->value[FAULT_OVERSHOOT_K];
     }
     control_settle_inputs(f->engine->bench, t_ns);
     chamber_hinder(c, fmax(part, RATE_PART_LEAST), t_ns);
+    chamber_overshoot(c, overshoot_k, t_ns);
     chamber_mislead(c, misreading_k);
+}
+
+/* ---- dividing head */
+
+static void refresh_stick(struct fault *f, int64_t t_ns)
+{
+    double unused;
+    control_settle_inputs(f->engine->bench, t_ns);
+    head_stick(&f->engine->bench->lab->head, count_active(f, FAULT_ID, &unused) > 0, t_ns);
+}
+
+static void refresh_slip(struct fault *f, int64_t t_ns)
+{
+    double step_deg;
+    (void)t_ns; /* it waits for a turn */
+    (void)count_active(f, FAULT_SLIP_DEG, &step_deg);
+    head_slip(&f->engine->bench->lab->head, step_deg);
 }
 
 /* ---- table */
@@ -140,6 +159,12 @@ static const struct fault_kind lab[] = {
      .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_RATE_PART), .lift = refresh_chamber},
     {"chamber.readout", "The thermometer of the chamber reads readout_k too much.", "the chamber's reading differs from the temperature codes by readout_k; at rest it is off its set point",
      .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_READOUT_K), .nonzero = FAULT_BIT(FAULT_READOUT_K), .lift = refresh_chamber},
+    {"chamber.overshoot", "The air of the chamber goes overshoot_k past its set point (no farther than the step) and comes back with its ramp.", "the chamber's reading and the temperature codes pass the set point; CHAMBER reports SETTLING longer than its ramp takes",
+     .places = FAULT_BIT(FAULT_AT_CHAMBER), .need = FAULT_BIT(FAULT_OVERSHOOT_K), .lift = refresh_chamber},
+    {"head.stick", "The dividing head sticks: it stops at once, and turns move nothing.", "the scale shows another angle than was set; the codes stay",
+     .places = FAULT_BIT(FAULT_AT_HEAD), .lift = refresh_stick},
+    {"head.slip", "The mount slips on its axis: each turn leaves it slip_deg short of the scale, one after another. The first turn after the fault makes it good.", "the scale shows what was set, the codes belong to another angle",
+     .places = FAULT_BIT(FAULT_AT_HEAD), .need = FAULT_BIT(FAULT_SLIP_DEG), .nonzero = FAULT_BIT(FAULT_SLIP_DEG), .lift = refresh_slip},
     {"table.ripple", "The servo of the axis ripples: a sine of amplitude ripple_dps in its rate.", "a spectral line at frequency_hz in the readout of the rate, and in the codes of a unit on the table",
      .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ), .apply = ripple_axis, .lift = lift_ripple},
 };

@@ -22,6 +22,8 @@ static const struct {
     [FAULT_AT_ENCODER] = {"platform.encoder", "the angle sensor of the platform"},
     [FAULT_AT_CHAMBER] = {"chamber", "the thermal chamber"},
     [FAULT_AT_TABLE] = {"table.N", "an axis of the rate table"},
+    [FAULT_AT_HEAD] = {"head", "the dividing head"},
+    [FAULT_AT_SCPI] = {"scpi.head|table|chamber|supply", "the SCPI link of an instrument"},
 };
 
 const char *fault_place_any(enum fault_place place)
@@ -110,26 +112,19 @@ static unsigned client_count(const struct control_bench *b)
     return n;
 }
 
-static bool point_of_supply(struct fault_point *p, char *name)
-{
-    *p = (struct fault_point){.place = FAULT_AT_SUPPLY};
-    snprintf(name, FAULT_POINT_MAX, "supply");
-    return true;
-}
-
-static bool point_of_platform(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
+static bool point_of_platform(unsigned n, struct fault_point *p, char *name)
 {
     static const char *const names[] = {[PLATFORM_LEVEL] = "level", [PLATFORM_AZIMUTH] = "azimuth", "encoder"};
-    if (!b->lab || !b->lab->platform.cfg.present || n > PLATFORM_AXES) return false;
     *p = (struct fault_point){.place = n < PLATFORM_AXES ? FAULT_AT_TORQUER : FAULT_AT_ENCODER, .index = n};
     snprintf(name, FAULT_POINT_MAX, "platform.%s", names[n]);
     return true;
 }
 
-static bool point_of_chamber(struct fault_point *p, char *name)
+/* An instrument of which there is one. */
+static bool point_of_whole(enum fault_place place, struct fault_point *p, char *name)
 {
-    *p = (struct fault_point){.place = FAULT_AT_CHAMBER};
-    snprintf(name, FAULT_POINT_MAX, "chamber");
+    *p = (struct fault_point){.place = place};
+    snprintf(name, FAULT_POINT_MAX, "%s", places[place].name);
     return true;
 }
 
@@ -140,14 +135,37 @@ static bool point_of_table(unsigned axis, struct fault_point *p, char *name)
     return true;
 }
 
-/* The n-th of the instruments that not every bench has. */
+const char *const fault_scpi_instruments[FAULT_SCPI_LINKS] = {"head", "table", "chamber", "supply"};
+
+/* The link of the n-th instrument that the bench has. */
+static bool point_of_link(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
+{
+    const struct lab *l = b->lab;
+    const bool has[FAULT_SCPI_LINKS] = {l != NULL, l && l->table.cfg.axes > 0, l && l->chamber.cfg.present,
+                                        l && l->supply.cfg.present};
+    for (unsigned i = 0; i < FAULT_SCPI_LINKS; i++) {
+        if (!has[i] || n-- > 0) continue;
+        *p = (struct fault_point){.place = FAULT_AT_SCPI, .index = i};
+        snprintf(name, FAULT_POINT_MAX, "scpi.%s", fault_scpi_instruments[i]);
+        return true;
+    }
+    return false;
+}
+
+/* The n-th of the instruments that not every bench has, then of those that came to have faults later. */
 static bool point_of_instrument(const struct control_bench *b, unsigned n, struct fault_point *p, char *name)
 {
     const bool chamber = b->lab && b->lab->chamber.cfg.present;
     const unsigned axes = b->lab ? b->lab->table.cfg.axes : 0;
-    if (chamber && n == 0) return point_of_chamber(p, name);
+    const unsigned platform = b->lab && b->lab->platform.cfg.present ? PLATFORM_AXES + 1 : 0;
+    if (chamber && n == 0) return point_of_whole(FAULT_AT_CHAMBER, p, name);
     n -= chamber;
-    return n < axes ? point_of_table(n, p, name) : point_of_platform(b, n - axes, p, name);
+    if (n < axes) return point_of_table(n, p, name);
+    n -= axes;
+    if (n < platform) return point_of_platform(n, p, name);
+    n -= platform;
+    if (b->lab && n == 0) return point_of_whole(FAULT_AT_HEAD, p, name);
+    return b->lab && point_of_link(b, n - 1, p, name);
 }
 
 /* The n-th of those that are not a unit's; false past the last. */
@@ -168,7 +186,7 @@ static bool bench_point(const struct control_bench *b, unsigned n, struct fault_
         snprintf(name, FAULT_POINT_MAX, "client.%" PRIu32, c.connection);
         return true;
     }
-    return n == programs ? point_of_supply(p, name) : point_of_instrument(b, n - programs - 1, p, name);
+    return n == programs ? point_of_whole(FAULT_AT_SUPPLY, p, name) : point_of_instrument(b, n - programs - 1, p, name);
 }
 
 bool fault_point_next(const struct control_bench *b, struct fault_points *at, struct fault_point *p,

@@ -20,6 +20,8 @@ enum fault_place {
     FAULT_AT_ENCODER,    /* platform.encoder */
     FAULT_AT_CHAMBER,    /* chamber */
     FAULT_AT_TABLE,      /* table.1: an axis, from the outermost */
+    FAULT_AT_HEAD,       /* head */
+    FAULT_AT_SCPI,       /* scpi.head: by the row of scpi_instruments */
     FAULT_PLACES
 };
 
@@ -35,6 +37,9 @@ struct fault_points {
 /* The next point of a bench with its name; false past the last. */
 bool fault_point_next(const struct control_bench *b, struct fault_points *at, struct fault_point *p,
                       char name[FAULT_POINT_MAX]);
+
+enum { FAULT_SCPI_LINKS = 4 };
+extern const char *const fault_scpi_instruments[FAULT_SCPI_LINKS]; /* "head", as the option --scpi has them */
 
 #define FAULT_NAMES_MAX 64u
 

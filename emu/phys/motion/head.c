@@ -26,24 +26,65 @@ static double draw_rad(struct head *h, double arcsec_rms)
     return arcsec_rms > 0.0 ? arcsec_rms * RAD_PER_ARCSEC * rng_gauss(&h->error) : 0.0;
 }
 
-/* Angle of the mount alone. Smooth start and stop: 3 x^2 - 2 x^3. */
+/* Smooth start and stop: 3 x^2 - 2 x^3. */
+static double turned_rad(const struct head *h, double from_rad, double to_rad, int64_t t_ns)
+{
+    if (t_ns >= h->end_ns) return to_rad;
+    if (t_ns <= h->start_ns) return from_rad;
+    const double x = (double)(t_ns - h->start_ns) / (double)(h->end_ns - h->start_ns);
+    return from_rad + (to_rad - from_rad) * x * x * (3.0 - 2.0 * x);
+}
+
+/* Angle of the mount alone. */
 static double mount_angle_rad(const struct head *h, int64_t t_ns)
 {
-    if (t_ns >= h->end_ns) return h->to_rad;
-    if (t_ns <= h->start_ns) return h->from_rad;
-    const double x = (double)(t_ns - h->start_ns) / (double)(h->end_ns - h->start_ns);
-    return h->from_rad + (h->to_rad - h->from_rad) * x * x * (3.0 - 2.0 * x);
+    return turned_rad(h, h->from_rad, h->to_rad, t_ns);
+}
+
+static double slip_rad(const struct head *h, int64_t t_ns)
+{
+    return turned_rad(h, h->slip_from_rad, h->slip_to_rad, t_ns);
+}
+
+/* What the faults make of a turn. */
+static void hinder_turn(struct head *h)
+{
+    const double way_rad = h->to_rad - h->from_rad - h->slip_from_rad;
+    h->slip_to_rad = h->slip_step_rad == 0.0 ? 0.0 : h->slip_from_rad + (way_rad < 0.0 ? -1.0 : 1.0) * h->slip_step_rad;
+    h->to_rad -= h->slip_to_rad;
+    if (!h->stuck) return;
+    h->to_rad = h->from_rad;
+    h->slip_to_rad = h->slip_from_rad;
 }
 
 void head_turn(struct head *h, double angle_deg, int64_t t_ns)
 {
+    const double slipped_rad = slip_rad(h, t_ns);
     h->from_rad = mount_angle_rad(h, t_ns);
+    h->slip_from_rad = slipped_rad;
     h->scale_rad = quantise_rad(&h->cfg, angle_deg * RAD_PER_DEG);
     h->setting_rad = draw_rad(h, h->cfg.setting_error_arcsec_rms);
     h->to_rad = h->scale_rad + h->setting_rad + periodic_rad(&h->cfg, h->scale_rad);
+    hinder_turn(h);
     h->start_ns = t_ns;
     h->end_ns = t_ns + (int64_t)(h->cfg.turn_s * (double)NS_PER_S + 0.5);
     h->rest_known = false;
+}
+
+void head_stick(struct head *h, bool stuck, int64_t t_ns)
+{
+    h->stuck = stuck;
+    if (!stuck || head_at_rest(h, t_ns)) return;
+    const double angle_rad = mount_angle_rad(h, t_ns), slipped_rad = slip_rad(h, t_ns);
+    h->from_rad = h->to_rad = angle_rad;
+    h->slip_from_rad = h->slip_to_rad = slipped_rad;
+    h->end_ns = t_ns;
+    h->rest_known = false;
+}
+
+void head_slip(struct head *h, double step_deg)
+{
+    h->slip_step_rad = step_deg * RAD_PER_DEG;
 }
 
 void head_mount(struct head *h, enum head_face face, int64_t t_ns)
@@ -92,7 +133,7 @@ struct motion_state head_motion(const struct head *h, int64_t t_ns)
 /* The scale carries its own periodic error: it shows what the operator set, off by the setting error. */
 double head_read_deg(const struct head *h, int64_t t_ns)
 {
-    const double angle_rad = mount_angle_rad(h, t_ns);
+    const double angle_rad = mount_angle_rad(h, t_ns) + slip_rad(h, t_ns);
     return quantise_rad(&h->cfg, angle_rad - periodic_rad(&h->cfg, angle_rad)) / RAD_PER_DEG;
 }
 

@@ -44,6 +44,9 @@ struct head {
     double scale_rad;                   /* what the operator set */
     double from_rad, to_rad;            /* true angle of the mount before and after the turn */
     double setting_rad;                 /* error drawn at the last turn */
+    bool stuck;                         /* of a faulty one: it stays where it is */
+    double slip_step_rad;               /* of a faulty one: each turn leaves the mount so much short of the scale; 0: none */
+    double slip_from_rad, slip_to_rad;  /* by which the scale is ahead of the mount, before and after the turn */
     double mount_rad, mount_before_rad; /* error drawn at the latest mounting and the one before */
     int64_t start_ns, end_ns;           /* of the turn */
     bool rest_known;                    /* gravity at rest, until the next command */
@@ -58,6 +61,11 @@ void head_turn(struct head *h, double angle_deg, int64_t t_ns);
 
 /* Puts the unit on the mount with another face, at once; the angle stays. */
 void head_mount(struct head *h, enum head_face face, int64_t t_ns);
+
+/* Faults. A head that sticks stops at once and stays; a turn then takes its time and moves nothing, and the scale shows it. In one
+ * that slips each turn leaves the mount short of the scale by so much, one after another; the first turn without makes it good. */
+void head_stick(struct head *h, bool stuck, int64_t t_ns);
+void head_slip(struct head *h, double step_deg);
 
 enum head_face head_face(const struct head *h, int64_t t_ns);
 bool head_at_rest(const struct head *h, int64_t t_ns);

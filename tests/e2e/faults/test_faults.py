@@ -75,12 +75,13 @@ def kinds_told() -> list[str]:
 ELSEWHERE = (
     *("controller.capacitor", "controller.stuck_reset", "controller.stuck_key"),  # test_faults_boards.py
     *("platform.torquer", "platform.drift_step", "platform.encoder_stuck"),  # test_gyro.py
-    *("chamber.slow", "chamber.readout", "table.ripple"),  # test_faults_instruments.py
+    *("chamber.slow", "chamber.readout", "chamber.overshoot", "table.ripple"),  # test_faults_instruments.py
 )
+EVERYWHERE = ("head.stick", "head.slip", "scpi.silent", "scpi.late", "scpi.garbled")  # the same file
 
 
 def test_no_kind_is_left_out() -> None:
-    assert sorted(kinds_told()) == sorted([*DETECT, *ELSEWHERE])
+    assert sorted(kinds_told()) == sorted([*DETECT, *ELSEWHERE, *EVERYWHERE])
 
 
 @pytest.mark.parametrize("kind", ELSEWHERE)

@@ -36,6 +36,9 @@ VALUES: dict[str, dict[str, object]] = {
     "chamber.slow": {"rate_part": 0.5},
     "chamber.readout": {"readout_k": 1},
     "table.ripple": {"ripple_dps": 1, "frequency_hz": 1},
+    "chamber.overshoot": {"overshoot_k": 1},
+    "head.slip": {"slip_deg": 1},
+    "scpi.late": {"late_s": 1},
 }
 
 

@@ -1,6 +1,8 @@
 /* The fault engine: what is accepted reaches the part it is for. */
 #include "fault_rig.h"
 
+#include "fault/scpi.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -142,6 +144,108 @@ static void what_was_felt_before_a_fault_of_the_chamber_stays(void **state)
         assert_int_equal(code_of_a_held_ramp(held_ns, false), code_of_a_held_ramp(held_ns, true));
 }
 
+/* 1 K/s from 25 to 35 degC: 2 K and 1 K past it, then back; without them no farther. */
+static void overshoots_of_the_chamber_add_up_and_end(void **state)
+{
+    (void)state;
+    struct chamber_cfg cfg = chamber_default();
+    cfg.present = true;
+    cfg.heating_max_k_per_min = cfg.cooling_max_k_per_min = cfg.ramp_k_per_min = 6000.0;
+    chamber_init(&r.lab.chamber, &cfg);
+    run_to(100 * MS);
+    add("{'kind':'chamber.overshoot','point':'chamber','overshoot_k':2,'for_s':0.3}");
+    add("{'kind':'chamber.overshoot','point':'chamber','overshoot_k':1,'for_s':0.3}");
+    assert_int_equal(chamber_set(&r.lab.chamber, 35.0, 100 * MS), CHAMBER_OK);
+    static const struct {
+        int64_t t_ms;
+        double air_degc;
+    } rows[] = {{200, 35}, {220, 37}, {230, 38}, {240, 37}, {260, 35}, {390, 35}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        run_to(rows[i].t_ms * MS);
+        assert_true(fabs(chamber_air_degc(&r.lab.chamber, rows[i].t_ms * MS) - rows[i].air_degc) < 1e-9);
+    }
+    run_to(410 * MS);
+    assert_int_equal(chamber_set(&r.lab.chamber, 25.0, 410 * MS), CHAMBER_OK);
+    assert_true(fabs(chamber_air_degc(&r.lab.chamber, 515 * MS) - 25.0) < 1e-9);
+}
+
+static double true_deg(int64_t t_ms)
+{
+    return head_angle_rad(&r.lab.head, t_ms * MS) * 57.29577951308232;
+}
+
+/* In the middle of a turn, and for the next one; afterwards it turns again. The scale tells. */
+static void a_head_that_sticks_stays_where_it_is(void **state)
+{
+    (void)state;
+    r.lab.head.cfg.turn_s = 0.1;
+    head_turn(&r.lab.head, 40.0, 0);
+    run_to(50 * MS);
+    add("{'kind':'head.stick','point':'head','for_s':0.3}");
+    assert_true(fabs(true_deg(50) - 20.0) < 1e-9 && head_at_rest(&r.lab.head, 50 * MS));
+    run_to(120 * MS);
+    head_turn(&r.lab.head, 90.0, 120 * MS);
+    assert_false(head_at_rest(&r.lab.head, 150 * MS));
+    assert_true(fabs(true_deg(200) - 20.0) < 1e-9 && head_at_rest(&r.lab.head, 220 * MS));
+    assert_true(fabs(head_read_deg(&r.lab.head, 230 * MS) - 20.0) < 1e-9);
+    run_to(400 * MS);
+    head_turn(&r.lab.head, 90.0, 400 * MS);
+    assert_true(fabs(true_deg(500) - 90.0) < 1e-9);
+    assert_true(fabs(head_read_deg(&r.lab.head, 500 * MS) - 90.0) < 1e-9);
+}
+
+/* 0.5 and 0.25 deg short of each turn, one after another, whichever way; the scale tells nothing. Then it is made good. */
+static void a_head_that_slips_is_short_of_its_scale(void **state)
+{
+    (void)state;
+    r.lab.head.cfg.turn_s = 0.01;
+    add("{'kind':'head.slip','point':'head','slip_deg':0.5,'for_s':0.25}");
+    add("{'kind':'head.slip','point':'head','slip_deg':0.25,'for_s':0.15}");
+    static const struct {
+        int64_t t_ms;
+        double set_deg, is_deg;
+    } rows[] = {{10, 90, 89.25}, {110, 180, 178.5}, {210, 170, 169.0}, {310, 90, 90}};
+    for (size_t i = 0; i < COUNT(rows); i++) {
+        const int64_t t_ms = rows[i].t_ms;
+        run_to(t_ms * MS);
+        const double was_deg = true_deg(t_ms), shown_deg = head_read_deg(&r.lab.head, t_ms * MS);
+        head_turn(&r.lab.head, rows[i].set_deg, t_ms * MS);
+        assert_true(fabs(true_deg(t_ms) - was_deg) < 1e-9);
+        assert_true(fabs(head_read_deg(&r.lab.head, t_ms * MS) - shown_deg) < 1e-9);
+        if (fabs(true_deg(t_ms + 10) - rows[i].is_deg) > 1e-9) fail_msg("%zu: %.9g", i, true_deg(t_ms + 10));
+        assert_true(fabs(head_read_deg(&r.lab.head, (t_ms + 10) * MS) - rows[i].set_deg) < 1e-9);
+    }
+}
+
+/* Each link for itself; delays add up; of ten answers at 0.5 some are garbled and some are not, in one byte each. */
+static void faults_of_a_link_are_those_of_its_instrument(void **state)
+{
+    (void)state;
+    add("{'kind':'scpi.silent','point':'scpi.supply','at_s':0.1,'for_s':0.1}");
+    add("{'kind':'scpi.late','point':'scpi.head','late_s':2}");
+    add("{'kind':'scpi.late','point':'scpi.head','late_s':0.5}");
+    add("{'kind':'scpi.garbled','point':'scpi.head','probability':0.5}");
+    assert_false(fault_scpi_of(&r.engine, "supply").silent);
+    run_to(150 * MS);
+    const struct fault_scpi supply = fault_scpi_of(&r.engine, "supply"), head = fault_scpi_of(&r.engine, "head");
+    assert_true(supply.silent && supply.late_ns == 0 && !supply.garbles);
+    assert_true(!head.silent && head.late_ns == 2500 * MS && head.garbles);
+    unsigned hit = 0;
+    for (unsigned i = 0; i < 20; i++) {
+        char text[] = "12.5", is[] = "12.5";
+        fault_scpi_garble(&head, text, 4);
+        unsigned bytes = 0;
+        for (unsigned k = 0; k < 4; k++) bytes += text[k] != is[k] && (text[k] ^ is[k]) == (char)0x80;
+        assert_true(bytes <= 1);
+        hit += bytes;
+        fault_scpi_garble(&supply, text, 4);
+    }
+    assert_in_range(hit, 3, 17);
+    run_to(250 * MS);
+    assert_false(fault_scpi_of(&r.engine, "supply").silent);
+    assert_false(fault_scpi_of(NULL, "head").silent);
+}
+
 /* Two sines in the rate of one axis, one in another; angle and acceleration belong to the rate. */
 static void ripples_of_a_table_add_up_and_end(void **state)
 {
@@ -242,6 +346,10 @@ int main(void)
         TEST(faults_of_a_chip_add_up),
         TEST(what_is_over_at_once_needs_no_lifting),
         TEST(random_faults_are_seeded_by_their_number),
+        TEST(overshoots_of_the_chamber_add_up_and_end),
+        TEST(a_head_that_sticks_stays_where_it_is),
+        TEST(a_head_that_slips_is_short_of_its_scale),
+        TEST(faults_of_a_link_are_those_of_its_instrument),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
