@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 
 REPLY_S = 10.0  # timeout for an answer, real time
 CONNECT_S = 5.0
+LATE_S = 0.05  # real time in which what came late is read away
 REST_LIMIT_S = 3600.0  # timeout for it, bench time
+TURN_OFF_DEG = 5.0  # a head that is farther off did not turn: five times the largest setting error of a scenario
 NS = 1_000_000_000
 
 Value = TypeVar("Value")
@@ -52,6 +54,7 @@ class Instrument:
         self.address = address
         self._resource = resource
         self._wait = wait
+        self._owes = False  # an answer: the latest command had none in time
 
     def close(self) -> None:
         self._resource.close()
@@ -110,14 +113,35 @@ class Instrument:
         from pyvisa.constants import StatusCode
         from pyvisa.errors import VisaIOError
 
+        where = f"{self.name} at {self.address}: {command}"
         try:
+            self._read_away()
             return self._resource.query(message).strip()
         except VisaIOError as e:
             if e.error_code == StatusCode.error_timeout:
-                raise TimeOut(f"{self.name} at {self.address}: {command}: no answer within {REPLY_S:g} s") from e
-            raise LinkError(f"{self.name} at {self.address}: {command}: {e.description}") from e
-        except (OSError, UnicodeDecodeError) as e:
-            raise LinkError(f"{self.name} at {self.address}: {command}: {e}") from e
+                self._owes = True
+                raise TimeOut(f"{where}: no answer within {REPLY_S:g} s") from e
+            raise LinkError(f"{where}: {e.description}") from e
+        except UnicodeDecodeError as e:
+            raise LinkError(expected("ASCII text", repr(e.object), where)) from e
+        except OSError as e:
+            raise LinkError(f"{where}: {e}") from e
+
+    def _read_away(self) -> None:
+        """An answer that came after its time-out is not that to the next command."""
+        from pyvisa.errors import VisaIOError
+
+        if not self._owes:
+            return
+        self._owes = False
+        timeout_ms, self._resource.timeout = self._resource.timeout, round(LATE_S * 1000)
+        try:
+            while True:
+                self._resource.read_raw()
+        except VisaIOError:
+            return
+        finally:
+            self._resource.timeout = timeout_ms
 
     def _raise_error(self, command: str, error: str) -> None:
         """`error` is the oldest entry of the error queue: -222,"Data out of range;..."; the younger ones go with it."""
@@ -149,9 +173,15 @@ class Head(Instrument):
     at_rest = _Shown("REST?", bool)
 
     def turn(self, angle_deg: float) -> float:
-        """Turn to angle_deg; returns what the scale shows when it stands still, deg."""
+        """Turn to angle_deg; returns what the scale shows when it stands still, deg.
+
+        Raises TimeOut if that is another attitude: it sticks.
+        """
         self.write(f"ANGL {angle_deg!r}")
-        return self._rest_angle_deg()
+        shown_deg = self._rest_angle_deg()
+        if abs((shown_deg - angle_deg + 180.0) % 360.0 - 180.0) > TURN_OFF_DEG:
+            raise TimeOut(f"{self.name}: {angle_deg:g} deg not reached: at rest its scale shows {shown_deg:g} deg")
+        return shown_deg
 
     def mount(self, face: Face | str) -> float:
         """Put the unit on the mount with this face; returns the scale's reading, deg."""

@@ -79,6 +79,15 @@ LEFT_OUT: Mapping[str, str] = {
     "analog.load_open": "the bench's sensors give voltages",
     "analog.load_short": "the bench's sensors give voltages",
     "link.stall": "the host in process could not go on",
+    "chamber.slow": "the chamber stays where it is",
+    "chamber.readout": "no requirement is about the chamber's thermometer",
+    "chamber.overshoot": "the chamber stays where it is",
+    "table.ripple": "the bench's sensors feel no acceleration",
+    "head.stick": "the bench's sensors feel no acceleration",
+    "head.slip": "the bench's sensors feel no acceleration",
+    "scpi.silent": "the host speaks to no instrument by SCPI",
+    "scpi.late": "the host speaks to no instrument by SCPI",
+    "scpi.garbled": "the host speaks to no instrument by SCPI",
 }
 
 

@@ -1,4 +1,4 @@
-"""Faults of chamber and table, as their readings over SCPI and the codes of a board show them."""
+"""Faults of chamber, head and table, and of their links, as readings over SCPI and the codes of a board show them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from psabench import Bench
-from psabench.errors import BenchError, TimeOut
+from psabench import Bench, instruments
+from psabench.errors import BenchError, LinkError, TimeOut
 from rig import HOST
 
 pytestmark = HOST
@@ -79,9 +79,86 @@ def test_a_table_that_ripples_shows_it_in_its_rate_and_in_the_codes(tmp_path: Pa
         assert np.ptp(b.unit.stream(500).axis("y")) < 1e-4
 
 
+def test_a_chamber_overshoots_and_comes_back(tmp_path: Path) -> None:
+    """40 K at 1 K/s, then 5 K past it and back: stable after 50 s in place of 40."""
+    with bench(tmp_path, CHAMBER.replace("}", ", cooling_max_k_per_min: 60}") + UNITS) as b:
+        with b.fault("chamber.overshoot", "chamber", overshoot_k=5):
+            b.chamber.set(60.0)
+            with pytest.raises(TimeOut, match="a stable temperature not reached within 45 s"):
+                b.chamber.wait_stable(limit_s=45.0)
+            assert b.chamber.temp_degc == pytest.approx(65.0, abs=0.5)
+            b.chamber.wait_stable(limit_s=7.0)
+        assert b.chamber.temp_degc == pytest.approx(60.0)
+
+
+def level_v(b: Bench) -> float:
+    """Mean of X, V, when the filter has forgotten the turn."""
+    b.run_for(0.1)
+    return float(b.unit.stream(200).axis("x").mean())
+
+
+LEVEL = "units: [{axes: {x: {sensor: mems, kx_v_per_g: 1}}}]\n"
+
+
+def test_a_head_that_sticks_says_so(tmp_path: Path) -> None:
+    with bench(tmp_path, LEVEL) as b:
+        b.unit.wait_ready()
+        assert b.head.turn(30.0) == pytest.approx(30.0)
+        with b.fault("head.stick", "head"):
+            with pytest.raises(TimeOut, match="^head: 90 deg not reached: at rest its scale shows 30 deg$"):
+                b.head.turn(90.0)
+            assert level_v(b) == pytest.approx(-0.5, abs=1e-3)
+        assert b.head.turn(90.0) == pytest.approx(90.0)
+
+
+def test_a_head_that_slips_is_seen_in_the_codes_alone(tmp_path: Path) -> None:
+    with bench(tmp_path, LEVEL) as b:
+        b.unit.wait_ready()
+        with b.fault("head.slip", "head", slip_deg=2):
+            assert b.head.turn(30.0) == pytest.approx(30.0)
+            assert level_v(b) == pytest.approx(-np.sin(np.radians(28.0)), abs=1e-3)
+        assert b.head.turn(30.0) == pytest.approx(30.0)
+        assert level_v(b) == pytest.approx(-0.5, abs=1e-3)
+
+
+def test_a_silent_link_is_a_time_out_that_names_the_instrument(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what was said meanwhile was not heard."""
+    monkeypatch.setattr(instruments, "REPLY_S", 0.3)
+    with bench(tmp_path, CHAMBER + UNITS) as b:
+        with b.fault("scpi.silent", "scpi.chamber"):
+            with pytest.raises(TimeOut, match=r"^chamber at TCPIP::.*: TEMP 60.0: no answer within 0.3 s$"):
+                b.chamber.set(60.0)
+            assert b.head.at_rest, "its link is another"
+        assert b.chamber.setpoint_degc == 20.0
+
+
+def test_a_late_answer_is_not_that_to_the_next_question(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """TEMP? and the look at the error queue time out; both answers come a second later."""
+    monkeypatch.setattr(instruments, "REPLY_S", 0.3)
+    with bench(tmp_path, CHAMBER + UNITS) as b:
+        with b.fault("scpi.late", "scpi.chamber", late_s=1):
+            with pytest.raises(TimeOut, match=r"TEMP\?: no answer within 0.3 s$"):
+                _ = b.chamber.temp_degc
+        b.run_for(2.0)
+        assert b.chamber.query("*IDN?").startswith("psabench,")
+        assert b.chamber.temp_degc == 20.0
+
+
+def test_a_garbled_answer_is_shown_as_it_came(tmp_path: Path) -> None:
+    with bench(tmp_path, CHAMBER + UNITS) as b, b.fault("scpi.garbled", "scpi.chamber"):
+        with pytest.raises(LinkError, match=r"chamber at .*: TEMP\?: expected ASCII text, got b'.*\\x"):
+            _ = b.chamber.temp_degc
+
+
 @pytest.mark.parametrize(
     ("kind", "point", "values"),
     [
+        ("chamber.overshoot", "chamber", {"overshoot_k": 5.0}),
+        ("scpi.silent", "scpi.chamber", {}),
+        ("scpi.garbled", "scpi.table", {}),
+        ("head.stick", "table.1", {}),
         ("chamber.slow", "chamber", {"rate_part": 0.5}),
         ("chamber.readout", "chamber", {"readout_k": 5.0}),
         ("table.ripple", "table.1", {"ripple_dps": 1.0, "frequency_hz": 1.0}),

@@ -70,6 +70,8 @@ ACCEPTED = {
     "platform": r"platform\..*",  # there is none here
     "chamber": r"chamber",  # nor this
     "table": r"table\.\d",  # nor this
+    "head": r"head",
+    "scpi": r"scpi\.(head|supply)",
 }
 
 _database = cast(cantools.database.can.Database, cantools.database.load_file(DBC))

@@ -422,4 +422,6 @@ ACCEPTED = {
     "link.stall": r"client\.\d+",
     "link": r"[ab]\.can|bus\.can0|client\.\d+",
     "supply": r"supply",
+    "head": r"head",
+    "scpi": r"scpi\.(head|supply)",
 }
