@@ -27,7 +27,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "view": ("logs.view_command", "show the CAN bus live in Foxglove, Lichtblick or PlotJuggler"),
     "tap": ("logs.tap_command", "record what is on a serial port, for Wireshark"),
     "waveform": ("logs.viewers", "write viewer files and pictures of a VCD file, install decoders and dissectors"),
-    "campaign": ("campaign.command", "run a procedure on thousands of virtual instruments"),
+    "campaign": ("campaign.procedures", "run a procedure on thousands of virtual instruments"),
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
     "report": ("report.diff_command", "compare the results of two runs"),
     "passport": ("passport.command", "keep what was measured of each instrument: passports in one file"),

@@ -1,4 +1,4 @@
-"""`psabench campaign`: options, what is computed, what is printed."""
+"""`psabench campaign gyrocompass`: options, what is computed, what is printed."""
 
 from __future__ import annotations
 
@@ -77,15 +77,14 @@ class Options:
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
-    """What follows `psabench campaign`. Raises BadInput."""
+    """What follows `psabench campaign gyrocompass`. Raises BadInput."""
     studies = (f"  {s.name:9} {s.title}" for s in STUDIES.values())
     p = Parser(
-        prog="psabench campaign",
+        prog="psabench campaign gyrocompass",
         description=ABOUT,
         epilog=EPILOG.format(studies="\n".join(studies), settings="\n".join(settings.lines())),
     )
     p.set_defaults(handler=_main, kept=KEPT)
-    p.add_argument("procedure", choices=["gyrocompass"], help="procedure")
     p.add_argument("--list", action="store_true", help="list the studies, their cases and the settings")
     p.add_argument("--study", action="append", default=[], help="study; may be repeated (all but own; emulated: wire)")
     p.add_argument("--case", help="run only the cases of this name")
@@ -123,7 +122,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def _main(args: argparse.Namespace) -> int:
     if args.list:
-        _list()
+        _print_studies()
         return 0
     from psabench.campaign import page  # matplotlib takes a second: other commands and --list do without
 
@@ -135,16 +134,16 @@ def _main(args: argparse.Namespace) -> int:
     return 0 if found.within else 1
 
 
-def _list() -> None:
+def _print_studies() -> None:
     for study in STUDIES.values():
         print(f"{study.name}: {study.title}")
-        for line in _names(list(study.cases(Setup()))):
+        for line in _case_names(list(study.cases(Setup()))):
             print(f"  {line}")
     print("settings of --set, with the article's values")
     print("\n".join(settings.lines()))
 
 
-def _names(cases: Sequence[Case]) -> list[str]:
+def _case_names(cases: Sequence[Case]) -> list[str]:
     """A line a case; a line a curve of a scan."""
     curves: dict[str, list[str]] = {}
     for case in cases:
@@ -166,7 +165,7 @@ def campaign(options: Options, progress: Progress) -> Campaign:
     _note_plans(plans, options)
     with Store(options.store or options.out / "store.sqlite") as store, provenance.without_notes():
         for plan in plans:
-            _fill(plan, store, options, progress)
+            _fill_store(plan, store, options, progress)
         return report.gather(plans, store)
 
 
@@ -237,7 +236,7 @@ def _base(options: Options) -> Setup:
     return emulated.setup_of(options.scenario)
 
 
-def _fill(plan: Plan, store: Store, options: Options, progress: Progress) -> None:
+def _fill_store(plan: Plan, store: Store, options: Options, progress: Progress) -> None:
     if options.fresh:
         for case in plan.cases:
             store.forget(plan.origin(case))
