@@ -34,7 +34,7 @@ MAY_INCLUDE = {
     "scenario": _COMMANDS,
     "telemetry": _COMMANDS | {"link"},
     "bench": _COMMANDS | {"scenario", "control", "scpi", "link"},
-    "api": {"base", "trace", "chip", "board", "board/*"},
+    "api": {"base", "trace", "phys", "chip", "board", "board/*"},
     "app": _COMMANDS | {"control", "scpi", "scenario", "bench", "telemetry", "link"},
 }
 ONE_ROOM = {"base", "phys", "link"}  # layers whose parts may include each other

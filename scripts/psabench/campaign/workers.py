@@ -12,6 +12,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from itertools import islice
 from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
@@ -80,16 +81,16 @@ def cores() -> int:
 
 
 def workers(
-    count: int | None = None, address: str | None = None, chain: str = "closed"
+    count: int | None = None, address: str | None = None, chain: str = "closed", own: Callable[[], str] | None = None
 ) -> AbstractContextManager[Workers]:
     """Workers for as long as the context lasts: those of the Dask scheduler at `address`, such as
     tcp://192.0.2.7:8786, else `count` processes of this machine, one a core without it; 1: this process. `chain` is
-    what they are to compute.
+    what they are to compute; `own`, for another study than gyrocompassing, names the build in place of own_build().
 
     Raises LinkError when nothing answers at the address, BadInput when what answers has another build.
     """
     if address is not None:
-        return _cluster_at(address, chain)
+        return _cluster_at(address, own or partial(own_build, chain))
     count = cores() if count is None else count
     return nullcontext(ThisProcess()) if count == 1 else _local_cluster(count)
 
@@ -121,14 +122,14 @@ def _no_interrupt_for_children() -> Iterator[None]:
 
 
 @contextmanager
-def _cluster_at(address: str, chain: str) -> Iterator[Workers]:
+def _cluster_at(address: str, own: Callable[[], str]) -> Iterator[Workers]:
     reach(address)  # a Client that finds no one does not end quietly
     try:
         client = _distributed().Client(address, timeout=CONNECT_S)
     except OSError as e:
         raise _nobody(address, e) from e
     with client:
-        _same_psabench(client, address, chain)
+        _same_psabench(client, address, own)
         yield Dask(client)
 
 
@@ -161,15 +162,15 @@ def own_build(chain: str) -> str:
     return f"{versions()}, build {builds.short(CHAINS[chain].build())}"
 
 
-def _same_psabench(client: Any, address: str, chain: str) -> None:
+def _same_psabench(client: Any, address: str, own: Callable[[], str]) -> None:
     try:
         client.wait_for_workers(1, timeout=CONNECT_S)
-        found: dict[str, str] = client.run(own_build, chain)
+        found: dict[str, str] = client.run(own)
     except TimeoutError as e:
         raise LinkError(f"--dask {address}: the scheduler has no workers") from e
     except Exception as e:
         raise BadInput(f"--dask {address}: {type(e).__name__} in a worker: {e}") from e
-    mine = own_build(chain)
+    mine = own()
     others = sorted({theirs for theirs in found.values() if theirs != mine})
     if others:
         raise BadInput(expected(f"workers with {mine}", "; ".join(others), f"--dask {address}"))

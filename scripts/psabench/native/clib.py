@@ -1,4 +1,4 @@
-"""libpsabench as ctypes sees it: declared here, used by `chips` only. The header is its manual."""
+"""libpsabench as ctypes sees it: declared here, used by `chips` and `quartz_model` only. The header is its manual."""
 
 from __future__ import annotations
 
@@ -34,8 +34,30 @@ class FrameStruct(c.Structure):
     ]
 
 
+class QuartzJobStruct(c.Structure):
+    """struct psabench_quartz_job."""
+
+    _fields_ = [
+        ("size", c.c_uint32),
+        ("cycles", c.c_uint32),
+        ("seed", c.c_uint64),
+        ("first_serial", c.c_uint32),
+        ("units", c.c_uint32),
+        ("g_mps2", c.c_double),
+        ("noise_a_rthz", c.c_double),
+        ("cold_degc", c.c_double),
+        ("hot_degc", c.c_double),
+        ("read_degc", c.c_double),
+        ("ramp_k_per_min", c.c_double),
+        ("soak_min", c.c_double),
+        ("rest_min", c.c_double),
+        ("reading_s", c.c_double),
+    ]
+
+
 FRAME = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.POINTER(FrameStruct))
 
+_DOUBLES = c.POINTER(c.c_double)
 _INT, _LEVEL, _TIME, _TEXT, _PTR = c.c_int, c.c_int, c.c_int64, c.c_char_p, c.c_void_p
 
 # Function without its psabench_: what it returns, what it takes.
@@ -81,6 +103,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "on_frame": (_INT, _PTR, FRAME, _PTR),
     "board_read": (_INT, _PTR, c.c_uint, c.c_uint, _TIME),
     "board_write": (_INT, _PTR, c.c_uint, c.c_uint, c.c_uint8, _TIME),
+    "quartz_run_in": (_INT, c.POINTER(QuartzJobStruct), _DOUBLES, c.c_size_t, _DOUBLES, _DOUBLES, _DOUBLES),
 }
 
 

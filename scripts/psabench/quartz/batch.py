@@ -7,7 +7,7 @@ curve and law of run-in: instruments 3.2 and 3.5, docs/instruments.md. A test co
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,24 +40,22 @@ def load_batch(name: str = SERIAL) -> Batch:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
         raise BadInput(expected("a batch of accelerometers", str(e).partition("\n")[0], path)) from None
-    return _checked_numbers(found, _serial_keys() if not (shipped and name == SERIAL) else None, path)
+    return _checked_numbers(found, None if shipped and name == SERIAL else list(load_batch()), path)
 
 
-def _serial_keys() -> set[str]:
-    return set(load_batch())
-
-
-def _checked_numbers(found: Any, keys: set[str] | None, path: Path) -> Batch:
+def _checked_numbers(found: Any, serial_keys: Sequence[str] | None, path: Path) -> Batch:
+    """In the order of serial, which is that of the emulator's struct."""
     if not isinstance(found, dict):
         raise BadInput(expected("a mapping of keys to numbers", type(found).__name__, path))
     numbers = {k: v for k, v in found.items() if k != "name"}
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise BadInput(expected("a number", repr(value), f"{path}: {key}"))
-    for key in sorted((keys or set(numbers)) ^ set(numbers), key=str):
+    keys = list(numbers) if serial_keys is None else serial_keys
+    for key in sorted(set(keys) ^ set(numbers), key=str):
         what = "no other keys than those of serial" if key in numbers else "a value"
         raise BadInput(expected(what, key if key in numbers else "none", f"{path}: {key}"))
-    return {k: float(v) for k, v in numbers.items()}
+    return {k: float(numbers[k]) for k in keys}
 
 
 # ---- the zero signal against temperature: fig. 2

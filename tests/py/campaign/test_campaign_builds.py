@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,17 +85,18 @@ class Cluster:
     def wait_for_workers(self, _: int, *, timeout: float) -> None:
         assert timeout > 0
 
-    def run(self, _: object, chain: str) -> dict[str, str]:
-        assert chain == "emulated"
+    def run(self, own: Callable[[], str]) -> dict[str, str]:
+        assert own() == workers.own_build("emulated")
         return {f"tcp://{k}": told for k, told in enumerate(self._told)}
 
 
 def test_a_cluster_with_another_build_is_refused() -> None:
-    mine = workers.own_build("emulated")
+    own = partial(workers.own_build, "emulated")
+    mine = own()
     assert mine.endswith(f"build {builds.wire()[:12]}")
-    workers._same_psabench(Cluster(mine, mine), "tcp://there", "emulated")
+    workers._same_psabench(Cluster(mine, mine), "tcp://there", own)
     with pytest.raises(BadInput, match=r"--dask tcp://there: expected workers with psabench .*, got mine, build 0123"):
-        workers._same_psabench(Cluster(mine, "mine, build 0123"), "tcp://there", "emulated")
+        workers._same_psabench(Cluster(mine, "mine, build 0123"), "tcp://there", own)
 
 
 def test_a_build_is_what_its_files_hold(tmp_path: Path) -> None:

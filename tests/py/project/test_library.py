@@ -111,6 +111,7 @@ C_TYPES: dict[str, object] = {
     "int64_t": ctypes.c_int64,
     "size_t": ctypes.c_size_t,
     "double": ctypes.c_double,
+    "double *": ctypes.POINTER(ctypes.c_double),
     "char *": ctypes.c_char_p,
     "uint8_t *": ctypes.c_void_p,
     "uint64_t *": ctypes.POINTER(ctypes.c_uint64),
@@ -122,6 +123,7 @@ C_TYPES: dict[str, object] = {
     "psabench_deadline_fn *": clib.DEADLINE,
     "psabench_input_fn *": clib.INPUT,
     "psabench_frame_fn *": clib.FRAME,
+    "psabench_quartz_job *": ctypes.POINTER(clib.QuartzJobStruct),
 }
 TX = {
     "spi": (1, ctypes.c_char_p),
@@ -163,6 +165,19 @@ def test_the_frame_has_the_layout_of_the_header(tmp_path: Path) -> None:
     fields = [getattr(clib.FrameStruct, n) for n in names]
     assert layout == [f"{f.offset} {f.size}" for f in fields]
     assert int(abi) == clib.ABI
+
+
+def test_the_job_of_a_run_in_has_the_layout_of_the_header(tmp_path: Path) -> None:
+    names = [name for name, *_ in clib.QuartzJobStruct._fields_]
+    rows = "".join(f'printf("%zu\\n", offsetof(struct psabench_quartz_job, {n}));' for n in names)
+    program = tmp_path / "layout"
+    size = 'printf("%zu\\n", sizeof(struct psabench_quartz_job));'
+    source = f"#include <psabench.h>\n#include <stdio.h>\nint main(void){{{rows}{size}}}"
+    command = ["cc", "-x", "c", "-", "-I", ROOT / "emu/api", "-o", program]
+    subprocess.run(command, input=source, text=True, check=True, timeout=60)
+    layout = subprocess.run([program], capture_output=True, text=True, check=True, timeout=10).stdout.split()
+    fields = [getattr(clib.QuartzJobStruct, n).offset for n in names]
+    assert [int(x) for x in layout] == [*fields, ctypes.sizeof(clib.QuartzJobStruct)]
 
 
 # ---- which library Python loads ----

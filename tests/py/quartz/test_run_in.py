@@ -1,0 +1,241 @@
+"""Run-in of a batch: the model through libpsabench, estimates from readings, figures, the command."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from psabench import cli
+from psabench.campaign.store import Store
+from psabench.campaign.workers import ThisProcess
+from psabench.errors import BadInput
+from psabench.native import clib, quartz_model
+from psabench.native.quartz_model import Schedule
+from psabench.progress import Bar
+from psabench.quartz import run_in, run_in_command, run_in_figures, run_in_page
+from psabench.quartz.batch import draw_instability, load_batch
+from psabench.quartz.run_in import RunIn
+from psabench.quartz.run_in_command import Options
+from psabench.quartz.run_in_page import Report
+from psabench.report.page import page_without_foot
+
+ROOT = Path(__file__).resolve().parents[3]
+QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
+BATCH = load_batch()
+QUIET_BATCH = {**BATCH, "start_ug": 0.0, "start_ppm": 0.0, "start_arcsec": 0.0, "glue_keep_spread": 0.0}
+SILENT = Schedule(noise_a_rthz=0.0)
+
+
+def values_of(s: Schedule, b: Mapping[str, float], units: int, seed: int = 1) -> np.ndarray:
+    return run_in.estimate_units(quartz_model.read_units(s, b, seed, 1, units))[0]
+
+
+# ---- the model
+
+
+def test_a_unit_is_the_same_in_every_range_and_another_for_another_seed() -> None:
+    whole = quartz_model.read_units(Schedule(), BATCH, 3, 1, 12)
+    first, rest = (quartz_model.read_units(Schedule(), BATCH, 3, k, n) for k, n in ((1, 5), (6, 7)))
+    np.testing.assert_array_equal(whole.mean_a, np.concatenate([first.mean_a, rest.mean_a]))
+    np.testing.assert_array_equal(whole.sd_a, np.concatenate([first.sd_a, rest.sd_a]))
+    assert not np.any(whole.mean_a == quartz_model.read_units(Schedule(), BATCH, 4, 1, 12).mean_a)
+    fewer = quartz_model.read_units(Schedule(cycles=2), BATCH, 3, 1, 12)
+    np.testing.assert_array_equal(fewer.mean_a, whole.mean_a[:, :3])  # one cycle more shifts nothing
+
+
+def test_the_librarys_own_batch_is_serial() -> None:
+    """A number that is not in its place of the struct gives other units."""
+    job = clib.QuartzJobStruct(
+        size=ctypes.sizeof(clib.QuartzJobStruct), cycles=1, seed=9, first_serial=1, units=20, g_mps2=9.8094,
+        cold_degc=-60.0, hot_degc=85.0, read_degc=30.0, ramp_k_per_min=1.0, soak_min=60.0, rest_min=120.0,
+        reading_s=1.0,
+    )  # fmt: skip
+    found = []
+    numbers = (ctypes.c_double * len(BATCH))(*BATCH.values())
+    for batch, count in ((None, 0), (numbers, len(BATCH))):
+        mean_a, sd_a = ((ctypes.c_double * (20 * 2 * 4))() for _ in range(2))
+        assert clib.library().quartz_run_in(ctypes.byref(job), batch, count, mean_a, sd_a, None) == 0
+        found.append(list(mean_a))
+    assert found[0] == found[1]
+    assert clib.library().quartz_run_in(ctypes.byref(job), numbers, len(BATCH) - 1, mean_a, sd_a, None) == -1
+    job.size -= 8
+    assert clib.library().quartz_run_in(ctypes.byref(job), None, 0, mean_a, sd_a, None) == -1
+
+
+def test_without_scatter_and_noise_the_stress_decays_by_half_each_cycle() -> None:
+    change = np.diff(values_of(SILENT, QUIET_BATCH, 40), axis=1)
+    # The play of the first cycle (instrument comes from 25 degC) is over with the second.
+    for k in range(3):
+        ratio = change[:, 2:, k] / change[:, 1:-1, k]
+        np.testing.assert_allclose(ratio, BATCH["glue_keep"], rtol=0.02)
+
+
+def test_a_course_that_elements_cannot_follow_relaxes_nothing() -> None:
+    fast = replace(SILENT, soak_min=0.0, ramp_k_per_min=5.0)
+    change = np.abs(np.diff(values_of(fast, QUIET_BATCH, 10), axis=1))
+    slow = np.abs(np.diff(values_of(SILENT, QUIET_BATCH, 10), axis=1))
+    assert change[:, 1:].max() < 0.05 * slow[:, 1].min()
+
+
+def test_a_schedule_that_the_chamber_cannot_do_is_rejected() -> None:
+    with pytest.raises(BadInput, match="expected a schedule and a batch that the model takes"):
+        quartz_model.read_units(Schedule(cold_degc=-80.0), BATCH, 1, 1, 1)
+
+
+# ---- estimates
+
+
+def test_estimates_are_from_readings_and_within_their_uncertainty_of_the_truth() -> None:
+    what = RunIn(schedule=Schedule(), batch=BATCH, seed=5)
+    r = quartz_model.read_units(what.schedule, BATCH, 5, 1, 400)
+    values, uncertain = run_in.estimate_units(r)
+    grades = run_in_figures.grade_values(values, uncertain, run_in.true_values(what, 400))
+    for g in grades:
+        assert g.covered == pytest.approx(0.95, abs=0.02)
+        assert g.z_rms == pytest.approx(1.01, abs=0.06)
+    noisy = run_in.estimate_units(quartz_model.read_units(replace(Schedule(), noise_a_rthz=4e-9), BATCH, 5, 1, 50))[1]
+    np.testing.assert_allclose(noisy / uncertain[:50], 10.0, rtol=1e-3)  # the same draws, ten times
+
+
+def test_the_emulators_generator_and_the_law_written_in_numpy_agree() -> None:
+    """Of independent draws: means of the change at cycles 1 ... 5, all three quantities."""
+    values = values_of(Schedule(), BATCH, 4000, seed=11)
+    found = np.abs(np.diff(values, axis=1))
+    laws = draw_instability(BATCH, 11, 100_000, 5)
+    for k, q in enumerate(("zero", "scale", "base")):
+        sd = found[..., k].std(axis=0) / np.sqrt(4000)
+        off = (found[..., k].mean(axis=0) - laws[q].mean(axis=0)) / sd
+        assert np.abs(off).max() < 4.5, (q, off)
+
+
+# ---- figures
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    return run_in_command.run_campaign(Options(out=tmp_path_factory.mktemp("run-in")), QUIET)
+
+
+def test_the_campaign_finds_what_the_batch_was_made_for(report: Report) -> None:
+    assert report.within
+    assert len(report.checks) == 11
+    gains = {q: f.gain for q, f in report.figures.items()}
+    for q, (middle, by) in run_in_figures.LAW_GAINS.items():
+        assert gains[q].value == pytest.approx(middle, abs=by)
+        assert 0.02 < gains[q].sd / middle < 0.06
+    assert report.figures["zero"].stop == 4
+    assert 0.55 < report.figures["zero"].small.share < 0.8
+
+
+@pytest.mark.parametrize("key", ["glue_ug", "glue_ppm", "glue_arcsec"])
+def test_a_batch_with_another_stress_is_out_of_limits(key: str) -> None:
+    b = {**BATCH, key: 1.6 * BATCH[key]}
+    values = values_of(Schedule(), b, 1000)
+    checks = run_in_figures.limit_checks(run_in_figures.find_figures(values, BATCH, 1), _grades(), 1000)
+    quantity = {"glue_ug": "zero", "glue_ppm": "scale", "glue_arcsec": "base"}[key]
+    outside = [c.what for c in checks if not c.within]
+    assert f"{quantity}: gain by run-in" in outside
+    assert all(what.startswith(quantity) for what in outside)
+
+
+def _grades(covered: float = 0.95) -> list[run_in_figures.Grade]:
+    return [run_in_figures.Grade(quantity="zero", count=1000, u=0.1, z_rms=1.0, covered=covered)]
+
+
+def test_uncertainties_that_are_too_small_are_out_of_limits(report: Report) -> None:
+    checks = run_in_figures.limit_checks(report.figures, _grades(0.90), 1000)
+    assert [c.what for c in checks if not c.within] == ["share of 95 % intervals that contain the truth"]
+
+
+def test_the_interval_of_a_ratio_covers() -> None:
+    rng = np.random.default_rng(2)
+    hits = 0
+    for _ in range(400):
+        x = rng.lognormal(0.0, 0.8, 300)
+        found = run_in_figures.ratio_of(2.0 * x * rng.lognormal(0.0, 0.3, 300), x)
+        hits += abs(found.value - 2.0 * np.exp(0.045)) <= found.half95
+    assert 0.90 < hits / 400 < 0.98
+
+
+# ---- store and command
+
+
+def test_parts_in_any_cut_and_order_are_the_same_bytes(tmp_path: Path) -> None:
+    what = RunIn(schedule=Schedule(), batch=BATCH, seed=2)
+    found = []
+    for name, order in (("a", 1), ("b", -1)):
+        with Store(tmp_path / name) as store:
+            run_in.fill_store(run_in.list_missing(what, 700, store)[:1], store, ThisProcess(), QUIET)
+            missing = run_in.list_missing(what, 1200, store)
+            assert [w.first for w in missing] == [500, 1000]
+            run_in.fill_store(missing[::order], store, ThisProcess(), QUIET)
+            found.append(store.rows(run_in.make_origin(what), 1200).tobytes())
+    assert found[0] == found[1]
+
+
+def test_two_processes_give_the_bytes_of_one(tmp_path: Path) -> None:
+    found = []
+    for count in (1, 2):
+        o = Options(units=1500, out=tmp_path / str(count), workers=count)
+        run_in_command.run_campaign(o, QUIET)
+        with Store(o.out / "store.sqlite") as store:
+            found.append(store.rows(store.origins()[0], 1500).tobytes())
+    assert found[0] == found[1]
+
+
+def test_the_report_is_the_same_each_time_and_whole(report: Report, tmp_path: Path) -> None:
+    assert cli.main(["campaign", "run-in", "--out", str(tmp_path)]) == 0
+    text = page_without_foot((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert text.rstrip() == run_in_page.html_page(report).rstrip()
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert result["within_limits"]
+    assert result["provenance"]["scenarios"][0]["name"] == "run-in"
+    assert set(result["quantities"]) == {"zero", "scale", "base"}
+    assert "They prove nothing about accelerometers" in text
+
+
+def test_a_batch_of_another_order_is_read_in_that_of_serial(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    text = yaml.safe_load((ROOT / "proto/batches/serial.yaml").read_text(encoding="utf-8"))
+    path.write_text(yaml.safe_dump(dict(sorted(text.items(), reverse=True)), sort_keys=False))
+    assert list(load_batch(str(path)).items()) == list(BATCH.items())
+
+
+MISTAKES = [
+    ("--units 1", "--units: expected 2 to 1000000, got 1"),
+    ("--cycles 4", "--cycles: expected 5 to 50, got 4"),
+    ("--seed 99999999999999999999", "--seed: expected 0 to "),
+    ("--workers 0", "--workers: expected 1 to 1024, got 0"),
+    ("--workers 2 --dask tcp://127.0.0.1:9", "--workers: expected none with --dask"),
+    ("--set soak=1", "--set: expected NAME=VALUE with a name of cold_degc, "),
+    ("--set soak_min=x", "--set soak_min=x: expected a number, got 'x'"),
+    ("--set cold_degc=-80", "--set cold_degc=-80: expected -60 to 20 °C, got -80"),
+    ("--set soak_min=nan", "--set soak_min=nan: expected 0 to 1000 min, got nan"),
+    ("--batch stars", "batches/stars.yaml: expected a file in "),
+    ("--store README.md", "README.md: expected a store of results"),
+]
+
+
+@pytest.mark.parametrize(("line", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
+def test_a_mistake_gets_one_line(
+    line: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "README.md").write_text("no store, and longer than the hundred bytes of a header would be " * 3)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["campaign", "run-in", *line.split()]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1), err
+    assert words in err
+
+
+def test_the_help_names_every_setting_with_its_default() -> None:
+    usual = Schedule()
+    for name, (default, *_) in run_in_command.SETTINGS.items():
+        assert getattr(usual, name) == default
