@@ -71,7 +71,8 @@ static void read_position(struct oven *o, const double g[3], double reading_s, d
 }
 
 /* A start, the readings of all positions, and what is true of them. */
-static void read_start(struct oven *o, const struct psabench_quartz_job *job, double *mean_a, double *sd_a, double *truth)
+static void read_start(struct oven *o, const struct psabench_quartz_job *job, double *mean_a, double *sd_a,
+                       double *truth)
 {
     quartz_start(&o->q);
     for (unsigned i = 0; i < PSABENCH_QUARTZ_POSITIONS; i++)

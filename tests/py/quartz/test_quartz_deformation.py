@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -155,20 +153,3 @@ def test_campaigns_are_a_table_and_gyrocompass_keeps_its_words(capsys: pytest.Ca
     assert all(name in out for name in CAMPAIGNS)
     assert cli.main(["campaign", "stars"]) == 2
     assert f"expected {', '.join(CAMPAIGNS)}, got 'stars'" in capsys.readouterr().err
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("plot_quartz", ROOT / "tools/plots/quartz.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_tables_of_the_page_are_what_is_computed(tool: ModuleType) -> None:
-    """A difference: run tools/plots/quartz.py, and read what the page says of the numbers."""
-    text = tool.DEFORMATION.read_text(encoding="utf-8")
-    assert text.splitlines() == tool.with_tables(text, tool.computed()).splitlines()
-    assert set(re.findall(r"<!-- quartz: (\w+)", text)) == set(tool.TABLES)
