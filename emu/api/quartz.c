@@ -121,7 +121,7 @@ static bool run_unit(const struct psabench_quartz_job *job, const struct quartz_
     return true;
 }
 
-static bool within(double value, double least, double most)
+static bool is_within(double value, double least, double most)
 {
     return value >= least && value <= most; /* not a number: no */
 }
@@ -129,9 +129,9 @@ static bool within(double value, double least, double most)
 static bool job_fits(const struct psabench_quartz_job *j)
 {
     return j->size == sizeof *j && j->cycles <= PSABENCH_QUARTZ_CYCLES_MAX &&
-           within(j->ramp_k_per_min, CHAMBER_RAMP_MIN_K_PER_MIN, 5.0) && within(j->soak_min, 0.0, 1e4) &&
-           within(j->rest_min, 0.0, 1e4) && within(j->reading_s, 1e-3, 1e4) && within(j->g_mps2, 1.0, 100.0) &&
-           within(j->noise_a_rthz, 0.0, 1.0);
+           is_within(j->ramp_k_per_min, CHAMBER_RAMP_MIN_K_PER_MIN, 5.0) && is_within(j->soak_min, 0.0, 1e4) &&
+           is_within(j->rest_min, 0.0, 1e4) && is_within(j->reading_s, 1e-3, 1e4) && is_within(j->g_mps2, 1.0, 100.0) &&
+           is_within(j->noise_a_rthz, 0.0, 1.0);
 }
 
 int psabench_quartz_run_in(const struct psabench_quartz_job *job, const double *batch, size_t numbers, double *mean_a,

@@ -48,16 +48,16 @@ class Readings:
 
 def read_units(s: Schedule, batch: Mapping[str, float], seed: int, first_serial: int, units: int) -> Readings:
     """Readings of these serial numbers. Raises BadInput."""
-    mean_a, sd_a, _ = _called(s, batch, (seed, first_serial, units), with_truth=False)
+    mean_a, sd_a, _ = _call_model(s, batch, (seed, first_serial, units), with_truth=False)
     return Readings(mean_a=mean_a, sd_a=sd_a)
 
 
 def true_terms(s: Schedule, batch: Mapping[str, float], seed: int, first_serial: int, units: int) -> Array:
     """Truth, for grading: bias in ug, scale in A for one g, tilt of the input axis to y in mrad: (units, starts, 3)."""
-    return _called(s, batch, (seed, first_serial, units), with_truth=True)[2]
+    return _call_model(s, batch, (seed, first_serial, units), with_truth=True)[2]
 
 
-def _called(
+def _call_model(
     s: Schedule, batch: Mapping[str, float], which: tuple[int, int, int], *, with_truth: bool
 ) -> tuple[Array, Array, Array]:
     seed, first_serial, units = which
@@ -67,11 +67,11 @@ def _called(
     own = {"size": c.sizeof(QuartzJobStruct), "seed": seed, "first_serial": first_serial, "units": units}
     job = QuartzJobStruct(**asdict(s), **own)
     numbers = np.array(list(batch.values()), float)
-    pointers = (_pointer(mean_a), _pointer(sd_a), _pointer(truth) if with_truth else None)
-    if library().quartz_run_in(c.byref(job), _pointer(numbers), len(numbers), *pointers) < 0:
+    pointers = (_pointer_of(mean_a), _pointer_of(sd_a), _pointer_of(truth) if with_truth else None)
+    if library().quartz_run_in(c.byref(job), _pointer_of(numbers), len(numbers), *pointers) < 0:
         raise BadInput(expected("a schedule and a batch that the model takes", asdict(s), "quartz batch"))
     return mean_a, sd_a, truth
 
 
-def _pointer(a: Array) -> c._Pointer[c.c_double]:
+def _pointer_of(a: Array) -> c._Pointer[c.c_double]:
     return a.ctypes.data_as(c.POINTER(c.c_double))

@@ -173,7 +173,7 @@ def test_the_job_of_a_run_in_has_the_layout_of_the_header(tmp_path: Path) -> Non
     program = tmp_path / "layout"
     size = 'printf("%zu\\n", sizeof(struct psabench_quartz_job));'
     source = f"#include <psabench.h>\n#include <stdio.h>\nint main(void){{{rows}{size}}}"
-    command = ["cc", "-x", "c", "-", "-I", ROOT / "emu/api", "-o", program]
+    command = ["cc", "-x", "c", "-", "-I", str(ROOT / "emu/api"), "-o", str(program)]
     subprocess.run(command, input=source, text=True, check=True, timeout=60)
     layout = subprocess.run([program], capture_output=True, text=True, check=True, timeout=10).stdout.split()
     fields = [getattr(clib.QuartzJobStruct, n).offset for n in names]
