@@ -219,7 +219,7 @@ PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned
 
 enum { PSABENCH_QUARTZ_POSITIONS = 4, PSABENCH_QUARTZ_CYCLES_MAX = 100 };
 
-/* Each unit in a chamber of -60 to +85 degC: to read_degc, rest_min there, switched on, read; then cycles times: to cold_degc,
+/* Each unit in a chamber of -60 to +85 degC: as warm as read_degc, switched on, read; then cycles times: to cold_degc,
  * to hot_degc, soak_min at each, to read_degc, rest_min, switched on, read. Unit k is the accelerometer x of the serial
  * number k in scenario quartz_chamber. */
 struct psabench_quartz_job {
@@ -230,6 +230,7 @@ struct psabench_quartz_job {
     double g_mps2, noise_a_rthz;
     double cold_degc, hot_degc, read_degc, ramp_k_per_min, soak_min, rest_min;
     double reading_s; /* of a position: mean of 64 looks */
+    double play_k;    /* half the width of the hysteresis in temperature */
 };
 
 /* Readings, A: mean_a and sd_a, the standard deviation of the mean, have for each unit and start (cycles + 1 of them) the

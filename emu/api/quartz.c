@@ -89,9 +89,11 @@ static bool put_in(struct oven *o, const struct psabench_quartz_job *job, const 
     struct chamber_cfg c = chamber_default();
     struct quartz_g g = quartz_default();
     c.present = true;
+    c.start_degc = job->read_degc;
     c.ramp_k_per_min = job->ramp_k_per_min;
     g.pendulum_given = true;
     g.noise_a_rthz = job->noise_a_rthz;
+    g.play_k = job->play_k;
     g = quartz_with_pendulum(&g, job->g_mps2);
     if (!quartz_batch_draw(b, job->seed, serial, 0, &g)) return false;
     *o = (struct oven){.g_mps2 = job->g_mps2};
@@ -108,7 +110,7 @@ static bool run_unit(const struct psabench_quartz_job *job, const struct quartz_
                      double *sd_a, double *truth)
 {
     struct oven o;
-    if (!put_in(&o, job, b, job->first_serial + unit) || !go_to(&o, job->read_degc, job->rest_min)) return false;
+    if (!put_in(&o, job, b, job->first_serial + unit)) return false;
     for (uint32_t n = 0; n <= job->cycles; n++) {
         if (n > 0 && !(go_to(&o, job->cold_degc, job->soak_min) && go_to(&o, job->hot_degc, job->soak_min) &&
                        go_to(&o, job->read_degc, job->rest_min)))
@@ -131,7 +133,7 @@ static bool job_fits(const struct psabench_quartz_job *j)
     return j->size == sizeof *j && j->cycles <= PSABENCH_QUARTZ_CYCLES_MAX &&
            is_within(j->ramp_k_per_min, CHAMBER_RAMP_MIN_K_PER_MIN, 5.0) && is_within(j->soak_min, 0.0, 1e4) &&
            is_within(j->rest_min, 0.0, 1e4) && is_within(j->reading_s, 1e-3, 1e4) && is_within(j->g_mps2, 1.0, 100.0) &&
-           is_within(j->noise_a_rthz, 0.0, 1.0);
+           is_within(j->noise_a_rthz, 0.0, 1.0) && is_within(j->play_k, 0.0, 100.0);
 }
 
 int psabench_quartz_run_in(const struct psabench_quartz_job *job, const double *batch, size_t numbers, double *mean_a,

@@ -52,6 +52,7 @@ class QuartzJobStruct(c.Structure):
         ("soak_min", c.c_double),
         ("rest_min", c.c_double),
         ("reading_s", c.c_double),
+        ("play_k", c.c_double),
     ]
 
 

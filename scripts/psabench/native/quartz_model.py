@@ -36,6 +36,7 @@ class Schedule:
     reading_s: float = 1.0
     g_mps2: float = 9.8094
     noise_a_rthz: float = 4.0e-10
+    play_k: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

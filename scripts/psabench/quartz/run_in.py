@@ -7,7 +7,7 @@ whoever computes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -27,8 +27,6 @@ from psabench.quartz.plate import Array
 
 NOMINAL_A_PER_G = 1.28e-3  # to which scale errors are related
 ARCSEC_PER_RAD = 3600.0 * 180.0 / np.pi
-PART_UNITS = 500  # of a part in the store
-UNIT_S = 1.4e-4  # one unit, one core: only how work is cut depends on it
 TASK_S = 0.4  # long beside the 2 ms that a Dask task costs
 ALONE_S = 4.0  # starting a cluster takes about as long
 
@@ -43,10 +41,22 @@ class RunIn:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Chain:
+    """How units are measured; functions of a module, so that they travel to workers."""
+
+    name: str
+    part_units: int  # of a part in the store: what an interrupt may cost
+    unit_s: float  # one unit, one core: only how work is cut depends on it
+    digest: Callable[[], str]  # of all that computes
+    measure: Callable[[RunIn, int, int], tuple[Array, Array]]  # first serial number and units -> as estimate_units
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
     """Units that a worker should compute."""
 
     what: RunIn
+    chain: Chain
     first: int
     units: int
 
@@ -86,14 +96,14 @@ def column_names(cycles: int) -> tuple[str, ...]:
     return (*names, *(f"u of {name}" for name in names))
 
 
-def make_origin(what: RunIn) -> Origin:
+def make_origin(what: RunIn, chain: Chain) -> Origin:
     """Of the series of the store."""
     return Origin(
-        kind="run-in, sensor model",
+        kind=f"run-in, {chain.name}",
         input={"schedule": asdict(what.schedule), "batch": dict(what.batch)},
         seed=what.seed,
         version=own_version(),
-        build=own_digest(),
+        build=chain.digest(),
         columns=column_names(what.schedule.cycles),
     )
 
@@ -103,57 +113,69 @@ def own_version() -> str:
     return f"psabench {version('psabench')}"
 
 
-@cache
-def own_digest() -> str:
-    """SHA-256 of libpsabench and of the host's code that takes part."""
-    return builds.digest([Path(clib.library().path), *builds.sources("psabench.quartz.run_in")])
-
-
-def own_build() -> str:
+def name_build(chain: Chain) -> str:
     """What a worker and we must have in common to compute the same."""
-    return f"{own_version()}, build {builds.short(own_digest())}"
+    return f"{own_version()}, build {builds.short(chain.digest())}"
 
 
 def compute_parts(wanted: Sequence[Wanted]) -> list[Part]:
     """The work of a worker. Raises BadInput for a schedule that the model does not take."""
-    return [Part(origin=make_origin(w.what), first_run=w.first, rows=_unit_rows(w)) for w in wanted]
+    return [Part(origin=make_origin(w.what, w.chain), first_run=w.first, rows=_unit_rows(w)) for w in wanted]
 
 
 def _unit_rows(w: Wanted) -> Rows:
-    r = quartz_model.read_units(w.what.schedule, w.what.batch, w.what.seed, 1 + w.first, w.units)
-    return np.concatenate([e.reshape(w.units, -1) for e in estimate_units(r)], axis=1).astype(CELL)
+    found = w.chain.measure(w.what, 1 + w.first, w.units)
+    return np.concatenate([e.reshape(w.units, -1) for e in found], axis=1).astype(CELL)
 
 
-def load_rows(what: RunIn, store: Store, units: int) -> tuple[Array, Array]:
+# ---- the sensor model
+
+
+@cache
+def model_digest() -> str:
+    """SHA-256 of libpsabench and of the host's code that takes part."""
+    return builds.digest([Path(clib.library().path), *builds.sources("psabench.quartz.run_in")])
+
+
+def measure_model(what: RunIn, first_serial: int, units: int) -> tuple[Array, Array]:
+    """Estimates from the readings of the sensor model."""
+    return estimate_units(quartz_model.read_units(what.schedule, what.batch, what.seed, first_serial, units))
+
+
+MODEL = Chain(name="sensor model", part_units=500, unit_s=1.4e-4, digest=model_digest, measure=measure_model)
+
+
+# ---- the store
+
+
+def load_rows(what: RunIn, chain: Chain, store: Store, units: int) -> tuple[Array, Array]:
     """Values and uncertainties of a complete series, (units, starts, 3) each."""
-    rows = store.rows(make_origin(what), units).astype(np.float64)
+    rows = store.rows(make_origin(what, chain), units).astype(np.float64)
     shape = (2, units, what.schedule.cycles + 1, len(QUANTITIES))
     values, uncertain = rows.reshape(units, 2, -1).swapaxes(0, 1).reshape(shape)
     return values, uncertain
 
 
-# ---- what the store lacks
-
-
-def list_missing(what: RunIn, units: int, store: Store) -> list[Wanted]:
-    """Parts to compute."""
-    there = store.runs(make_origin(what))
-    firsts = range(0, units, PART_UNITS)
-    parts = [Wanted(what=what, first=k, units=min(PART_UNITS, units - k)) for k in firsts]
+def list_missing(what: RunIn, chain: Chain, units: int, store: Store) -> list[Wanted]:
+    """Parts that the store lacks."""
+    there, many = store.runs(make_origin(what, chain)), chain.part_units
+    firsts = range(0, units, many)
+    parts = [Wanted(what=what, chain=chain, first=k, units=min(many, units - k)) for k in firsts]
     return [w for w in parts if there.get(w.first, 0) < w.units]
 
 
 def cut_tasks(wanted: Sequence[Wanted]) -> Iterator[Sequence[Wanted]]:
     """Parts together, so that each task is worth sending."""
-    for piece in spread([w.units * UNIT_S for w in wanted], TASK_S):
+    for piece in spread([w.units * w.chain.unit_s for w in wanted], TASK_S):
         yield wanted[piece]
 
 
 def fill_store(wanted: Sequence[Wanted], store: Store, at_work: Workers, progress: Progress) -> None:
     """Compute and store; what is stored stays, whatever ends it."""
-    with progress.step(f"run-in, {at_work.count} at once, parts of {PART_UNITS} units", len(wanted)) as done:
+    chain = wanted[0].chain
+    with progress.step(f"{chain.name}, {at_work.count} at once, {chain.part_units} units a step", len(wanted)) as done:
         for parts in at_work.map(compute_parts, cut_tasks(wanted)):
-            if any(p.origin.build != own_digest() for p in parts):
+            if any(p.origin.build != chain.digest() for p in parts):
                 raise BenchError("run-in: psabench was rebuilt during the run; start the campaign again")
             store.put(parts)
             for _ in parts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,12 @@ if TYPE_CHECKING:
     from psabench.campaign.store import Store
     from psabench.native.quartz_model import Schedule
     from psabench.procedures.head_bench import Progress
-    from psabench.quartz.run_in import RunIn
+    from psabench.quartz.plate import Array
+    from psabench.quartz.run_in import Chain, RunIn
     from psabench.quartz.run_in_page import Report
+    from psabench.quartz.run_in_wire import Agreement
+
+    Measured = tuple[Array, Array]
 
 ABOUT = """\
 Run a production batch of quartz accelerometers in: thermal cycles from -60 to +85 °C after the article of Denisov and
@@ -25,12 +30,13 @@ Akilin, a start and readings in four positions after each. The report has the in
 cycle (fig. 8), what run-in gains, when to stop, and how far a batch of 30 may mislead.
 """
 EPILOG = """\
-Units are drawn by the emulator's generator (docs/instruments.md); no board takes part. Estimates come from readings
-with their noise; truth is used in the grading alone.
+Units are drawn by the emulator's generator (docs/instruments.md); without --wire no board takes part. Estimates come
+from readings with their noise; truth is used in the grading alone.
 
 examples:
   psabench campaign run-in                                  1000 units; build/run-in/report.html
   psabench campaign run-in --units 100000 --workers 2       on two cores, the same numbers as on one
+  psabench campaign run-in --wire 10                        ten of them over CAN and SCPI, compared start by start
   psabench campaign run-in --cycles 8                       is anything gained after the fourth?
   psabench campaign run-in --set soak_min=0 --set ramp_k_per_min=5   too fast: elements lag, and no cycle relaxes them
   psabench campaign run-in --batch mine.yaml --seed 7       your batch: the keys of proto/batches/serial.yaml
@@ -54,6 +60,7 @@ SETTINGS: dict[str, tuple[float, str, float, float, str]] = {
     "soak_min": (60.0, "min", 0.0, 1000.0, "at each end (E0)"),
     "rest_min": (120.0, "min", 0.0, 1000.0, "before a start (E0)"),
     "reading_s": (1.0, "s", 0.01, 1000.0, "reading of a position (E0)"),
+    "play_k": (0.3, "K", 0.0, 100.0, "half the width of the hysteresis in temperature (E0)"),
     "noise_a_rthz": (4.0e-10, "A/√Hz", 0.0, 1e-6, "white noise of the sensor, as in scenario quartz_chamber (E0)"),
 }
 
@@ -67,6 +74,7 @@ class Options:
     batch: str = "serial"
     seed: int = 1
     settings: Sequence[str] = ()  # NAME=VALUE
+    wire: int = 0  # units that are measured again through the wire
     workers: int | None = None
     dask: str | None = None
     store: Path | None = None
@@ -85,6 +93,8 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--seed", type=natural, default=usual.seed, help="random seed (%(default)s)")
     text = "change the schedule; names below"
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help=text)
+    text = "measure the first N units again through the wire, an emulator each; half a minute a unit (%(default)s)"
+    p.add_argument("--wire", type=natural, default=usual.wire, metavar="N", help=text)
     p.add_argument("--workers", type=natural, help="processes (one per core for long runs); 1: this process alone")
     p.add_argument(
         "--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler, as tcp://192.0.2.7:8786"
@@ -120,42 +130,43 @@ def run_campaign(o: Options, progress: Progress) -> Report:
     """
     from psabench.campaign.store import Store
     from psabench.campaign.workers import reach
-    from psabench.quartz import run_in, run_in_page
+    from psabench.quartz import run_in_page
 
     _check_options(o)
     what = _what_of(o)
     if o.dask is not None:
         reach(o.dask)  # first: the store may have all results, and --fresh forgets what it has
     provenance.note_digest("run-in", o.seed, run_in_page.origin_dict(what, o.units))
-    with Store(o.store or o.out / "store.sqlite") as store:
-        if o.fresh:
-            store.forget(run_in.make_origin(what))
-        _compute_missing(o, what, store, progress)
-        return _gather_report(o, what, store)
+    with Store(o.store or o.out / "store.sqlite") as store, provenance.without_notes():
+        return _gather_report(o, what, store, progress)
 
 
-def _compute_missing(o: Options, what: RunIn, store: Store, progress: Progress) -> None:
+def _measure_units(o: Options, what: RunIn, chain: Chain, units: int, store: Store, progress: Progress) -> Measured:
+    """Values and uncertainties of the first units, what is missing computed."""
     from psabench.campaign.workers import workers
     from psabench.quartz import run_in
 
-    wanted = run_in.list_missing(what, o.units, store)
-    if not wanted:
-        return
-    count = o.workers
-    if count is None and o.dask is None and run_in.UNIT_S * o.units < run_in.ALONE_S:
-        count = 1  # done before a cluster would have started
-    with workers(count, o.dask, own=run_in.own_build) as at_work:
-        run_in.fill_store(wanted, store, at_work, progress)
+    if o.fresh:
+        store.forget(run_in.make_origin(what, chain))
+    if wanted := run_in.list_missing(what, chain, units, store):
+        count = o.workers
+        if count is None and o.dask is None and chain.unit_s * units < run_in.ALONE_S:
+            count = 1  # done before a cluster would have started
+        with workers(count, o.dask, own=partial(run_in.name_build, chain)) as at_work:
+            run_in.fill_store(wanted, store, at_work, progress)
+    return run_in.load_rows(what, chain, store, units)
 
 
-def _gather_report(o: Options, what: RunIn, store: Store) -> Report:
+def _gather_report(o: Options, what: RunIn, store: Store, progress: Progress) -> Report:
     from psabench.quartz import run_in, run_in_figures, run_in_page
 
-    values, uncertain = run_in.load_rows(what, store, o.units)
+    values, uncertain = _measure_units(o, what, run_in.MODEL, o.units, store, progress)
     graded = min(o.units, GRADED_UNITS)
     found = run_in_figures.find_figures(values, what.batch, o.seed)
     grades = run_in_figures.grade_values(values[:graded], uncertain[:graded], run_in.true_values(what, graded))
+    agreements = _compare_wire(o, what, store, progress) if o.wire else []
     usual = o.batch == Options().batch and not o.settings
+    checks = run_in_figures.limit_checks(found, grades, o.units) if usual else []
     return run_in_page.Report(
         what=what,
         batch_name=o.batch,
@@ -163,9 +174,20 @@ def _gather_report(o: Options, what: RunIn, store: Store) -> Report:
         figures=found,
         grades=grades,
         graded_units=graded,
-        checks=run_in_figures.limit_checks(found, grades, o.units) if usual else [],
-        code=run_in.own_build(),
+        wire_units=o.wire,
+        agreements=agreements,
+        checks=[*checks, *run_in_figures.wire_checks(agreements)],
+        code=run_in.name_build(run_in.MODEL),
     )
+
+
+def _compare_wire(o: Options, what: RunIn, store: Store, progress: Progress) -> Sequence[Agreement]:
+    """The first units again through the wire, and on the model with the same course."""
+    from psabench.quartz import run_in, run_in_wire
+
+    same = run_in_wire.without_play(what)
+    model = _measure_units(o, same, run_in.MODEL, o.wire, store, progress)
+    return run_in_wire.compare_changes(_measure_units(o, same, run_in_wire.WIRE, o.wire, store, progress), model)
 
 
 # ---- options
@@ -174,6 +196,7 @@ def _gather_report(o: Options, what: RunIn, store: Store) -> Report:
 def _check_options(o: Options) -> None:
     rows = (
         ("--units", o.units, 2, MOST_UNITS),
+        ("--wire", o.wire, 0, min(o.units, 1000)),
         ("--cycles", o.cycles, LEAST_CYCLES, MOST_CYCLES),
         ("--seed", o.seed, 0, MOST_SEED),
         ("--workers", 1 if o.workers is None else o.workers, 1, 1024),

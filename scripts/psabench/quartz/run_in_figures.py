@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from psabench.quartz import batch as law
 from psabench.quartz.batch import QUANTITIES, Batch
 from psabench.quartz.draws import draw_source
 from psabench.quartz.plate import Array
+
+if TYPE_CHECKING:
+    from psabench.quartz.run_in_wire import Agreement
 
 LAW_GAINS = {"zero": (2.2, 0.15), "scale": (1.65, 0.12), "base": (3.2, 0.25)}  # instruments 3.5, 1000 units and more
 ARTICLE = {"zero": ("more than 2", 2.0), "scale": ("1.6", 1.6), "base": ("more than 3", 3.0)}
@@ -182,3 +186,17 @@ def _grade_checks(grades: Sequence[Grade]) -> Iterator[Check]:
     count = sum(g.count for g in grades)
     pooled = sum(g.covered * g.count for g in grades) / count
     yield Check(what="share of 95 % intervals that contain the truth", value=pooled, low=0.94, high=0.96)
+
+
+WIRE_2U = (0.90, 1.0)  # share of changes within 2 u of the model's: 95 % expected, a hundred and more of them
+WIRE_ENOUGH = 100
+
+
+def wire_checks(found: Sequence[Agreement]) -> list[Check]:
+    """Of the units that were measured through the wire."""
+    count = sum(a.count for a in found)
+    if count < WIRE_ENOUGH:
+        return []
+    share = sum(a.within_2u * a.count for a in found) / count
+    low, high = WIRE_2U
+    return [Check(what="share of changes through the wire within 2 u of the model's", value=share, low=low, high=high)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from psabench.quartz.run_in_figures import (
 from psabench.report.grading import aligned
 from psabench.report.page import bullets, figure, section, verdict_line, whole_page, write_report
 from psabench.report.page import table as html_table
+
+if TYPE_CHECKING:
+    from psabench.quartz.run_in_wire import Agreement
 
 TITLE = "Quartz accelerometers: run-in of a production batch"
 FORMAT = 1  # of result.json
@@ -50,6 +53,8 @@ class Report:
     figures: Mapping[str, Figures]
     grades: Sequence[Grade]
     graded_units: int
+    wire_units: int
+    agreements: Sequence[Agreement]
     checks: Sequence[Check]
     code: str
 
@@ -119,13 +124,24 @@ def grade_table(r: Report) -> list[list[str]]:
     return [["against truth", "u of a start", "starts", "error/u, rms", "in 95 %: share, %"], *rows]
 
 
+def wire_table(r: Report) -> list[list[str]]:
+    """Changes from start to start through the wire less those of the model."""
+    rows = []
+    for a in r.agreements:
+        unit = SHOWN_UNITS[UNITS[a.quantity]]
+        numbers = (f"{a.rms:.2f} {unit}", f"{a.u:.2f} {unit}", f"{a.z_rms:.2f}", f"{100 * a.within_2u:.0f}")
+        rows.append([a.quantity, str(a.count), *numbers])
+    return [["wire less model", "changes", "rms", "u of it", "rms over u", "within 2 u, %"], *rows]
+
+
 def _with_half(n: Number, digits: int) -> str:
     return f"{n.value:.{digits}f} ± {n.half95:.{digits}f}"
 
 
 def console_lines(r: Report) -> Iterator[str]:
     """Lines of all tables."""
-    for rows in (mean_table(r), gain_table(r), stop_table(r), small_table(r), grade_table(r)):
+    tables = [mean_table(r), gain_table(r), stop_table(r), small_table(r), grade_table(r)]
+    for rows in (*tables, *([wire_table(r)] if r.agreements else [])):
         yield from aligned(rows)
         yield ""
     for c in r.checks:
@@ -155,6 +171,7 @@ def result_dict(r: Report) -> dict[str, Any]:
         "schedule": asdict(r.what.schedule),
         "batch": {"name": r.batch_name, **r.what.batch},
         "checks": [asdict(c) | {"within": c.within} for c in r.checks],
+        "wire": {"units": r.wire_units, "agreements": [asdict(a) for a in r.agreements]},
         "grades": [asdict(g) for g in r.grades],
         "quantities": {q: _quantity_dict(f) for q, f in r.figures.items()},
     }
@@ -191,6 +208,7 @@ def html_page(r: Report) -> str:
         section("When to stop", html_table(stop_table(r)), figure(drawn["means"]), f"<p>{_stop_words(r)}</p>"),
         section(f"What a batch of {SMALL} shows", html_table(small_table(r)), figure(drawn["small"], small)),
         section(f"Estimates against truth, the first {r.graded_units} units", html_table(grade_table(r))),
+        _wire_section(r),
         _limits_section(r),
     ]
     return whole_page(TITLE, _facts_dict(r), body)
@@ -202,6 +220,13 @@ def _stop_words(r: Report) -> str:
         return ""
     worth = _with_half(zero[STOP_AT - 1], 1)
     return f"After the fourth cycle one more lowers the instability of the zero signal by {worth} % of its first value."
+
+
+def _wire_section(r: Report) -> str:
+    if not r.agreements:
+        return ""
+    words = "The same serial numbers on the bench: chamber, head and supply over SCPI, PSA-2 over CAN. Without play."
+    return section(f"{r.wire_units} units through the wire", f"<p>{words}</p>", html_table(wire_table(r)))
 
 
 def _limits_section(r: Report) -> str:

@@ -55,7 +55,7 @@ def test_the_librarys_own_batch_is_serial() -> None:
     job = clib.QuartzJobStruct(
         size=ctypes.sizeof(clib.QuartzJobStruct), cycles=1, seed=9, first_serial=1, units=20, g_mps2=9.8094,
         cold_degc=-60.0, hot_degc=85.0, read_degc=30.0, ramp_k_per_min=1.0, soak_min=60.0, rest_min=120.0,
-        reading_s=1.0,
+        reading_s=1.0, play_k=0.3,
     )  # fmt: skip
     found = []
     numbers = (ctypes.c_double * len(BATCH))(*BATCH.values())
@@ -71,7 +71,7 @@ def test_the_librarys_own_batch_is_serial() -> None:
 
 def test_without_scatter_and_noise_the_stress_decays_by_half_each_cycle() -> None:
     change = np.diff(values_of(SILENT, QUIET_BATCH, 40), axis=1)
-    # The play of the first cycle (instrument comes from 25 degC) is over with the second.
+    # The play of the first cycle is over with the second.
     for k in range(3):
         ratio = change[:, 2:, k] / change[:, 1:-1, k]
         np.testing.assert_allclose(ratio, BATCH["glue_keep"], rtol=0.02)
@@ -172,11 +172,11 @@ def test_parts_in_any_cut_and_order_are_the_same_bytes(tmp_path: Path) -> None:
     found = []
     for name, order in (("a", 1), ("b", -1)):
         with Store(tmp_path / name) as store:
-            run_in.fill_store(run_in.list_missing(what, 700, store)[:1], store, ThisProcess(), QUIET)
-            missing = run_in.list_missing(what, 1200, store)
+            run_in.fill_store(run_in.list_missing(what, run_in.MODEL, 700, store)[:1], store, ThisProcess(), QUIET)
+            missing = run_in.list_missing(what, run_in.MODEL, 1200, store)
             assert [w.first for w in missing] == [500, 1000]
             run_in.fill_store(missing[::order], store, ThisProcess(), QUIET)
-            found.append(store.rows(run_in.make_origin(what), 1200).tobytes())
+            found.append(store.rows(run_in.make_origin(what, run_in.MODEL), 1200).tobytes())
     assert found[0] == found[1]
 
 

@@ -1,0 +1,154 @@
+"""Units of a run-in on the bench: an emulator each, chamber, head and supply over SCPI, PSA-2 over CAN.
+
+The same serial numbers, course and starts as on the sensor model, with all that a bench adds: the converter with its
+offset, noise and reference, the head's setting error. What a change from start to start may differ by:
+
+- noise of the readings, type A, on either side
+- the head's setting error, 2" rms of the scenario at each turn: (I3 - I4)/2 has it over sqrt(2)
+- the converter's reference from start to start: 0.4 ppm (E3: six starts of a unit without scatter, through the wire)
+
+The unit is off during a cycle. The emulator moves the play only of a unit that is on, so a comparison is made without
+play.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from psabench.bench import Bench
+from psabench.campaign import builds
+from psabench.errors import BenchError
+from psabench.native.quartz_model import Readings
+from psabench.places import find_emulator, proto_file
+from psabench.quartz.batch import QUANTITIES
+from psabench.quartz.plate import Array
+from psabench.quartz.run_in import Chain, RunIn, estimate_units
+
+SCENARIO = "scenarios/quartz_chamber.yaml"
+FILES = (SCENARIO, "psabench.dbc", "psa2.eds")
+HEAD_DEG = (270.0, 90.0, 180.0, 0.0)  # g along +x, -x, +y, -y of the unit
+SAMPLE_HZ = 1000.0
+SETTLE_S, OFF_S = 1.0, 1.0
+HEAD_ARCSEC = 2.0  # setting error of the scenario's head, rms
+REFERENCE_PPM = 0.4
+MOST_UNITS = 1000
+
+
+def without_play(what: RunIn) -> RunIn:
+    """The same batch for a comparison."""
+    return replace(what, schedule=replace(what.schedule, play_k=0.0))
+
+
+def make_scenario(what: RunIn, serial: int) -> dict[str, Any]:
+    """The shipped scenario with this unit, course and batch."""
+    import yaml
+
+    found: dict[str, Any] = yaml.safe_load(proto_file(SCENARIO).read_text(encoding="utf-8"))
+    s = what.schedule
+    found["site"] = {"g_mps2": s.g_mps2}
+    found["chamber"] |= {"start_degc": s.read_degc, "ramp_k_per_min": s.ramp_k_per_min}
+    found["spread"] = {"quartz": dict(what.batch)}
+    unit = found["units"][0]
+    unit["serial"] = serial
+    for axis in unit["axes"].values():
+        axis["quartz"] |= {"noise_a_rthz": s.noise_a_rthz, "play_k": s.play_k}
+    return found
+
+
+def measure_wire(what: RunIn, first_serial: int, units: int) -> tuple[Array, Array]:
+    """As `measure_model`, through the wire; the uncertainties include the bench's."""
+    found = [read_unit(what, first_serial + k) for k in range(units)]
+    values, noise = estimate_units(
+        Readings(mean_a=np.stack([r.mean_a for r in found]), sd_a=np.stack([r.sd_a for r in found]))
+    )
+    bench = np.array([0.0, REFERENCE_PPM, HEAD_ARCSEC / np.sqrt(2.0)])
+    return values, np.hypot(noise, bench)
+
+
+def read_unit(what: RunIn, serial: int) -> Readings:
+    """Every start of one unit, (starts, positions). Raises BenchError."""
+    import yaml
+
+    with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
+        path = Path(folder) / "unit.yaml"
+        scenario = make_scenario(what, serial)
+        path.write_text(yaml.dump(scenario, Dumper=yaml.SafeDumper), encoding="utf-8")
+        load_ohm = float(scenario["units"][0]["axes"]["x"]["afe"]["load_ohm"])
+        with Bench.start(path, seed=what.seed) as bench:
+            for _ in range(serial):  # the head's errors are of the seed and its turns: another series for each unit
+                bench.head.turn(HEAD_DEG[0])
+            starts = [_read_start(bench, what, n) for n in range(what.schedule.cycles + 1)]
+    volts = np.array(starts)
+    return Readings(mean_a=volts[..., 0] / load_ohm, sd_a=volts[..., 1] / load_ohm)
+
+
+def _read_start(bench: Bench, what: RunIn, cycle: int) -> Sequence[tuple[float, float]]:
+    """Mean and its standard deviation at each position, V; after a cycle, but for the first."""
+    if cycle > 0:
+        _run_cycle(bench, what)
+    bench.unit.wait_ready()
+    return [_read_position(bench, angle_deg, what.schedule.reading_s) for angle_deg in HEAD_DEG]
+
+
+def _run_cycle(bench: Bench, what: RunIn) -> None:
+    """Off, cold, hot, back, on."""
+    s = what.schedule
+    bench.supply.output(False)
+    for degc, stay_min in ((s.cold_degc, s.soak_min), (s.hot_degc, s.soak_min), (s.read_degc, s.rest_min)):
+        bench.chamber.set(degc, wait=True)
+        bench.wait_away(60.0 * stay_min + OFF_S)
+    bench.supply.output(True)
+
+
+def _read_position(bench: Bench, angle_deg: float, reading_s: float) -> tuple[float, float]:
+    bench.head.turn(angle_deg)
+    bench.wait(SETTLE_S)
+    volts = bench.unit.stream(max(2, round(SAMPLE_HZ * reading_s)), timeout_s=reading_s + 5.0).axis("x")
+    if not np.all(np.isfinite(volts)):
+        raise BenchError("run-in: the unit sent samples that are no numbers")
+    return float(volts.mean()), float(volts.std(ddof=1) / np.sqrt(len(volts)))
+
+
+@cache
+def wire_digest() -> str:
+    """SHA-256 of psa-emu, the protocol's files, and the host's code that takes part."""
+    return builds.digest([find_emulator(), *map(proto_file, FILES), *builds.sources("psabench.quartz.run_in_wire")])
+
+
+WIRE = Chain(name="through the wire", part_units=1, unit_s=30.0, digest=wire_digest, measure=measure_wire)
+
+
+# ---- beside the model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """Of one quantity: changes from start to start through the wire less those of the model."""
+
+    quantity: str
+    count: int
+    rms: float  # the quantity's unit
+    u: float  # combined standard uncertainty of a difference
+    z_rms: float
+    within_2u: float
+
+
+def compare_changes(wire: tuple[Array, Array], model: tuple[Array, Array]) -> list[Agreement]:
+    """Values and uncertainties (units, starts, 3) of the same units. Offsets and scale of the converter drop out."""
+    off = np.diff(wire[0], axis=1) - np.diff(model[0], axis=1)
+    squares = wire[1] ** 2 + model[1] ** 2
+    u = np.sqrt(squares[:, 1:] + squares[:, :-1])
+    found = []
+    for k, q in enumerate(QUANTITIES):
+        z = off[..., k] / u[..., k]
+        rms = [float(np.sqrt(np.mean(x**2))) for x in (off[..., k], u[..., k], z)]
+        within = float((np.abs(z) <= 2.0).mean())
+        found.append(Agreement(quantity=q, count=z.size, rms=rms[0], u=rms[1], z_rms=rms[2], within_2u=within))
+    return found
