@@ -19,7 +19,7 @@ from psabench.errors import BadInput
 from psabench.native import clib, quartz_model
 from psabench.native.quartz_model import Schedule
 from psabench.progress import Bar
-from psabench.quartz import run_in, run_in_command, run_in_figures, run_in_page
+from psabench.quartz import run_in, run_in_command, run_in_figures, run_in_page, run_in_wire
 from psabench.quartz.batch import draw_instability, load_batch
 from psabench.quartz.run_in import RunIn
 from psabench.quartz.run_in_command import Options
@@ -239,3 +239,43 @@ def test_the_help_names_every_setting_with_its_default() -> None:
     usual = Schedule()
     for name, (default, *_) in run_in_command.SETTINGS.items():
         assert getattr(usual, name) == default
+
+
+# ---- through the wire
+
+
+def test_the_scenario_of_a_unit_is_the_shipped_one_with_its_number_and_course() -> None:
+    what = run_in_wire.without_play(RunIn(schedule=Schedule(ramp_k_per_min=2.0), batch=BATCH, seed=1))
+    found = run_in_wire.make_scenario(what, 7)
+    unit = found["units"][0]
+    assert (unit["serial"], unit["axes"]["x"]["quartz"]["play_k"]) == (7, 0.0)
+    assert found["chamber"] == {"start_degc": 30.0, "ramp_k_per_min": 2.0}
+    assert found["spread"] == {"quartz": BATCH}
+    assert unit["axes"]["x"]["afe"]["load_ohm"] == 937.5
+
+
+def test_changes_that_differ_by_more_than_their_uncertainty_are_out_of_limits() -> None:
+    rng = np.random.default_rng(4)
+    model, u = rng.standard_normal((10, 6, 3)), np.full((10, 6, 3), 0.5)
+    offset = np.array([200.0, 9000.0, 30.0])  # of the converter: no change from start to start
+    for size, good in ((0.5, True), (1.5, False)):
+        wire = model + offset + size * rng.standard_normal(model.shape)
+        found = run_in_wire.compare_changes((wire, np.full_like(u, size if good else 0.5)), (model, 0.0 * u))
+        assert [a.count for a in found] == [50, 50, 50]
+        assert all(c.within == good for c in run_in_figures.wire_checks(found)), found
+    assert run_in_figures.wire_checks(found[:1]) == []  # too few to tell
+
+
+def test_a_unit_through_the_wire_changes_as_the_model_does(tmp_path: Path) -> None:
+    """One unit, two starts with a cycle between: PSA-2 over CAN; chamber, head and supply over SCPI."""
+    what = run_in_wire.without_play(RunIn(schedule=Schedule(cycles=1), batch=BATCH, seed=3))
+    found = {}
+    for chain in (run_in.MODEL, run_in_wire.WIRE):
+        with Store(tmp_path / "store") as store:
+            run_in.fill_store(run_in.list_missing(what, chain, 1, store), store, ThisProcess(), QUIET)
+            found[chain.name] = run_in.load_rows(what, chain, store, 1)
+    wire, model = found["through the wire"], found["sensor model"]
+    off = np.diff(wire[0], axis=1) - np.diff(model[0], axis=1)
+    u = np.sqrt(np.sum(wire[1] ** 2 + model[1] ** 2, axis=1))
+    assert np.all(np.abs(off[:, 0]) < 4.0 * u), (off, u)
+    assert np.all(np.abs(np.diff(model[0], axis=1)[0, 0]) > u[0])  # there is a change to be seen
