@@ -6,11 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from psabench.errors import BenchError, expected
+from psabench.estimate.angles import wrapped_deg
 from psabench.procedures.head_bench import Progress, Silent
 from psabench.thermal.bench import CASE_CHANNEL, ThermalBench
 from psabench.thermal.follow import FollowCheck
 from psabench.thermal.records import Recording
 from psabench.thermal.schedule import SOAK, Action, Schedule, Setting, Take, planned_actions
+
+HEAD_DEG = 0.1  # that the head's scale may miss a position by: what is beyond first order there is 2 ppm
 
 
 def _drop_it(_: object) -> None:
@@ -44,7 +48,7 @@ def measure_schedule(
 ) -> list[Recording]:
     """Carry out a schedule; kept: its first recordings, which are not made again. All recordings.
 
-    Raises BenchError where the chamber or the case does not follow, LinkError for a sensor that gives nothing.
+    Raises BenchError where head, chamber or case does not follow, LinkError for a sensor that gives nothing.
     """
     actions = planned_actions(schedule, start.chamber_degc)
     recordings, follow = list(kept), FollowCheck()
@@ -70,6 +74,9 @@ def _record_take(
     bench: ThermalBench, schedule: Schedule, take: Take, start: RunStart, follow: FollowCheck, watch: ThermalWatch
 ) -> Recording:
     alpha_deg = bench.turn(take.position)
+    if abs(wrapped_deg(alpha_deg - take.position.set_deg)) > HEAD_DEG:
+        at = f"{take.position.set_deg:g} deg for {take.position.name}"
+        raise BenchError(expected(at, f"{alpha_deg:.4f}: it does not turn or slips", "head"))
     bench.wait_until(start.origin_s + take.at_s)
     shown = bench.chamber_degc()
     s = bench.record(schedule.record_s)

@@ -108,7 +108,7 @@ class RunFolder:
     def store_setup(self, setup: Mapping[str, Any]) -> None:
         """What the run was asked for; checkpoints and rows of an earlier run go. Raises OutputError."""
         self.path.mkdir(parents=True, exist_ok=True)
-        for old in (*self._snapshots().values(), self.data, self.truth):
+        for old in (*self._snapshots().values(), self.data, self.truth, self.path / "result.json"):
             old.unlink(missing_ok=True)
         replace_file(self.path / SETUP, json.dumps({"format": FORMAT, **setup}, indent=1) + "\n")
 

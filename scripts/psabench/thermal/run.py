@@ -25,7 +25,7 @@ from psabench.procedures.run_table import G_MPS2, SITE_G_MPS2
 from psabench.report import provenance
 from psabench.thermal.bench import WireThermal
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
-from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
+from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row, whole_lines
 from psabench.thermal.result import ThermalResult, estimate_run
 from psabench.thermal.schedule import (
     Schedule,
@@ -72,6 +72,8 @@ class ThermalRun:
 def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
     """Measure and estimate. Raises BadInput, BenchError; what was recorded stays."""
     folder = RunFolder(options.resume or options.out)
+    if not options.resume:
+        _refuse_unfinished(folder)
     setup = _resumed_setup(options, folder) if options.resume else _new_setup(options)
     schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
     recordings = _whole_recordings(setup, folder, schedule) if options.resume else None
@@ -87,6 +89,14 @@ def _accuracy_of(options: ThermalOptions, *, ours: bool) -> BenchAccuracy:
     """Nothing is hidden in the chain and the head of our own scenario; else what the user gives, or our figures."""
     given = {**(EXACT if ours else {}), **fields_of(BenchAccuracy, options.params)}
     return made_params(BenchAccuracy, "accuracy of the bench", given)
+
+
+def _refuse_unfinished(folder: RunFolder) -> None:
+    """Hours of recordings are not overwritten. Raises BadInput."""
+    rows = max(len(whole_lines(folder.data)) - 1, 0)
+    if rows and not (folder.path / "result.json").exists():
+        what = f"another folder, or --resume {folder.path} to continue its run"
+        raise BadInput(expected(what, f"one with {rows} recordings of a run that is not complete", "--out"))
 
 
 def _is_there(options: ThermalOptions) -> bool:
@@ -150,6 +160,8 @@ class _Session:
         rows = len(read_recordings(self._folder.data))
         found = self._folder.last_checkpoint(rows) if self._setup["ours"] else None
         if found is None:
+            if rows and self._setup["ours"]:
+                self._folder.set_aside(0)
             return self._stack.enter_context(_opened_bench(options, self._setup, self._folder))
         bench = self._stack.enter_context(Bench.restore(found[1]))
         self._kept = self._folder.keep_rows(found[0])

@@ -36,6 +36,7 @@ class FakeThermalBench:
     head_arcsec: float = 2.0  # rms, which the scale shows
     rate_part: float = 1.0  # of its ramp that the chamber makes
     readout_k: float = 0.0
+    stuck_deg: float | None = None  # where the head stays
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(1))
     t_s: float = 0.0
 
@@ -62,6 +63,8 @@ class FakeThermalBench:
     def turn(self, position: Position) -> float:
         self._face = position.face
         self._angle_deg = position.set_deg + self.head_arcsec / 3600.0 * self.rng.standard_normal()
+        if self.stuck_deg is not None:
+            self._angle_deg = self.stuck_deg
         return self._angle_deg
 
     def record(self, seconds: float) -> Sample:

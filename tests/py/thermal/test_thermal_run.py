@@ -119,6 +119,17 @@ def test_the_lag_predicts_how_the_methods_differ(whole: ThermalResult) -> None:
         assert d.loop == pytest.approx(2 * d.less_soak, rel=0.25)
 
 
+def test_each_rate_has_its_sweep_and_its_residuals(short: list[Recording]) -> None:
+    assert SHORT.sweep is not None
+    twice = replace(SHORT, soak=None, sweep=replace(SHORT.sweep, rates_k_per_min=(4.0, 8.0)))
+    result = found_by(measure_schedule(FakeThermalBench(), twice, START, ThermalWatch()), twice)
+    report = thermal_grading.graded_report(result, None, {})
+    (_, slow, fast) = thermal_grading.rates_table(report)
+    assert (slow[0], fast[0]) == ("4", "8")
+    other_leg = [float(row[2].rstrip(" %")) for row in (slow, fast)]
+    assert other_leg[1] == pytest.approx(2 * other_leg[0], rel=0.3)  # the loop goes with the rate
+
+
 def test_what_the_scale_of_the_head_shows_is_taken_out() -> None:
     bench = FakeThermalBench(head_arcsec=60.0)
     points = points_of(measure_schedule(bench, SHORT, START, ThermalWatch()))["soak"]
@@ -166,6 +177,11 @@ def test_a_chamber_that_does_not_follow_ends_the_run(fault: dict[str, Any], says
         measure_schedule(FakeThermalBench(**fault), SLOW, START, ThermalWatch(store=seen.append))
     assert seen  # what was recorded before is kept
     assert "\n" not in str(e.value)
+
+
+def test_a_head_that_sticks_ends_the_run() -> None:
+    with pytest.raises(BenchError, match=r"head: expected 90 deg for x_up, got 270\.0000: it does not turn or slips"):
+        measure_schedule(FakeThermalBench(stuck_deg=270.0), SHORT, START, ThermalWatch())
 
 
 def frames_of(**columns: np.ndarray) -> Frames:
@@ -281,6 +297,13 @@ def test_a_folder_without_a_run_is_not_resumed(text: str | None, says: str, tmp_
         (tmp_path / "thermal-run.json").write_text(text)
     with pytest.raises(BadInput, match=says):
         run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path), Silent())
+
+
+def test_recordings_of_a_run_that_is_not_complete_are_not_overwritten(short: list[Recording], tmp_path: Path) -> None:
+    folder = stored_in(tmp_path, short[:4])
+    with pytest.raises(BadInput, match=r"--resume .* got one with 4 recordings of a run that is not complete"):
+        run_thermal(ThermalOptions(out=tmp_path), Silent())
+    assert read_recordings(folder.data) == short[:4]
 
 
 def test_what_a_run_has_already_is_not_given_again(tmp_path: Path) -> None:
