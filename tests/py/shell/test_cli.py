@@ -24,10 +24,10 @@ from tests.py.link.test_lineport import lines
 MISTAKES: list[tuple[str, str]] = [
     (
         "run",
-        "run: expected turns, fourier, reversal, all, compare-converters, gyrocompass, heading-hold or script (",
+        "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, heading-hold or script (",
     ),
     ("run --out turns", "run: expected turns"),
-    ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, gyrocompass, "),
+    ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, "),
     ("run spin --positions 80", "heading-hold or script, got 'spin'"),
     (
         "run turns --positions 80",
