@@ -77,7 +77,9 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
     setup = _resumed_setup(options, folder) if options.resume else _new_setup(options)
     schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
     recordings = _whole_recordings(setup, folder, schedule) if options.resume else None
-    if recordings is None:
+    if recordings is not None:
+        provenance.note_recorded(setup)
+    else:
         with ExitStack() as stack:
             recordings = _Session(options, setup, folder, schedule, stack).measure_rest(progress)
     accuracy = _accuracy_of(options, ours=bool(setup["ours"]) and not setup["scenario"])
@@ -177,6 +179,7 @@ class _Session:
             return self._go_on_there()
         start = RunStart(origin_s=float(int(self._wire.t_s) + 1), chamber_degc=self._wire.chamber_degc())
         self._setup |= {"origin_s": start.origin_s, "start_degc": start.chamber_degc}
+        self._setup["scenarios"] = provenance.noted_scenarios()
         self._folder.store_setup(self._setup)
         return start
 

@@ -381,6 +381,7 @@ def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
     [
         ("run turns", "; what was measured is kept"),
         ("run all", "; what was measured is kept"),
+        ("run thermal", "; what was measured is kept; --resume continues the run"),
         ("campaign gyrocompass", "; what was measured is kept"),
         ("record run.log", "; what was recorded is kept"),
         ("run gyrocompass", ""),
