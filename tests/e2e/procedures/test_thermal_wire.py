@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import time
@@ -41,7 +42,6 @@ record_s: 0.16
 soak: {temperatures_c: [15, 25, 35], ramp_k_per_min: 60, dwell_s: 20}
 sweep: {rates_k_per_min: [5], every_s: 6, rest_s: 20, legs: up, ramp_k_per_min: 60}
 """
-FAULT = "faults: [{kind: chamber.slow, point: chamber, at_s: 40, rate_part: 1.0e-6}]\n"
 
 
 def started(folder: Path, unit: str = UNIT) -> list[str]:
@@ -82,11 +82,24 @@ def test_a_run_that_was_killed_has_the_digits_of_one_in_one_piece(tmp_path: Path
     assert results[0]["sections"] == results[1]["sections"]
 
 
-def test_a_chamber_that_sticks_ends_the_run_and_keeps_what_it_has(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("fault", "says", "rows"),
+    [
+        # seen by the recording that it spoils
+        ("chamber.slow, point: chamber, rate_part: 1.0e-6", "chamber: expected 25.0 degC .* it does not follow", 7),
+        (
+            "chamber.readout, point: chamber, readout_k: 5",
+            "chamber: expected 25.0 degC .* it does not follow or reads",
+            7,
+        ),
+        ("analog.load_open, point: a.afe.y", "channel y: expected readings within its range, got one at its limit", 6),
+    ],
+)
+def test_a_fault_of_the_bench_ends_the_run_and_what_it_has_is_kept(
+    fault: str, says: str, rows: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(started(tmp_path / "run", UNIT + FAULT)) == 3
+    unit = f"{UNIT}faults: [{{at_s: 72, kind: {fault}}}]\n"
+    assert cli.main(started(tmp_path / "run", unit)) == 3
     (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("psabench: ")]
-    assert "chamber: expected 25.0 degC" in line
-    assert "it does not follow or reads wrong" in line
-    assert rows_in(tmp_path / "run") == 7  # the coldest temperature, and the recording that shows it
+    assert re.search(says, line)
+    assert rows_in(tmp_path / "run") == rows

@@ -24,7 +24,7 @@ from tests.py.link.test_lineport import lines
 MISTAKES: list[tuple[str, str]] = [
     (
         "run",
-        "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, heading-hold or script (",
+        "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, heading-hold or script",
     ),
     ("run --out turns", "run: expected turns"),
     ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, "),

@@ -22,7 +22,15 @@ from psabench.thermal.records import Recording, RunFolder, read_recordings, reco
 from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
 from psabench.thermal.run import ThermalOptions, run_thermal
-from psabench.thermal.schedule import Schedule, Setting, Soak, Take, planned_actions, schedule_of_dict
+from psabench.thermal.schedule import (
+    Schedule,
+    Setting,
+    Soak,
+    Take,
+    planned_actions,
+    read_schedule,
+    schedule_of_dict,
+)
 from thermal_bench import UNITS, FakeThermalBench
 
 START = RunStart(origin_s=0.0, chamber_degc=25.0)
@@ -359,6 +367,24 @@ def test_a_passport_takes_the_curves_of_a_report(whole: ThermalResult, tmp_path:
     assert sweep.range_c == pytest.approx((-60.0, 85.0), abs=1.0)
     sections = json.loads((tmp_path / "result.json").read_text())["sections"]
     assert [len(s["differences"]) for s in sections] == [0, 12]
+
+
+def test_the_full_schedule_finds_the_usual_lags() -> None:
+    """Thirty hours with lags of three and six minutes."""
+    full = read_schedule("full")
+    recordings = measure_schedule(FakeThermalBench(case_tau_s=180.0, element_tau_s=360.0), full, START, ThermalWatch())
+    assert recordings[-1].t_s == pytest.approx(30 * 3600.0, rel=0.01)
+    result = found_by(recordings, full)
+    soak, (sweep,) = result.method("soak"), result.sweeps
+    assert soak is not None
+    assert case_lag_s(recordings, "sweep-1") == pytest.approx(180.0, rel=0.02)
+    for axis in "xyz":
+        lag = sweep.fits[f"zero_{axis}_ug"].best.lag
+        assert lag is not None
+        assert lag.tau_s == pytest.approx(360.0, rel=0.01)
+        d = difference_of(soak, sweep, f"zero_{axis}_ug")
+        assert d.less_soak == pytest.approx(d.less_soak_predicted, rel=0.05)
+        assert d.loop == pytest.approx(d.loop_predicted, rel=0.05)
 
 
 @pytest.mark.parametrize(("wrong_ug", "says"), [(0.0, "All 72 values"), (30.0, "18 of 72 values")])
