@@ -366,8 +366,7 @@ void unit_reseed(struct unit *u, uint64_t seed)
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         draws_reseed(&u->mems[i].noise, seed);
         draws_reseed(&u->mems[i].slow.draws, seed);
-        draws_reseed(&u->quartz[i].noise, seed);
-        draws_reseed(&u->quartz[i].scatter, seed);
+        quartz_reseed(&u->quartz[i], seed);
     }
     board_reseed(u->board, seed);
 }

@@ -68,6 +68,7 @@ void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, st
                          .terms.start = -1,
                          .noise = noise,
                          .scatter = scatter,
+                         .later_scatter = scatter,
                          .t_ns = -1};
     q->every_ns = loop_period_ns(&q->cfg);
 }
@@ -75,6 +76,13 @@ void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, st
 void quartz_start(struct quartz *q)
 {
     q->starts++;
+    q->scatter = q->later_scatter;
+}
+
+void quartz_reseed(struct quartz *q, uint64_t seed)
+{
+    draws_reseed(&q->noise, seed);
+    draws_reseed(&q->later_scatter, seed);
 }
 
 /* ---- temperature */

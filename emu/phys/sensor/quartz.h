@@ -73,7 +73,8 @@ struct quartz {
     double cycles;                  /* thermal cycles since then, as chamber_body_cycles() counts them; its owner too */
     uint32_t starts;                /* since then: quartz_start() */
     struct quartz_terms terms;      /* of the last look */
-    struct draws noise, scatter;
+    struct draws noise;
+    struct draws scatter, later_scatter; /* of the present start; of those to come */
     int64_t t_ns;               /* of the last look; -1 before the first */
     int64_t dt_ns;              /* for which the coefficients of the loop hold */
     int64_t every_ns;           /* period of the loop's grid; 0: its memory is too long for one */
@@ -95,6 +96,9 @@ void quartz_init(struct quartz *q, const struct quartz_g *cfg, double g_mps2, st
 
 /* It is switched on: the pendulum comes to rest elsewhere. */
 void quartz_start(struct quartz *q);
+
+/* Noise from here on, and what later starts add, come from another seed. */
+void quartz_reseed(struct quartz *q, uint64_t seed);
 
 /* What it would give at rest without noise: truth. */
 double quartz_true_a(const struct quartz *q, const double a_mps2[3]);

@@ -121,9 +121,7 @@ def test_a_head_that_slips_is_seen_in_the_codes_alone(tmp_path: Path) -> None:
         assert level_v(b) == pytest.approx(-0.5, abs=1e-3)
 
 
-def test_a_silent_link_is_a_time_out_that_names_the_instrument(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_link_is_a_time_out_that_names_the_instrument(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And what was said meanwhile was not heard."""
     monkeypatch.setattr(instruments, "REPLY_S", 0.3)
     with bench(tmp_path, CHAMBER + UNITS) as b:

@@ -284,6 +284,22 @@ static void each_start_scatters_by_itself(void **state)
     assert_true(quartz_true_a(&later, (const double[3]){0}) == quartz_true_a(&q, (const double[3]){0}));
 }
 
+static void another_seed_is_for_the_starts_to_come(void **state)
+{
+    (void)state;
+    const struct quartz_g cfg = {.scale_a_per_g = 1e-3, .start_ug = 12.6};
+    struct quartz q = up(&cfg), again = up(&cfg), plain = up(&cfg);
+    const double still[3] = {0}, now_a = quartz_true_a(&plain, still);
+    quartz_reseed(&q, 7);
+    quartz_reseed(&again, 7);
+    assert_true(quartz_true_a(&q, still) == now_a);
+    quartz_start(&q);
+    quartz_start(&again);
+    quartz_start(&plain);
+    assert_true(quartz_true_a(&q, still) == quartz_true_a(&again, still));
+    assert_true(quartz_true_a(&q, still) != quartz_true_a(&plain, still));
+}
+
 /* Two sines at 45 degrees: half the coupling times the squares, of the part of the deflection that is in phase. At the natural
  * frequency that is none; above it has the other sign. */
 static void a_pendulum_rectifies_vibration_across(void **state)
@@ -408,6 +424,7 @@ int main(void)
         cmocka_unit_test(noise_of_a_look_follows_its_interval),
         cmocka_unit_test(cycles_relax_the_glue),
         cmocka_unit_test(each_start_scatters_by_itself),
+        cmocka_unit_test(another_seed_is_for_the_starts_to_come),
         cmocka_unit_test(a_pendulum_rectifies_vibration_across),
         cmocka_unit_test(the_two_groups_mirror_each_other),
     };
