@@ -1,1 +1,1 @@
-"""Accelerometers against temperature: polynomial compensation, its choice of degree, its export to a computer."""
+"""Accelerometers against temperature: the run in a chamber, compensation by polynomials, its export to a computer."""

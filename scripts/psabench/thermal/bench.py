@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -77,21 +75,16 @@ class WireThermal:
         """Once a run: the unit is ready and has the data rate."""
         self._unit.wait_ready()
         code = next(code for code, hz in DATA_HZ.items() if hz == self._hz)
-        with self._reads_registers():
-            value = self._unit.register("x", CONFIG0) & ~DR_MASK | code << DR_SHIFT
-            if self._unit.register("x", CONFIG0) != value:
-                self._unit.write_register("x", CONFIG0, value)  # one input line for all three
-                self._unit.host.advance(2 * SETTLE_PERIODS / self._hz)
+        config0 = self._unit.register("x", CONFIG0)
+        wanted = config0 & ~DR_MASK | code << DR_SHIFT
+        if config0 != wanted:
+            self._unit.write_register("x", CONFIG0, wanted)  # one input line for all three
+            self._unit.host.advance(2 * SETTLE_PERIODS / self._hz)
         self.resume()
 
     def resume(self) -> None:
         """The unit goes on as it was left: what is known of it is read again."""
         self._gain = self._unit.filter_gain
-
-    @contextmanager
-    def _reads_registers(self) -> Iterator[None]:
-        self._unit.stop()
-        yield
 
     @property
     def t_s(self) -> float:

@@ -24,6 +24,7 @@ from psabench.thermal.schedule import POSITIONS
 NAME = "thermal"
 SETUP = "thermal-run.json"
 FORMAT = 1  # of it
+SETUP_KEYS = ("name", "schedule", "ours", "scenario", "node", "accuracy", "g_mps2", "origin_s", "start_degc")
 SNAPSHOT = "checkpoint-{rows}.snapshot"
 
 
@@ -123,6 +124,9 @@ class RunFolder:
             raise BadInput(expected("the set-up of a run", e, path)) from e
         if not isinstance(found, dict) or found.get("format") != FORMAT:
             raise BadInput(expected(f"the set-up of a run, format {FORMAT}", "another", path))
+        missing = [key for key in SETUP_KEYS if key not in found]
+        if missing:
+            raise BadInput(expected(", ".join(missing), "none", path))
         return found
 
     def _snapshots(self) -> dict[int, Path]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
+from psabench.boards.psa2.device import Psa2
 from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.errors import BadInput, expected
@@ -82,15 +83,15 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
     else:
         with ExitStack() as stack:
             recordings = _Session(options, setup, folder, schedule, stack).measure_rest(progress)
-    accuracy = _accuracy_of(options, ours=bool(setup["ours"]) and not setup["scenario"])
+    given = {**setup["accuracy"], **fields_of(BenchAccuracy, options.params)}
+    accuracy = _accuracy_of(given, exact=bool(setup["ours"]) and not setup["scenario"])
     result = estimate_run(recordings, schedule, float(setup["g_mps2"]), accuracy)
     return ThermalRun(result=result, folder=folder, facts=_facts_of(setup))
 
 
-def _accuracy_of(options: ThermalOptions, *, ours: bool) -> BenchAccuracy:
+def _accuracy_of(given: dict[str, Any], *, exact: bool) -> BenchAccuracy:
     """Nothing is hidden in the chain and the head of our own scenario; else what the user gives, or our figures."""
-    given = {**(EXACT if ours else {}), **fields_of(BenchAccuracy, options.params)}
-    return made_params(BenchAccuracy, "accuracy of the bench", given)
+    return made_params(BenchAccuracy, "accuracy of the bench", {**(EXACT if exact else {}), **given})
 
 
 def _refuse_unfinished(folder: RunFolder) -> None:
@@ -117,6 +118,7 @@ def _new_setup(options: ThermalOptions) -> dict[str, Any]:
         "scenario": str(options.scenario) if options.scenario else "",
         "seed": options.seed,
         "node": options.node,
+        "accuracy": fields_of(BenchAccuracy, options.params),
         "g_mps2": default_g if options.gravity is None else options.gravity,
     }
 
@@ -154,7 +156,7 @@ class _Session:
         else:
             self._bench = stack.enter_context(_opened_bench(options, setup, folder))
         b = self._bench
-        self._wire = WireThermal(b.unit, b.head, b.chamber, schedule.samples_hz)
+        self._wire = WireThermal(_unit_at(b, int(setup["node"])), b.head, b.chamber, schedule.samples_hz)
         self._checkpoints = b.emulator is not None
 
     def _continue_bench(self, options: ThermalOptions) -> Bench:
@@ -165,7 +167,8 @@ class _Session:
             if rows and self._setup["ours"]:
                 self._folder.set_aside(0)
             return self._stack.enter_context(_opened_bench(options, self._setup, self._folder))
-        bench = self._stack.enter_context(Bench.restore(found[1]))
+        pace = "wall" if options.real_time else "step"
+        bench = self._stack.enter_context(Bench.restore(found[1], pace=pace))
         self._kept = self._folder.keep_rows(found[0])
         return bench
 
@@ -221,6 +224,12 @@ class _Session:
         load_ohm = [float(axes[a]["afe"]["load_ohm"]) for a in "xyz"]
         with self._folder.open_truth() as series:
             yield lambda r: series.store_rows([_truth_row(r, self._bench.truth_state(), load_ohm)])
+
+
+def _unit_at(bench: Bench, node: int) -> Psa2:
+    """The PSA-2 of this node, among all of a bench that was restored; else its first one."""
+    found = (u for u in bench.units.values() if isinstance(u, Psa2) and u.node.node_id == node)
+    return next(found, None) or bench.unit
 
 
 def _truth_row(r: Recording, state: dict[str, Any], load_ohm: Sequence[float]) -> list[object]:

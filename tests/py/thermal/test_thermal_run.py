@@ -298,6 +298,7 @@ def test_a_full_disk_ends_a_run_in_one_line(short: list[Recording], tmp_path: Pa
         (None, "expected a folder of psabench run thermal, with thermal-run.json, got none"),
         ("{", "thermal-run.json: expected the set-up of a run"),
         ('{"format": 2}', "expected the set-up of a run, format 1"),
+        ('{"format": 1, "name": "quick"}', "expected schedule, ours, scenario, node, .* got none"),
     ],
 )
 def test_a_folder_without_a_run_is_not_resumed(text: str | None, says: str, tmp_path: Path) -> None:
