@@ -40,7 +40,7 @@ static bool take_over(struct service *s, const struct options *o, int out_fd, ch
     return service_reopen(s, o, why, cap);
 }
 
-static bool reseed(struct service *s, uint64_t seed, char *why, size_t cap)
+static bool reseed_child(struct service *s, uint64_t seed, char *why, size_t cap)
 {
     cJSON *args = cJSON_CreateObject(), *result = cJSON_CreateObject();
     const bool made = args && result && cJSON_AddNumberToObject(args, "seed", (double)seed);
@@ -56,7 +56,7 @@ static _Noreturn void run_child(struct service *s, const struct options *o, cons
     char why[1024];
     FILE *out = fdopen(out_fd, "w");
     if (!out) _exit(SERVICE_MACHINE);
-    if (!take_over(s, o, out_fd, why, sizeof why) || (seed && !reseed(s, *seed, why, sizeof why))) {
+    if (!take_over(s, o, out_fd, why, sizeof why) || (seed && !reseed_child(s, *seed, why, sizeof why))) {
         fprintf(out, "%s%s\n", failure, why);
         fflush(out);
         _exit(SERVICE_MACHINE);

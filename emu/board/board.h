@@ -91,8 +91,9 @@ struct board_type {
     const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
-    unsigned (*noises)(struct board *b, struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
-    bool analog;                                          /* it has analog inputs; for faults: sample_until() first */
+    unsigned (*noises)(struct board *b,
+                       struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
+    bool analog;                                            /* it has analog inputs; for faults: sample_until() first */
     void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const struct board *b, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */

@@ -84,7 +84,7 @@ struct fault_engine {
     struct sched *sched;
     struct fault fault[FAULTS_MAX];
     uint32_t last_id;
-    uint64_t seed; /* the bench's, until fault_reseed() */
+    uint64_t seed;                                                   /* the bench's, until fault_reseed() */
     void (*changed)(void *ctx, const struct fault *f, int64_t t_ns); /* it began or ended; may be NULL */
     void *ctx;
 };

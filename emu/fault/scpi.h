@@ -5,8 +5,8 @@
 #include "fault/fault.h"
 
 struct fault_scpi {
-    bool silent;          /* nothing comes through, either way */
-    int64_t late_ns;      /* of each answer */
+    bool silent;           /* nothing comes through, either way */
+    int64_t late_ns;       /* of each answer */
     struct fault *garbles; /* NULL: none does */
 };
 

@@ -7,8 +7,8 @@
 #include <assert.h>
 #include <math.h>
 
-#define S_PER_MIN 60.0
-#define NEVER_S   1e9   /* a chamber that sticks is there no sooner */
+#define S_PER_MIN    60.0
+#define NEVER_S      1e9      /* a chamber that sticks is there no sooner */
 #define AIR_MIN_DEGC (-100.0) /* nothing is colder or warmer, as scenario/lab.c has it */
 #define AIR_MAX_DEGC 200.0
 

@@ -157,7 +157,8 @@ static struct looks_range accel_range(void *ctx, unsigned axis, int64_t every_ns
     const double a_max_mps2 = ROUNDED * u->lab->site.g_mps2;
     if (c->sensor == UNIT_NO_SENSOR) return (struct looks_range){0.0, 0.0};
     if (c->series.sample) *why = "a sensor is driven from a file";
-    else if (is_quartz(u, axis) && quartz_past_ns(&u->quartz[axis]) < 0) *why = "the loop of a quartz sensor remembers long";
+    else if (is_quartz(u, axis) && quartz_past_ns(&u->quartz[axis]) < 0)
+        *why = "the loop of a quartz sensor remembers long";
     else if (u->sensor_faults[axis]) *why = "a sensor has a fault";
     else if (!is_quartz(u, axis) && u->mems[axis].slow.moves) *why = "a sensor has slow noise";
     else if (!feels_gravity(u, axis)) *why = "its mount accelerates it";

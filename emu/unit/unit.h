@@ -59,7 +59,7 @@ struct unit {
     char profile[32];    /* its name */
     struct mems mems[UNIT_AXES];
     struct quartz quartz[UNIT_AXES];
-    struct chamber_play play[UNIT_AXES]; /* of the quartz sensors */
+    struct chamber_play play[UNIT_AXES];           /* of the quartz sensors */
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
     struct unit_observer *observers;     /* in order of subscription */

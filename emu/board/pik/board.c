@@ -181,7 +181,7 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
-static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+static unsigned list_noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
 {
     struct pik *b = (struct pik *)board;
     for (unsigned i = 0; i < PIK_AXES; i++) at[i] = &b->channel[i].noise;
@@ -210,6 +210,6 @@ const struct board_type pik_board = {
     .observe = observe,
     .analog = true,
     .why_eager = why_eager,
-    .noises = noises,
+    .noises = list_noises,
     .truth = truth,
 };

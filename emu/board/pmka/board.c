@@ -212,7 +212,7 @@ static const struct board_controller_fault controller_faults[] = {
 };
 static const char *const capabilities[] = {"temp_noise_scale", NULL};
 
-static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+static unsigned list_noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
 {
     struct pmka *b = (struct pmka *)board;
     at[0] = &b->adc_noise;
@@ -244,6 +244,6 @@ const struct board_type pmka_board = {
     .set_faults = set_faults,
     .analog = true,
     .why_eager = why_eager,
-    .noises = noises,
+    .noises = list_noises,
     .truth = truth,
 };

@@ -114,7 +114,7 @@ static const char *why_eager(struct board *board, int64_t t_ns)
     return psa2_why_eager((struct psa2 *)board, t_ns);
 }
 
-static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+static unsigned list_noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
 {
     struct psa2 *b = (struct psa2 *)board;
     for (unsigned i = 0; i < 3; i++) at[i] = &b->adc[i].noise;
@@ -189,6 +189,6 @@ const struct board_type psa2_board = {
     .pulses = pulses,
     .analog = true,
     .why_eager = why_eager,
-    .noises = noises,
+    .noises = list_noises,
     .truth = truth,
 };

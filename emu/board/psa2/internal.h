@@ -78,8 +78,8 @@ void psa2_lazy_frame(struct psa2 *b,
 void psa2_lazy_sleep(
     struct psa2 *b); /* between two frames it has done something else: if it sleeps, it may skip frames */
 void psa2_lazy_init(struct psa2 *b);
-void psa2_lazy_change(struct psa2 *b, int64_t t_ns);      /* the world is about to change abruptly, perhaps back to normal */
-void psa2_lazy_stop(struct psa2 *b);                      /* a reset: nothing to be awake for */
+void psa2_lazy_change(struct psa2 *b, int64_t t_ns); /* the world is about to change abruptly, perhaps back to normal */
+void psa2_lazy_stop(struct psa2 *b);                 /* a reset: nothing to be awake for */
 const char *psa2_why_eager(struct psa2 *b, int64_t t_ns); /* NULL: what no one looks at need not be computed */
 
 /* psa2/frame.c */

@@ -185,7 +185,7 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 
-static unsigned noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
+static unsigned list_noises(struct board *board, struct draws *at[BOARD_NOISES_MAX])
 {
     struct psd1 *b = (struct psd1 *)board;
     for (unsigned i = 0; i < 3; i++) {
@@ -217,6 +217,6 @@ const struct board_type psd1_board = {
     .bus = &psd1_bus,
     .analog = true,
     .why_eager = why_eager,
-    .noises = noises,
+    .noises = list_noises,
     .truth = truth,
 };

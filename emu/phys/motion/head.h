@@ -40,12 +40,12 @@ struct head {
     struct site site;
     struct rng error;
     enum head_face face, face_before;
-    int64_t face_ns;                    /* of the latest mounting */
-    double scale_rad;                   /* what the operator set */
-    double from_rad, to_rad;            /* true angle of the mount before and after the turn */
-    double setting_rad;                 /* error drawn at the last turn */
-    bool stuck;                         /* of a faulty one: it stays where it is */
-    double slip_step_rad;               /* of a faulty one: each turn leaves the mount so much short of the scale; 0: none */
+    int64_t face_ns;         /* of the latest mounting */
+    double scale_rad;        /* what the operator set */
+    double from_rad, to_rad; /* true angle of the mount before and after the turn */
+    double setting_rad;      /* error drawn at the last turn */
+    bool stuck;              /* of a faulty one: it stays where it is */
+    double slip_step_rad;    /* of a faulty one: each turn leaves the mount so much short of the scale; 0: none */
     double slip_from_rad, slip_to_rad;  /* by which the scale is ahead of the mount, before and after the turn */
     double mount_rad, mount_before_rad; /* error drawn at the latest mounting and the one before */
     int64_t start_ns, end_ns;           /* of the turn */

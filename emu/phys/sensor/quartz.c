@@ -285,7 +285,8 @@ void quartz_skip(struct quartz *q, int64_t t_ns)
     q->end_ns = 0;
 }
 
-#define WARMER_MAX_K   170.0 /* off the reference temperature: -100 to 200 degC is the widest that a scenario may ask for */
+#define WARMER_MAX_K                                                                                                   \
+    170.0 /* off the reference temperature: -100 to 200 degC is the widest that a scenario may ask for */
 #define GRADIENT_MAX_K 300.0
 
 /* Integral of the magnitude of the loop's impulse response: no input of magnitude 1 deflects it more. */
@@ -302,7 +303,8 @@ static double tilt_max_rad(const struct quartz_g *c)
 {
     const double arcsec = fabs(c->base_slope_arcsec_per_k) * WARMER_MAX_K + fabs(c->base_curve_arcsec) +
                           fabs(c->glue_arcsec) + DRAWS_GAUSS_MAX * c->start_arcsec;
-    return (fabs(c->tilt_y_mrad) + fabs(c->tilt_z_mrad) + fabs(c->position_urad) * 1e-3) * 1e-3 + arcsec * RAD_PER_ARCSEC;
+    return (fabs(c->tilt_y_mrad) + fabs(c->tilt_z_mrad) + fabs(c->position_urad) * 1e-3) * 1e-3 +
+           arcsec * RAD_PER_ARCSEC;
 }
 
 static double zero_max_ug(const struct quartz_g *c)
@@ -317,7 +319,8 @@ struct looks_range quartz_range_a(const struct quartz *q, double a_max_mps2, int
 {
     const struct quartz_g *c = &q->cfg;
     const double a_g = a_max_mps2 / q->g_mps2, gain = loop_gain_max(c);
-    const double load_max_g = a_g * (1.0 + tilt_max_rad(c)) + (fabs(c->square_ug_per_g2) * a_g * a_g + zero_max_ug(c)) * 1e-6;
+    const double load_max_g =
+        a_g * (1.0 + tilt_max_rad(c)) + (fabs(c->square_ug_per_g2) * a_g * a_g + zero_max_ug(c)) * 1e-6;
     const double fed_back = gain * fabs(c->pendulous_ug_per_g2) * 1e-6 * a_g;
     const double ppm = fabs(c->scale_tc_ppm_per_k) * WARMER_MAX_K + fabs(c->scale_curve_ppm) + fabs(c->glue_ppm) +
                        DRAWS_GAUSS_MAX * c->start_ppm;

@@ -70,18 +70,18 @@ struct quartz {
     double g_mps2;
     /* Its owner keeps them up; the reference temperature from quartz_init() on. felt: element with play. */
     double case_degc, element_degc, felt_degc;
-    double cycles;                  /* thermal cycles since then, as chamber_body_cycles() counts them; its owner too */
-    uint32_t starts;                /* since then: quartz_start() */
-    struct quartz_terms terms;      /* of the last look */
+    double cycles;             /* thermal cycles since then, as chamber_body_cycles() counts them; its owner too */
+    uint32_t starts;           /* since then: quartz_start() */
+    struct quartz_terms terms; /* of the last look */
     struct draws noise;
     struct draws scatter, later_scatter; /* of the present start; of those to come */
-    int64_t t_ns;               /* of the last look; -1 before the first */
-    int64_t dt_ns;              /* for which the coefficients of the loop hold */
-    int64_t every_ns;           /* period of the loop's grid; 0: its memory is too long for one */
-    int64_t end_ns;             /* of the present period; 0: a look is the first */
-    struct quartz_loop loop[2]; /* that answers now, and that will in the next period */
-    double step[2][2];          /* (deviation, rate / w) of the loop over dt_ns */
-    double held_a;              /* of the last look, without noise */
+    int64_t t_ns;                        /* of the last look; -1 before the first */
+    int64_t dt_ns;                       /* for which the coefficients of the loop hold */
+    int64_t every_ns;                    /* period of the loop's grid; 0: its memory is too long for one */
+    int64_t end_ns;                      /* of the present period; 0: a look is the first */
+    struct quartz_loop loop[2];          /* that answers now, and that will in the next period */
+    double step[2][2];                   /* (deviation, rate / w) of the loop over dt_ns */
+    double held_a;                       /* of the last look, without noise */
 };
 
 /* Plausible figures (E0): 1.28 mA/g, 350 Hz with 0.7, zero 60 ug with a curve of 300 ug, 55 K wide about 12 degC. Of the two

@@ -70,7 +70,7 @@ def residual_g(curves: dict[str, Compensation]) -> Array:
     zero_g = np.array([curves[f"zero_{a}_ug"].rms * 1e-6 for a in "xyz"])
     scale_g = curves["scale_y_v_per_g"].rms / float(curves["scale_y_v_per_g"].value_at(PLAIN_C))
     base_g = [curves[f"base_{a}y_arcsec"].rms / ARCSEC for a in "xz"]
-    return np.hypot(zero_g, [base_g[0], scale_g, base_g[1]])
+    return np.asarray(np.hypot(zero_g, [base_g[0], scale_g, base_g[1]]))
 
 
 def rms(x: Array) -> Array:

@@ -42,7 +42,7 @@ def drawn_curves() -> dict[str, Compensation]:
 
 
 def frames_of(curves: dict[str, Compensation], felt_g: np.ndarray, low_c: float = 10.0) -> Frames:
-    """A case that goes up by 40 K and back, read as codes; its channel is told in every fourth frame."""
+    """A case that goes up by 40 K and back, read as codes; its channel is in every fourth frame."""
     n = int(RATE_HZ * READ_S)
     t_s = np.arange(n) / RATE_HZ
     code = np.round((low_c + 40.0 * (1.0 - np.abs(2.0 * t_s / READ_S - 1.0)) + ZERO_C_K) * CODES_PER_K).astype(np.int64)

@@ -230,7 +230,8 @@ static struct lab up_with_errors(void)
 static void a_seed_changes_what_is_random_from_its_instant_on(void **state)
 {
     (void)state;
-    struct lab plain = up_with_errors(), seventh = up_with_errors(), again = up_with_errors(), eighth = up_with_errors();
+    struct lab plain = up_with_errors(), seventh = up_with_errors(), again = up_with_errors(),
+               eighth = up_with_errors();
     struct platform_state before, after;
     lab_reseed(&seventh, 7, 10 * NS_PER_S);
     lab_reseed(&again, 7, 10 * NS_PER_S);
