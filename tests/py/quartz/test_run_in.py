@@ -190,6 +190,20 @@ def test_two_processes_give_the_bytes_of_one(tmp_path: Path) -> None:
     assert found[0] == found[1]
 
 
+def test_a_cluster_at_an_address_gives_the_bytes_of_one_process(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    found = []
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    ) as cluster:
+        for name, how in (("here", {"workers": 1}), ("there", {"dask": cluster.scheduler_address})):
+            o = replace(Options(units=1500, out=tmp_path / name), **how)
+            run_in_command.run_campaign(o, QUIET)
+            with Store(o.out / "store.sqlite") as store:
+                found.append(store.rows(store.origins()[0], 1500).tobytes())
+    assert found[0] == found[1]
+
+
 def test_the_report_is_the_same_each_time_and_whole(report: Report, tmp_path: Path) -> None:
     assert cli.main(["campaign", "run-in", "--out", str(tmp_path)]) == 0
     text = page_without_foot((tmp_path / "report.html").read_text(encoding="utf-8"))
