@@ -196,7 +196,7 @@ def _per_volt(m: Method, quantity: str) -> float:
 def _noise_of(m: Method, quantity: str) -> float:
     """Standard deviation of one point of the quantity by the scatter within recordings."""
     i = AXES.index(quantity.split("_")[1][0])
-    return float(m.points.scatter_v[i]) / 2.0**0.5 * _per_volt(m, quantity)
+    return float(m.points.scatter_v[i] / 2.0**0.5) * _per_volt(m, quantity)
 
 
 def _slope_of(c: Compensation, temp_c: float) -> float:
