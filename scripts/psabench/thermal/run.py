@@ -200,6 +200,7 @@ class _Session:
         return RunStart(origin_s=restarted_origin(self._wire, actions, whole), chamber_degc=degc)
 
     def measure_rest(self, progress: Progress) -> list[Recording]:
+        """All recordings; raises as `measure_schedule`, with those so far stored."""
         start = self._begun_run()
         with self._folder.open_series() as series, self._truth_store() as note_truth:
 
@@ -236,7 +237,8 @@ def _truth_row(r: Recording, state: dict[str, Any], load_ohm: Sequence[float]) -
     unit = state["unit"]
     g_mps2 = math.hypot(*unit["f_mps2"])
     a = [-float(f) / g_mps2 for f in unit["f_mps2"]]
-    out_v = [float(i) * load for i, load in zip(unit["sensor_a"], load_ohm, strict=True)]
+    sensors = zip(unit["sensor_v"], unit["sensor_a"], load_ohm, strict=True)  # one of the two outputs is 0
+    out_v = [float(v) + float(i) * load for v, i, load in sensors]
     return [r.t_s, unit["case_degc"], unit["element_degc"], *a, *out_v]
 
 
