@@ -28,13 +28,6 @@ struct chamber_cfg chamber_default(void)
 
 /* ---- the air */
 
-unsigned chamber_leg_at(const struct chamber *c, double t_s)
-{
-    unsigned i = c->legs - 1;
-    while (i > 0 && t_s < c->leg[i].from_s) i--;
-    return i;
-}
-
 double chamber_air_degc(const struct chamber *c, int64_t t_ns)
 {
     const double t_s = sched_since_s(c->from_ns, t_ns);

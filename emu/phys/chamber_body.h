@@ -5,7 +5,12 @@
 #include "phys/chamber.h"
 
 /* Number of the leg that the air is on. */
-unsigned chamber_leg_at(const struct chamber *c, double t_s);
+static inline unsigned chamber_leg_at(const struct chamber *c, double t_s)
+{
+    unsigned i = c->legs - 1;
+    while (i > 0 && t_s < c->leg[i].from_s) i--;
+    return i;
+}
 
 /* A command is about to come: the body as it is then. And has come: what it will do. */
 void chamber_body_arrive(const struct chamber *c, struct chamber_body *b, int64_t t_ns);

@@ -6,15 +6,17 @@
  *
  *   y(T) = y(30) + curve x exp((1 - x^2) / 2) + slope (T - 30),   x = (T - centre) / width,
  *
- * T with a play, which its owner has (chamber.h); the zero has a part for case - element besides. A positive curve is the article's group (a), a negative one its
- * group (b). Two causes move all three from start to start: the residual stress of the glue, of which each thermal cycle leaves
- * a part, and the position of the pendulum, sealed in for good but for a scatter that is drawn at each start.
+ * T with a play, which its owner has (chamber.h); the zero has a part for case - element besides. A positive curve is the
+ * article's group (a), a negative one its group (b). Two causes move all three from start to start: the residual stress of the
+ * glue, of which each thermal cycle leaves a part, and the position of the pendulum, sealed in for good but for a scatter that
+ * is drawn at each start.
  *
  * The loop answers as one oscillator of second order, exactly for an input held since the look before. What it holds of the past
- * is finite: it is started anew, in balance, at the first look of each period of a fixed grid, and answers in the next period;
- * what it did not know then has decayed by exp(-40). Two pasts that agree for two periods have the same answer to the bit. Deflected, the pendulum
- * feels the acceleration along y (vibropendulous error). Then the white noise, one draw for each instant (looks.h), and the
- * limits. a = projection of gravity on the sensor's axes as in mems.h, m/s^2; output in amperes. Plain struct, one thread. */
+ * is finite: it starts again, in balance, at the first look of each period of a fixed grid, and answers in the next period;
+ * what it did not know then has decayed by exp(-40). Two pasts that agree for two periods have the same answer to the bit.
+ * Deflected, the pendulum feels the acceleration along y (vibropendulous error). Then the white noise, one draw for each
+ * instant (looks.h), and the limits. a = projection of gravity on the sensor's axes as in mems.h, m/s^2; output in amperes.
+ * Plain struct, one thread. */
 #ifndef PSABENCH_PHYS_SENSOR_QUARTZ_H
 #define PSABENCH_PHYS_SENSOR_QUARTZ_H
 

@@ -105,7 +105,7 @@ def test_a_head_that_sticks_says_so(tmp_path: Path) -> None:
         b.unit.wait_ready()
         assert b.head.turn(30.0) == pytest.approx(30.0)
         with b.fault("head.stick", "head"):
-            with pytest.raises(TimeOut, match="^head: 90 deg not reached: at rest its scale shows 30 deg$"):
+            with pytest.raises(TimeOut, match=r"^head: 90 deg not reached: at rest its scale shows 30 deg$"):
                 b.head.turn(90.0)
             assert level_v(b) == pytest.approx(-0.5, abs=1e-3)
         assert b.head.turn(90.0) == pytest.approx(90.0)
@@ -136,18 +136,45 @@ def test_a_late_answer_is_not_that_to_the_next_question(tmp_path: Path, monkeypa
     """TEMP? and the look at the error queue time out; both answers come a second later."""
     monkeypatch.setattr(instruments, "REPLY_S", 0.3)
     with bench(tmp_path, CHAMBER + UNITS) as b:
-        with b.fault("scpi.late", "scpi.chamber", late_s=1):
-            with pytest.raises(TimeOut, match=r"TEMP\?: no answer within 0.3 s$"):
-                _ = b.chamber.temp_degc
+        with (
+            b.fault("scpi.late", "scpi.chamber", late_s=1),
+            pytest.raises(TimeOut, match=r"TEMP\?: no answer within 0.3 s$"),
+        ):
+            _ = b.chamber.temp_degc
         b.run_for(2.0)
         assert b.chamber.query("*IDN?").startswith("psabench,")
         assert b.chamber.temp_degc == 20.0
 
 
 def test_a_garbled_answer_is_shown_as_it_came(tmp_path: Path) -> None:
-    with bench(tmp_path, CHAMBER + UNITS) as b, b.fault("scpi.garbled", "scpi.chamber"):
-        with pytest.raises(LinkError, match=r"chamber at .*: TEMP\?: expected ASCII text, got b'.*\\x"):
-            _ = b.chamber.temp_degc
+    with (
+        bench(tmp_path, CHAMBER + UNITS) as b,
+        b.fault("scpi.garbled", "scpi.chamber"),
+        pytest.raises(LinkError, match=r"chamber at .*: TEMP\?: expected ASCII text, got b'.*\\x"),
+    ):
+        _ = b.chamber.temp_degc
+
+
+def test_a_snapshot_and_a_fork_keep_them(tmp_path: Path) -> None:
+    faults: list[tuple[str, str, dict[str, object]]] = [
+        ("head.stick", "head", {}),
+        ("head.slip", "head", {"slip_deg": 2}),
+        ("chamber.overshoot", "chamber", {"overshoot_k": 5}),
+        ("scpi.garbled", "scpi.chamber", {"probability": 0.5}),
+        ("scpi.late", "scpi.supply", {"late_s": 1}),
+    ]
+    path = tmp_path / "faulty.snapshot"
+    with bench(tmp_path, CHAMBER + "supply: {}\n" + UNITS) as b:
+        for kind, point, values in faults:
+            b.fault(kind, point, **values)
+        listed = b.control.call("fault.list").result
+        b.snapshot(path)
+        with b.fork() as fork:
+            assert fork.control.call("fault.list").result == listed
+    with Bench.restore(path) as again:
+        assert again.control.call("fault.list").result == listed
+        with pytest.raises(TimeOut, match="head: 90 deg not reached"):
+            again.head.turn(90.0)
 
 
 @pytest.mark.parametrize(

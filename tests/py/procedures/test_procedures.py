@@ -360,3 +360,25 @@ def test_registry_names_procedures_whose_options_explain_themselves() -> None:
         again = p.estimate(result.readings, p.params(), result.g_mps2)
         assert again.estimates == result.estimates
         assert set(p.expected(ARTICLE, ARTICLE)) == {e.name for e in result.estimates}
+
+
+class SlippingBench(FakeBench):
+    """Each turn leaves the mount slip_deg short of the scale, one after another."""
+
+    slip_deg = 0.02
+
+    def turn(self, angle_deg: float) -> float:
+        self.slipped_deg = getattr(self, "slipped_deg", 0.0) + self.slip_deg
+        super().turn(angle_deg - self.slipped_deg)
+        return angle_deg
+
+
+@pytest.mark.parametrize(
+    ("run", "params"), [(fourier, FourierParams()), (reversal, ReversalParams())], ids=["fourier", "reversal"]
+)
+def test_a_head_that_slips_makes_the_intervals_doubtful(
+    run: Callable[[HeadBench, object], ProcedureResult], params: object
+) -> None:
+    """More positions than unknowns: the scale and the codes belong to different angles. `turns` has no such redundancy."""
+    assert run(FakeBench(noise_v=1e-6, rng=seeded("slip")), params).doubts == ()
+    assert run(SlippingBench(noise_v=1e-6, rng=seeded("slip")), params).doubts

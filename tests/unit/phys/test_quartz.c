@@ -175,7 +175,7 @@ static void a_slow_loop_says_so(void **state)
     }
 }
 
-/* Started anew each 30 ms or never (a loop of damping 0 but for the last bit has no grid): the same answer but for rounding. */
+/* Started again each 30 ms or never (a loop of damping 0 but for the last bit has no grid): the same answer but for rounding. */
 static void the_grid_changes_nothing_that_can_be_seen(void **state)
 {
     (void)state;
