@@ -379,6 +379,6 @@ class SlippingBench(FakeBench):
 def test_a_head_that_slips_makes_the_intervals_doubtful(
     run: Callable[[HeadBench, object], ProcedureResult], params: object
 ) -> None:
-    """More positions than unknowns: the scale and the codes belong to different angles. `turns` has no such redundancy."""
+    """More positions than unknowns: scale and codes belong to different angles. `turns` has no such redundancy."""
     assert run(FakeBench(noise_v=1e-6, rng=seeded("slip")), params).doubts == ()
     assert run(SlippingBench(noise_v=1e-6, rng=seeded("slip")), params).doubts
