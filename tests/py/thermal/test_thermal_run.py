@@ -102,7 +102,7 @@ def test_one_leg_is_good_both_need_the_lag(whole: ThermalResult) -> None:
         assert r.both_legs is not None
         assert r.one_leg <= 0.7  # the article
         assert r.best <= 0.7
-        assert 8.0 < r.other_leg < 16.0  # the fact sheet: 11.7 in the median of units with a play
+        assert 8.0 < r.other_leg < 16.0  # sources instruments 3.3: 11.7 in the median of units with a play
         assert 4.0 < r.both_legs < 8.0
 
 
