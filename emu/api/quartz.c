@@ -23,6 +23,7 @@ static const double positions[PSABENCH_QUARTZ_POSITIONS][3] = {{1, 0, 0}, {-1, 0
 struct oven {
     struct chamber chamber;
     struct chamber_body body;
+    struct chamber_play play;
     struct quartz q;
     double g_mps2;
     int64_t t_ns;
@@ -33,6 +34,7 @@ static void warm_sensor(struct oven *o)
 {
     o->q.case_degc = chamber_case_degc(&o->chamber, &o->body, o->t_ns);
     o->q.element_degc = chamber_element_degc(&o->chamber, &o->body, o->t_ns);
+    o->q.felt_degc = chamber_felt_degc(&o->chamber, &o->body, &o->play, o->t_ns);
     o->q.cycles = chamber_body_cycles(&o->chamber, &o->body, o->t_ns);
 }
 
@@ -47,14 +49,12 @@ static void look_row(struct oven *o, const double g[3], int64_t dt_ns, unsigned 
     o->t_ns += dt_ns;
 }
 
-/* To a temperature, and a while there. On a course in one direction the play needs a look at its end only. */
+/* To a temperature, and a while there. */
 static bool go_to(struct oven *o, double degc, double soak_min)
 {
-    double ignored_a;
     if (chamber_set(&o->chamber, degc, o->t_ns) != CHAMBER_OK) return false;
     o->t_ns = chamber_stable_ns(&o->chamber) + (int64_t)(soak_min * 60.0 * (double)NS_PER_S);
     warm_sensor(o);
-    look_row(o, positions[0], SETTLE_NS, 1, &ignored_a);
     return true;
 }
 
@@ -99,6 +99,7 @@ static bool put_in(struct oven *o, const struct psabench_quartz_job *job, const 
     *o = (struct oven){.g_mps2 = job->g_mps2};
     chamber_init(&o->chamber, &c);
     chamber_put_in(&o->chamber, &o->body, 0.0, 0.0);
+    chamber_play_add(&o->body, &o->play, g.play_k);
     quartz_init(&o->q, &g, job->g_mps2, draws_of(job->seed, serial, "quartz.x"),
                 draws_of(job->seed, serial, "quartz.start.x"));
     warm_sensor(o);

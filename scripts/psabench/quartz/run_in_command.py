@@ -182,12 +182,11 @@ def _gather_report(o: Options, what: RunIn, store: Store, progress: Progress) ->
 
 
 def _compare_wire(o: Options, what: RunIn, store: Store, progress: Progress) -> Sequence[Agreement]:
-    """The first units again through the wire, and on the model with the same course."""
+    """The first units again through the wire, beside the model."""
     from psabench.quartz import run_in, run_in_wire
 
-    same = run_in_wire.without_play(what)
-    model = _measure_units(o, same, run_in.MODEL, o.wire, store, progress)
-    return run_in_wire.compare_changes(_measure_units(o, same, run_in_wire.WIRE, o.wire, store, progress), model)
+    model = _measure_units(o, what, run_in.MODEL, o.wire, store, progress)
+    return run_in_wire.compare_changes(_measure_units(o, what, run_in_wire.WIRE, o.wire, store, progress), model)
 
 
 # ---- options

@@ -225,7 +225,7 @@ def _stop_words(r: Report) -> str:
 def _wire_section(r: Report) -> str:
     if not r.agreements:
         return ""
-    words = "The same serial numbers on the bench: chamber, head and supply over SCPI, PSA-2 over CAN. Without play."
+    words = "The same serial numbers on the bench: chamber, head and supply over SCPI, PSA-2 over CAN."
     return section(f"{r.wire_units} units through the wire", f"<p>{words}</p>", html_table(wire_table(r)))
 
 

@@ -10,15 +10,14 @@ offset, noise and reference, the head's setting error. What a change from start 
 Offset and scale of the converter are constant from start to start: 128 starts of units without scatter show no more
 than the noise (0.18 ug, 0.18 ppm; E3).
 
-The unit is off during a cycle. The emulator moves the play only of a unit that is on, so a comparison is made without
-play.
+The unit is off during a cycle.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,11 +40,6 @@ SAMPLE_HZ = 1000.0
 SETTLE_S, OFF_S = 1.0, 1.0
 HEAD_ARCSEC = 2.0  # setting error of the scenario's head, rms
 BATCHES = 20  # of a reading, for its type A uncertainty
-
-
-def without_play(what: RunIn) -> RunIn:
-    """The same batch for a comparison."""
-    return replace(what, schedule=replace(what.schedule, play_k=0.0))
 
 
 def make_scenario(what: RunIn, serial: int) -> dict[str, Any]:

@@ -259,10 +259,10 @@ def test_the_help_names_every_setting_with_its_default() -> None:
 
 
 def test_the_scenario_of_a_unit_is_the_shipped_one_with_its_number_and_course() -> None:
-    what = run_in_wire.without_play(RunIn(schedule=Schedule(ramp_k_per_min=2.0), batch=BATCH, seed=1))
+    what = RunIn(schedule=Schedule(ramp_k_per_min=2.0), batch=BATCH, seed=1)
     found = run_in_wire.make_scenario(what, 7)
     unit = found["units"][0]
-    assert (unit["serial"], unit["axes"]["x"]["quartz"]["play_k"]) == (7, 0.0)
+    assert (unit["serial"], unit["axes"]["x"]["quartz"]["play_k"]) == (7, 0.3)
     assert found["chamber"] == {"start_degc": 30.0, "ramp_k_per_min": 2.0}
     assert found["spread"] == {"quartz": BATCH}
     assert unit["axes"]["x"]["afe"]["load_ohm"] == 937.5
@@ -282,7 +282,7 @@ def test_changes_that_differ_by_more_than_their_uncertainty_are_out_of_limits() 
 
 def test_a_unit_through_the_wire_changes_as_the_model_does(tmp_path: Path) -> None:
     """One unit, two starts with a cycle between: PSA-2 over CAN; chamber, head and supply over SCPI."""
-    what = run_in_wire.without_play(RunIn(schedule=Schedule(cycles=1), batch=BATCH, seed=3))
+    what = RunIn(schedule=Schedule(cycles=1), batch=BATCH, seed=3)
     found = {}
     for chain in (run_in.MODEL, run_in_wire.WIRE):
         with Store(tmp_path / "store") as store:
