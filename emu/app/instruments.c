@@ -11,18 +11,22 @@
 
 /* An answer that comes later. */
 struct late {
-    struct sched_ev ev; /* first */
-    struct session *session;
     struct late *next;
+    int64_t due_ns;
     size_t n;
-    char text[SCPI_OUT_MAX];
+    char text[];
 };
+
+/* Of one session, with what belongs to it: more than that is lost, as in an interface that is full. */
+#define LATE_BYTES_MAX ((size_t)1 << 20)
 
 struct session {
     struct scpi scpi; /* first */
     struct instruments *all;
     struct scpi_peer *peer;
-    struct late *late; /* in order */
+    struct late *late, *latest; /* in order: the first and the last */
+    size_t late_bytes;
+    struct sched_ev due; /* of the first */
 };
 
 static struct fault_scpi faults_of(const struct session *s)
@@ -30,39 +34,48 @@ static struct fault_scpi faults_of(const struct session *s)
     return fault_scpi_of(s->all->control->bench->faults, s->scpi.kind->name);
 }
 
+static struct late *take_late(struct session *s)
+{
+    struct late *l = s->late;
+    s->late = l->next;
+    s->late_bytes -= sizeof *l + l->n;
+    return l;
+}
+
 static void on_late(void *ctx, int64_t t_ns)
 {
-    struct late *l = ctx;
-    (void)t_ns;
-    l->session->late = l->next;
-    scpi_port_reply(l->session->peer, l->text, l->n);
-    free(l);
+    struct session *s = ctx;
+    while (s->late && s->late->due_ns <= t_ns) {
+        struct late *l = take_late(s);
+        if (!faults_of(s).silent) scpi_port_reply(s->peer, l->text, l->n);
+        free(l);
+    }
+    if (s->late) sched_at(s->all->sched, &s->due, s->late->due_ns);
 }
 
 /* After those that are late already. */
-static bool put_off(struct session *s, const char *text, size_t n, int64_t late_ns)
+static void put_off(struct session *s, const char *text, size_t n, int64_t late_ns)
 {
-    struct late *l = calloc(1, sizeof *l), **at = &s->late;
-    int64_t due_ns = s->all->sched->now_ns + late_ns;
-    if (!l) return false;
-    for (; *at; at = &(*at)->next) due_ns = ns_later(due_ns, (*at)->ev.due_ns);
-    *at = l;
-    l->session = s;
-    l->n = n;
+    const size_t bytes = sizeof(struct late) + n;
+    struct late *l = s->late_bytes + bytes <= LATE_BYTES_MAX ? malloc(bytes) : NULL;
+    if (!l) return;
+    *l = (struct late){.due_ns = s->all->sched->now_ns + late_ns, .n = n};
     memcpy(l->text, text, n);
-    sched_ev_inner(&l->ev, on_late, l);
-    sched_at(s->all->sched, &l->ev, due_ns);
-    return true;
+    if (s->late) {
+        l->due_ns = ns_later(l->due_ns, s->latest->due_ns);
+        s->latest->next = l;
+    } else {
+        s->late = l;
+        sched_at(s->all->sched, &s->due, l->due_ns);
+    }
+    s->latest = l;
+    s->late_bytes += bytes;
 }
 
 static void drop_late(struct session *s)
 {
-    while (s->late) {
-        struct late *l = s->late;
-        s->late = l->next;
-        sched_cancel(s->all->sched, &l->ev);
-        free(l);
-    }
+    sched_cancel(s->all->sched, &s->due);
+    while (s->late) free(take_late(s));
 }
 
 static void on_reply(void *ctx, const char *text, size_t n)
@@ -73,8 +86,8 @@ static void on_reply(void *ctx, const char *text, size_t n)
     if (f.silent) return;
     memcpy(sent, text, n);
     fault_scpi_garble(&f, sent, n);
-    if ((f.late_ns > 0 || s->late) && put_off(s, sent, n, f.late_ns)) return;
-    scpi_port_reply(s->peer, sent, n);
+    if (f.late_ns > 0 || s->late) put_off(s, sent, n, f.late_ns);
+    else scpi_port_reply(s->peer, sent, n);
 }
 
 static void *on_opened(void *ctx, struct scpi_peer *peer)
@@ -89,6 +102,7 @@ static void *on_opened(void *ctx, struct scpi_peer *peer)
     s->scpi.sched = i->all->sched;
     s->scpi.reply = on_reply;
     s->scpi.ctx = s;
+    sched_ev_inner(&s->due, on_late, s);
     scpi_open(&s->scpi);
     s->scpi.next = i->all->sessions;
     i->all->sessions = &s->scpi;

@@ -25,6 +25,14 @@ static bool reaches_brownout(const struct control_bench *b, const struct fault *
     return false;
 }
 
+static bool turns_units(const struct control_bench *b, const struct fault *f, char *why)
+{
+    for (unsigned i = 0; i < b->units; i++)
+        if (b->unit[i]->cfg.mounting.on == LAB_HEAD) return true;
+    snprintf(why, CONTROL_WHY_MAX, "%s: expected a unit on the head, got none", f->name);
+    return false;
+}
+
 static bool dip_supply(struct fault *f, int64_t t_ns)
 {
     const struct control_bench *b = f->engine->bench;
@@ -164,7 +172,8 @@ static const struct fault_kind lab[] = {
     {"head.stick", "The dividing head sticks: it stops at once, and turns move nothing.", "the scale shows another angle than was set; the codes stay",
      .places = FAULT_BIT(FAULT_AT_HEAD), .lift = refresh_stick},
     {"head.slip", "The mount slips on its axis: each turn leaves it slip_deg short of the scale, one after another. The first turn after the fault makes it good.", "the scale shows what was set, the codes belong to another angle",
-     .places = FAULT_BIT(FAULT_AT_HEAD), .need = FAULT_BIT(FAULT_SLIP_DEG), .nonzero = FAULT_BIT(FAULT_SLIP_DEG), .lift = refresh_slip},
+     .places = FAULT_BIT(FAULT_AT_HEAD), .need = FAULT_BIT(FAULT_SLIP_DEG), .nonzero = FAULT_BIT(FAULT_SLIP_DEG),
+     .unless = "no unit is on the head", .fits = turns_units, .lift = refresh_slip},
     {"table.ripple", "The servo of the axis ripples: a sine of amplitude ripple_dps in its rate.", "a spectral line at frequency_hz in the readout of the rate, and in the codes of a unit on the table",
      .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ), .apply = ripple_axis, .lift = lift_ripple},
 };

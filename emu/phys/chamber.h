@@ -7,10 +7,11 @@
  *
  * both in closed form over the straight pieces of the air's course: temperatures are functions of time, independent of
  * how often they are read. So is how many thermal cycles a body has had: an element that has been cold and then is hot, powered
- * or not; on its way up, the part of a cycle. The few kelvin that an element overshoots after a command count for nothing.
- * And so is what follows an element with play: a fold over the element's extremes, which a command finds beforehand.
- * A command updates every body in the chamber. Plain structs, one thread; commands in order of
- * time; an instant before the latest command gets what held at the command. */
+ * or not; on its way up, the part of a cycle. And so is what follows an element with play. Both are folds over the element's
+ * extremes, which a command finds beforehand.
+ *
+ * A command updates every body in the chamber. Plain structs, one thread; commands in order of time; an instant before the
+ * latest command gets what held at the command. */
 #ifndef PSABENCH_PHYS_CHAMBER_H
 #define PSABENCH_PHYS_CHAMBER_H
 

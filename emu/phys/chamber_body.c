@@ -94,10 +94,19 @@ static void count_cycles(struct chamber_cycles *n, double element_degc)
     *n = (struct chamber_cycles){.whole = n->whole + 1};
 }
 
+/* Between two turns the element goes one way: then the ends decide. What it has passed since stays counted. */
+static struct chamber_cycles cycles_at(const struct chamber *c, const struct chamber_body *b, int64_t t_ns)
+{
+    const double t_s = sched_since_s(c->from_ns, t_ns);
+    struct chamber_cycles n = b->cycles;
+    for (unsigned i = 0; i < b->turns && b->turn_s[i] <= t_s; i++) count_cycles(&n, b->turn_degc[i]);
+    count_cycles(&n, chamber_element_degc(c, b, t_ns));
+    return n;
+}
+
 double chamber_body_cycles(const struct chamber *c, const struct chamber_body *b, int64_t t_ns)
 {
-    struct chamber_cycles n = b->cycles;
-    count_cycles(&n, chamber_element_degc(c, b, t_ns));
+    const struct chamber_cycles n = cycles_at(c, b, t_ns);
     return n.whole + n.part;
 }
 
@@ -186,10 +195,10 @@ void chamber_play_add(struct chamber_body *b, struct chamber_play *p, double hal
 void chamber_body_arrive(const struct chamber *c, struct chamber_body *b, int64_t t_ns)
 {
     for (struct chamber_play *p = b->plays; p; p = p->next) p->felt_degc = chamber_felt_degc(c, b, p, t_ns);
+    b->cycles = cycles_at(c, b, t_ns);
     const double case_degc = chamber_case_degc(c, b, t_ns);
     b->element_degc[0] = chamber_element_degc(c, b, t_ns);
     b->case_degc[0] = case_degc;
-    count_cycles(&b->cycles, b->element_degc[0]);
 }
 
 void chamber_body_plan(const struct chamber *c, struct chamber_body *b)
@@ -201,7 +210,7 @@ void chamber_body_plan(const struct chamber *c, struct chamber_body *b)
         b->element_degc[i + 1] = element_after(b, &p, for_s);
     }
     b->turns = 0;
-    for (unsigned i = 0; b->plays && i < c->legs; i++) find_turns(c, b, i);
+    for (unsigned i = 0; i < c->legs; i++) find_turns(c, b, i);
 }
 
 void chamber_put_in(struct chamber *c, struct chamber_body *b, double tau_case_s, double tau_element_s)

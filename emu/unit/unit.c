@@ -362,9 +362,11 @@ void unit_sample_until(struct unit *u, int64_t t_ns)
     u->type->sample_until(u->board, t_ns);
 }
 
-void unit_reseed(struct unit *u, uint64_t seed)
+/* Slow noise goes on where no one looks, in a unit without power, too: up to t_ns it is that of the old seed. */
+void unit_reseed(struct unit *u, uint64_t seed, int64_t t_ns)
 {
     for (unsigned i = 0; i < UNIT_AXES; i++) {
+        (void)noise_slow_u(&u->mems[i].slow, t_ns);
         draws_reseed(&u->mems[i].noise, seed);
         draws_reseed(&u->mems[i].slow.draws, seed);
         quartz_reseed(&u->quartz[i], seed);

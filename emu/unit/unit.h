@@ -82,7 +82,8 @@ void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bu
 void unit_power_up(struct unit *u, int64_t t_ns); /* board, then its node */
 void unit_power_down(struct unit *u, int64_t t_ns);
 void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics change abruptly */
-void unit_reseed(struct unit *u, uint64_t seed);      /* noise and later starts alone; unit_sample_until() before it */
+void unit_reseed(struct unit *u, uint64_t seed,
+                 int64_t t_ns); /* noise from t_ns on and later starts alone; unit_sample_until() before it */
 /* Why it computes what no one looks at from t_ns on; NULL: it does not. */
 const char *unit_why_eager(struct unit *u, int64_t t_ns);
 struct trace *unit_trace(const struct unit *u);

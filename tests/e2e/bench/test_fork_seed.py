@@ -84,6 +84,24 @@ def test_a_seed_that_is_no_number_is_refused_and_there_is_no_child(tmp_path: Pat
         assert not (tmp_path / "c").exists()
 
 
+def test_slow_noise_keeps_the_value_that_it_has_reached(tmp_path: Path) -> None:
+    """Of a unit that is off, too: no one has looked at it for minutes."""
+    path = tmp_path / "slow.yaml"
+    sensor = "{sensor: mems, u0_v: 2.5, bias_instability_v: 1.0e-3, walk_v_rts: 1.0e-4}"
+    path.write_text(f"supply: {{volt_v: 12}}\nunits: [{{name: a, axes: {{x: {sensor}}}}}]\n", encoding="utf-8")
+    with Bench.start(path) as bench:
+        bench.run_for(1.0)
+        bench.control.call("supply.output", on=False)
+        bench.run_for(100.0)
+        with bench.fork(seed=5) as child:
+            now = child.truth_state()
+            child.run_for(10.0)
+            later = child.truth_state()
+        assert now == bench.truth_state()
+        bench.run_for(10.0)
+        assert later["unit"]["zero_moved_v"] != bench.truth_state()["unit"]["zero_moved_v"]
+
+
 def reading_figures(bench: Bench) -> tuple[float, float]:
     """Mean and scatter of X, V, once the filters have forgotten what was before."""
     bench.run_for(FILTERS_S)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import numpy as np
 import pytest
 from psabench import Bench, instruments
 from psabench.errors import BenchError, LinkError, TimeOut
-from rig import HOST
+from rig import HOST, TIMEOUT_S
 
 pytestmark = HOST
 
@@ -144,6 +145,23 @@ def test_a_late_answer_is_not_that_to_the_next_question(tmp_path: Path, monkeypa
         b.run_for(2.0)
         assert b.chamber.query("*IDN?").startswith("psabench,")
         assert b.chamber.temp_degc == 20.0
+
+
+def test_what_was_late_is_lost_when_the_link_falls_silent(tmp_path: Path) -> None:
+    with bench(tmp_path, CHAMBER + UNITS) as b:
+        _, host, port = b.head.address.split("::")[:3]
+        with (
+            b.fault("scpi.late", "scpi.head", late_s=2),
+            socket.create_connection((host, int(port)), TIMEOUT_S) as client,
+        ):
+            client.sendall(b"ANGL?\n")
+            b.run_for(0.5)  # inputs are read before time moves
+            with b.fault("scpi.silent", "scpi.head"):
+                b.run_for(3.0)
+            b.run_for(1.0)
+            client.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                client.recv(100)
 
 
 def test_a_garbled_answer_is_shown_as_it_came(tmp_path: Path) -> None:

@@ -28,7 +28,8 @@ static void run_job(const struct psabench_quartz_job *job, double truth[STARTS][
 {
     double mean_a[STARTS * PSABENCH_QUARTZ_POSITIONS], sd_a[STARTS * PSABENCH_QUARTZ_POSITIONS];
     assert_int_equal(psabench_quartz_run_in(job, NULL, 0, mean_a, sd_a, truth[0]), PSABENCH_OK);
-    for (unsigned i = 0; i < STARTS * PSABENCH_QUARTZ_POSITIONS; i++) assert_true(isfinite(mean_a[i]) && sd_a[i] >= 0.0);
+    for (unsigned i = 0; i < STARTS * PSABENCH_QUARTZ_POSITIONS; i++)
+        assert_true(isfinite(mean_a[i]) && sd_a[i] >= 0.0);
 }
 
 /* The first start is at the temperature where everything began; after a cycle the element has come from above, and feels up to

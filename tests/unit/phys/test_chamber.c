@@ -239,6 +239,31 @@ static void a_faulty_controller_overshoots(void **state)
     assert_int_equal(chamber_stable_ns(&c), ns(2e6 + 80 + 24));
 }
 
+/* Up to the heat of a cycle and back by an overshoot: the cycle stays counted; cold the same, before the next command. */
+static void a_cycle_that_was_counted_stays(void **state)
+{
+    (void)state;
+    struct chamber c;
+    struct chamber_body b;
+    struct chamber_cfg cfg = chamber_default();
+    cfg.present = true;
+    chamber_init(&c, &cfg);
+    chamber_put_in(&c, &b, 18.0, 36.0);
+    const int64_t hour_ns = 3600 * NS_PER_S;
+    assert_int_equal(chamber_set(&c, -48.0, 0), CHAMBER_OK);
+    chamber_overshoot(&c, 10.0, 0);
+    assert_int_equal(chamber_set(&c, -40.0, hour_ns), CHAMBER_OK);
+    assert_int_equal(chamber_set(&c, -48.0, 2 * hour_ns), CHAMBER_OK); /* by way of -58 */
+    assert_int_equal(chamber_set(&c, 70.0, 6 * hour_ns), CHAMBER_OK);  /* by way of 80 */
+    double was = 0.0;
+    for (int64_t t_ns = 6 * hour_ns; t_ns < 12 * hour_ns; t_ns += 60 * NS_PER_S) {
+        const double now = chamber_body_cycles(&c, &b, t_ns);
+        assert_true(now >= was);
+        was = now;
+    }
+    assert_true(was == 1.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -253,6 +278,7 @@ int main(void)
         cmocka_unit_test(air_alone_makes_no_cycle),
         cmocka_unit_test(play_follows_the_extremes),
         cmocka_unit_test(a_faulty_controller_overshoots),
+        cmocka_unit_test(a_cycle_that_was_counted_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
