@@ -97,10 +97,17 @@ def _decode_can(args: argparse.Namespace, out: Any) -> int:
     compensator = _open_compensator(args) if args.passport else None
     c = decode_can(args.file, node_of(args), out, args.board, compensator.columns if compensator else None).counters
     print(f"frames {c.frames}, lost {c.lost}, torn {c.torn}", file=sys.stderr)
-    if compensator and compensator.clamped:
+    return _report_compensation(compensator, c.frames) if compensator else 0
+
+
+def _report_compensation(compensator: Compensator, frames: int) -> int:
+    """What has to be known of the accelerations; the exit status."""
+    if compensator.clamped:
         what = "frames at temperatures outside of the compensation; taken at the end of its range"
         print(f"{compensator.clamped} {what}", file=sys.stderr)
-    return 0
+    if compensator.blind:
+        print(f"{compensator.blind} frames without acceleration: no temperature of the case", file=sys.stderr)
+    return 1 if compensator.blind >= frames else 0
 
 
 def _open_compensator(args: argparse.Namespace) -> Compensator:

@@ -61,7 +61,7 @@ SETTINGS: dict[str, tuple[float, str, float, float, str]] = {
     "rest_min": (120.0, "min", 0.0, 1000.0, "before a start (E0)"),
     "reading_s": (1.0, "s", 0.01, 1000.0, "reading of a position (E0)"),
     "play_k": (0.3, "K", 0.0, 100.0, "half the width of the hysteresis in temperature (E0)"),
-    "noise_a_rthz": (4.0e-10, "A/√Hz", 0.0, 1e-6, "white noise of the sensor, as in scenario quartz_chamber (E0)"),
+    "noise_a_rthz": (4.0e-10, "A/√Hz", 1e-12, 1e-6, "white noise of the sensor, as in scenario quartz_chamber (E0)"),
 }
 
 

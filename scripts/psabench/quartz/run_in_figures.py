@@ -189,6 +189,7 @@ def _grade_checks(grades: Sequence[Grade]) -> Iterator[Check]:
 
 
 WIRE_2U = (0.90, 1.0)  # share of changes within 2 u of the model's: 95 % expected, a hundred and more of them
+WIRE_RMS = (0.5, 1.5)  # over u, of each quantity: 1 expected, four standard deviations of 50 changes that share starts
 WIRE_ENOUGH = 100
 
 
@@ -199,4 +200,7 @@ def wire_checks(found: Sequence[Agreement]) -> list[Check]:
         return []
     share = sum(a.within_2u * a.count for a in found) / count
     low, high = WIRE_2U
-    return [Check(what="share of changes through the wire within 2 u of the model's", value=share, low=low, high=high)]
+    what = "share of changes through the wire within 2 u of the model's"
+    rms = "changes through the wire less the model's, rms over u"
+    each = [Check(what=f"{a.quantity}: {rms}", value=a.z_rms, low=WIRE_RMS[0], high=WIRE_RMS[1]) for a in found]
+    return [Check(what=what, value=share, low=low, high=high), *each]

@@ -78,6 +78,8 @@ def read_truth(folder: RunFolder, recordings: Sequence[Recording]) -> ThermalTru
     true: list[Recording] = []
     element: dict[int, list[float]] = {}
     for r, row in zip(recordings, rows, strict=False):
+        if row["t_s"] != r.t_s:
+            raise BadInput(expected(f"the truth at {r.t_s:g} s", f"{row['t_s']:g} s", folder.truth))
         if r.segment == "soak":
             true.append(_true_recording(r, row))
             element.setdefault(r.part, []).append(row["element_degc"])

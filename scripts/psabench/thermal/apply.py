@@ -18,7 +18,7 @@ import numpy as np
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import BadInput, expected
 from psabench.passport.store import UnitRun
-from psabench.thermal.bench import CASE_CHANNEL
+from psabench.thermal.bench import CASE_CHANNEL, SENSOR_HIGH_C, SENSOR_LOW_C
 from psabench.thermal.compensation import Array, Compensation, element_temperature
 from psabench.thermal.reduce import ARCSEC, AXES, quantity_names
 
@@ -40,7 +40,8 @@ class _Followed:
 
 
 class Compensator:
-    """Takes the readings of one log, some at a time; clamped: how many were outside of a curve's range.
+    """Takes the readings of one log, some at a time. clamped: how many were outside of a curve's range; blind: how many
+    came before a temperature of the case that its sensor can have.
 
     filter_gain: of the converters at DC, which a thermal run takes out of its readings, too (`Psa2.filter_gain`).
     """
@@ -52,7 +53,7 @@ class Compensator:
         self._curves, self._gain = curves, filter_gain
         self._taus = {c.lag.tau_s for c in curves.values() if c.lag}
         self._past: _Followed | None = None
-        self.clamped = 0
+        self.clamped = self.blind = 0
 
     def accelerations_g(self, frames: Frames) -> Array:
         """Along the axes of the case, g, (n, 3); NaN up to the first temperature of the case.
@@ -62,6 +63,7 @@ class Compensator:
         t_s = frames.t_rx_s  # the board's stamps begin again after a pause
         case = self._case_of(t_s, frames)
         if case is None:
+            self.blind += len(frames)
             return np.full((len(frames), 3), np.nan)
         return self._solve(frames.u_v / self._gain, self._values_at(t_s, case))
 
@@ -71,9 +73,12 @@ class Compensator:
 
     def _case_of(self, t_s: Array, frames: Frames) -> Case | None:
         """From what is known of before; None: nothing yet."""
-        if len(frames) and not np.any(frames.temp_code):
-            raise BadInput(expected("frames with temperatures (form 1 carries them)", "none", "--passport"))
-        told = (frames.temp_channel == CASE_CHANNEL) & np.isfinite(frames.temp_degc)
+        if len(frames) and self._past is None and not np.any(frames.temp_code):
+            raise BadInput(
+                expected("frames with temperatures, as each form but 1 (fast) has them", "none", "--passport")
+            )
+        degc = frames.temp_degc  # NaN, or near 0 K, where the sensor is open
+        told = (frames.temp_channel == CASE_CHANNEL) & (degc >= SENSOR_LOW_C) & (degc <= SENSOR_HIGH_C)
         known_t, known_c = t_s[told], frames.temp_degc[told]
         if self._past is not None:
             known_t, known_c = np.append(self._past.t_s, known_t), np.append(self._past.case_c, known_c)

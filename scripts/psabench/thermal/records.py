@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -85,6 +86,8 @@ def _recording_of(row: Sequence[str], where: str) -> Recording:
             name: text if name in TEXTS else int(text) if name in WHOLE else float(text)
             for name, text in zip(COLUMNS, row, strict=True)
         }
+        if not all(math.isfinite(v) for v in values.values() if isinstance(v, float)):
+            raise ValueError(expected("finite numbers", "others"))
         if values["position"] not in POSITIONS:
             raise ValueError(expected(", ".join(POSITIONS), values["position"]))
     except ValueError as e:

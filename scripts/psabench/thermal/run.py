@@ -97,9 +97,19 @@ def _accuracy_of(given: dict[str, Any], *, exact: bool) -> BenchAccuracy:
 def _refuse_unfinished(folder: RunFolder) -> None:
     """Hours of recordings are not overwritten. Raises BadInput."""
     rows = max(len(whole_lines(folder.data)) - 1, 0)
-    if rows and not (folder.path / "result.json").exists():
+    if rows and not _is_complete(folder):
         what = f"another folder, or --resume {folder.path} to continue its run"
         raise BadInput(expected(what, f"one with {rows} recordings of a run that is not complete", "--out"))
+
+
+def _is_complete(folder: RunFolder) -> bool:
+    """Whether every recording of its schedule is there; a result.json may be of another procedure."""
+    try:
+        setup = folder.read_setup()
+        schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
+        return _whole_recordings(setup, folder, schedule) is not None
+    except BadInput:
+        return False
 
 
 def _is_there(options: ThermalOptions) -> bool:
@@ -181,8 +191,11 @@ class _Session:
         if self._resumed and not self._setup["ours"]:
             return self._go_on_there()
         start = RunStart(origin_s=float(int(self._wire.t_s) + 1), chamber_degc=self._wire.chamber_degc())
-        self._setup |= {"origin_s": start.origin_s, "start_degc": start.chamber_degc}
-        self._setup["scenarios"] = provenance.noted_scenarios()
+        scenarios = provenance.noted_scenarios()
+        if self._resumed and self._setup.get("scenarios", scenarios) != scenarios:
+            what = "the scenario and the seed that the run began with"
+            raise BadInput(expected(what, "others", f"{self._folder.path}: {self._setup['scenario'] or SCENARIO}"))
+        self._setup |= {"origin_s": start.origin_s, "start_degc": start.chamber_degc, "scenarios": scenarios}
         self._folder.store_setup(self._setup)
         return start
 

@@ -362,6 +362,6 @@ def _convert_value(name: str, value: Any, declared: str) -> Any:
 def _number_of(name: str, value: Any, convert: Callable[[Any], Any]) -> Any:
     if convert is not str and (isinstance(value, bool) or not isinstance(value, int | float)):
         raise ValueError(expected("a number", value, name))
-    if convert is int and value != int(value):
+    if convert is int and not (math.isfinite(value) and value == int(value)):
         raise ValueError(expected("a whole number", value, name))
     return convert(value)

@@ -121,3 +121,20 @@ def test_frames_without_temperatures_and_half_a_passport_are_refused() -> None:
     del curves["base_xz_arcsec"]
     with pytest.raises(BadInput, match="base_xz_arcsec"):
         Compensator(curves)
+
+
+@pytest.mark.parametrize("code", [3, 32767])
+def test_a_sensor_that_is_open_is_no_temperature(code: int) -> None:
+    """From half of the log on; the last temperature before holds, and from the beginning there is none."""
+    curves = drawn_curves()
+    f = frames_of(curves, FELT_G)
+    late, whole = f.temp_code.copy(), np.full(len(f), code)
+    late[len(f) // 2 :] = code
+    fields = {n: getattr(f, n) for n in f.__slots__}
+    compensator = Compensator(curves)
+    held = compensator.accelerations_g(Frames(**fields | {"temp_code": late}))
+    assert np.abs(held[: len(f) // 2] - FELT_G).max() < 1e-6
+    assert compensator.blind == 0
+    blind = Compensator(curves)
+    assert np.all(np.isnan(blind.accelerations_g(Frames(**fields | {"temp_code": whole}))))
+    assert blind.blind == len(f)
