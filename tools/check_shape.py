@@ -162,8 +162,8 @@ RULES = {
     "one-word-functions-python": Rule(one_word_functions, 922, 922),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 60_615, 60_615),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 54_244, 54_244),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 60_651, 60_651),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 54_278, 54_278),
     "tracked-files": Rule(lambda root: len(tracked(root)), 1_838, 1_838),
 }
 
