@@ -32,7 +32,7 @@ static enum control_outcome do_reseed(const struct control_call *call)
     control_settle_inputs(b, call->t_ns);
     lab_reseed(b->lab, seed, call->t_ns);
     for (unsigned i = 0; i < b->units; i++) unit_reseed(b->unit[i], seed, call->t_ns);
-    if (b->faults) fault_reseed(b->faults, seed);
+    if (b->faults) fault_reseed(b->faults, seed, call->t_ns);
     return CONTROL_DONE;
 }
 
@@ -45,8 +45,8 @@ static const struct control_command rows[] = {
       {"can", CONTROL_TEXT, true, .what = "child's CAN adapters as for --can, separated by spaces; default: none"},
       {"truth", CONTROL_TEXT, true, .what = "path of the child's truth port; default: none"},
       {"seed", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "the child begins with reseed and this seed; default: it has the parent's noise"}), .run = do_fork},
-    {"reseed", "Takes noise from another seed from now on; units, instruments, their present state and faults that are active stay as they are.",
-     CONTROL_ARGS({"seed", CONTROL_COUNT, false, NULL, 0, CONTROL_COUNT_MAX, .what = "seed of the noise, of random errors of instruments, of faults that begin later"}),
+    {"reseed", "Takes noise from another seed from now on; units, instruments, their present state and the list of active faults stay as they are.",
+     CONTROL_ARGS({"seed", CONTROL_COUNT, false, NULL, 0, CONTROL_COUNT_MAX, .what = "seed of the noise, of random errors of instruments, of what is random in faults"}),
      .run = do_reseed, .changes = true},
 };
 // clang-format on

@@ -40,10 +40,13 @@ void fault_init(struct fault_engine *e, const struct control_bench *bench, struc
     e->seed = bench->seed;
 }
 
-void fault_reseed(struct fault_engine *e, uint64_t seed)
+void fault_reseed(struct fault_engine *e, uint64_t seed, int64_t t_ns)
 {
     e->seed = seed;
-    for (unsigned i = 0; i < FAULTS_MAX; i++) rng_reseed(&e->fault[i].random, seed);
+    for (struct fault *f = e->fault; f < e->fault + FAULTS_MAX; f++) {
+        rng_reseed(&f->random, seed);
+        if (f->id != 0 && f->state == FAULT_ACTIVE && f->kind->reseed) f->kind->reseed(f, seed, t_ns);
+    }
 }
 
 const char *fault_state_name(enum fault_state state)

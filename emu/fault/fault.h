@@ -72,6 +72,7 @@ struct fault_kind {
     /* False: the point is no longer there, or has no room. NULL: lift does it, which puts the sum of what is ACTIVE in effect. */
     bool (*apply)(struct fault *f, int64_t t_ns);
     void (*lift)(struct fault *f, int64_t t_ns); /* it is no longer ACTIVE; NULL for those that are over at once */
+    void (*reseed)(struct fault *f, uint64_t seed, int64_t t_ns); /* while it is ACTIVE: what hangs in the bench; NULL: nothing random */
 };
 
 struct fault_table {
@@ -91,8 +92,8 @@ struct fault_engine {
 
 void fault_init(struct fault_engine *e, const struct control_bench *bench, struct sched *s);
 
-/* Faults that are added later, and the noise of those that begin later, draw from another seed. */
-void fault_reseed(struct fault_engine *e, uint64_t seed);
+/* What is random in faults, later ones and those that are active, draws from another seed from now on. */
+void fault_reseed(struct fault_engine *e, uint64_t seed, int64_t t_ns);
 
 /* The i-th kind; NULL past the last. */
 const struct fault_kind *fault_kind(unsigned i);

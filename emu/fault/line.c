@@ -34,6 +34,11 @@ static void lift_line(struct fault *f, int64_t t_ns)
     line_fault_end(line_faults_of(f), f->as.line, t_ns);
 }
 
+static void reseed_line(struct fault *f, uint64_t seed, int64_t t_ns)
+{
+    line_fault_reseed(line_faults_of(f), f->as.line, seed, t_ns);
+}
+
 /* Only one line has pulses with a place in the frame. */
 static bool has_pulse(const struct control_bench *b, const struct fault *f, char *why)
 {
@@ -50,7 +55,7 @@ static bool has_pulse(const struct control_bench *b, const struct fault *f, char
 }
 
 // clang-format off
-#define LINE(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_LINE), .apply = apply_line, .lift = lift_line
+#define LINE(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_LINE), .apply = apply_line, .lift = lift_line, .reseed = reseed_line
 static const struct fault_kind line[] = {
     {"line.stuck", "The line is stuck at level.", "no edge on it",
      LINE(LINE_STUCK_LOW), .need = FAULT_BIT(FAULT_LEVEL)},

@@ -60,6 +60,12 @@ static void lift_frames(struct fault *f, int64_t t_ns)
     if (bus) can_fault_remove(bus, &f->as.can, t_ns);
 }
 
+static void reseed_frames(struct fault *f, uint64_t seed, int64_t t_ns)
+{
+    (void)t_ns;
+    rng_reseed(&f->as.can.rng, seed);
+}
+
 static bool bus_off(struct fault *f, int64_t t_ns)
 {
     struct can_bus *bus;
@@ -99,7 +105,7 @@ static bool has_bits(const struct control_bench *b, const struct fault *f, char 
 #define ANY_FRAME AT(NODE) | AT(BUS) | AT(CLIENT)
 #define WHICH     FAULT_BIT(FAULT_PROBABILITY) | FAULT_BIT(FAULT_FRAMES) | FAULT_BIT(FAULT_ID) | FAULT_BIT(FAULT_ID_MASK)
 #define HOLD      FAULT_BIT(FAULT_HOLD_S)
-#define FRAMES(v) .variant = (v), .apply = apply_frames, .lift = lift_frames
+#define FRAMES(v) .variant = (v), .apply = apply_frames, .lift = lift_frames, .reseed = reseed_frames
 
 // clang-format off
 static const struct fault_kind link[] = {

@@ -146,8 +146,14 @@ static void lift_sensor(struct fault *f, int64_t t_ns)
     sensor_fault_remove(&u->sensor_faults[f->point.index], &f->as.sensor);
 }
 
+static void reseed_sensor(struct fault *f, uint64_t seed, int64_t t_ns)
+{
+    (void)t_ns;
+    draws_reseed(&f->as.sensor.noise, seed);
+}
+
 // clang-format off
-#define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor
+#define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor, .reseed = reseed_sensor
 static const struct fault_kind sensor[] = {
     {"sensor.stuck", "The sensor output freezes at out_v (default: its present value).", "the axis shows a constant plus converter noise at any head angle",
      SENSOR(SENSOR_STUCK), .may = FAULT_BIT(FAULT_OUT_V), .unless = "the channel has no sensor", .fits = has_sensor},

@@ -20,8 +20,19 @@ static uint64_t bit_of(const struct line_fault_slot *s)
 
 /* ---- one fault ---- */
 
-static int64_t noise_gap_ns(struct line_fault *f)
+/* Steps come later than commands: a seed waits for the edges of its instant. */
+static void take_seeds(struct line_fault_slot *s, int64_t t_ns)
 {
+    while (s->laters > 0 && s->later[0].from_ns <= t_ns) {
+        rng_reseed(&s->f.rng, s->later[0].seed);
+        memmove(s->later, s->later + 1, --s->laters * sizeof *s->later);
+    }
+}
+
+static int64_t noise_gap_ns(struct line_fault_slot *s, int64_t t_ns)
+{
+    struct line_fault *f = &s->f;
+    take_seeds(s, t_ns);
     const double gap_ns = -det_log(rng_uniform(&f->rng)) * 1e9 / f->rate_hz;
     return gap_ns < 1.0 ? 1 : gap_ns > 1e15 ? INT64_C(1000000000000000) : (int64_t)gap_ns;
 }
@@ -38,7 +49,7 @@ static void begin_fault(struct line_fault_slot *s, int64_t t_ns)
 {
     s->began = true;
     s->next_ns = NEVER;
-    if (s->f.kind == LINE_NOISE) s->next_ns = t_ns + noise_gap_ns(&s->f);
+    if (s->f.kind == LINE_NOISE) s->next_ns = t_ns + noise_gap_ns(s, t_ns);
     if (s->f.kind != LINE_GLITCH) return;
     s->flip = true;
     s->next_ns = t_ns + s->f.width_ns;
@@ -48,7 +59,7 @@ static void toggle_fault(struct line_fault_slot *s, int64_t t_ns)
 {
     s->flip = !s->flip;
     if (s->flip) s->next_ns = t_ns + s->f.width_ns;
-    else s->next_ns = s->f.kind == LINE_NOISE ? t_ns + noise_gap_ns(&s->f) : NEVER;
+    else s->next_ns = s->f.kind == LINE_NOISE ? t_ns + noise_gap_ns(s, t_ns) : NEVER;
     if (!s->flip && s->f.kind == LINE_GLITCH) s->id = 0;
 }
 
@@ -195,4 +206,12 @@ void line_fault_end(struct line_faults *l, uint32_t id, int64_t t_ns)
     if (!s) return;
     if (t_ns < s->f.until_ns) s->f.until_ns = t_ns;
     if (!s->began && s->f.until_ns <= s->f.from_ns) s->id = 0;
+}
+
+void line_fault_reseed(struct line_faults *l, uint32_t id, uint64_t seed, int64_t t_ns)
+{
+    struct line_fault_slot *s = id ? slot_of(l, id) : NULL;
+    if (!s) return;
+    if (s->laters < LINE_FAULT_SEEDS) s->laters++;
+    s->later[s->laters - 1] = (struct line_fault_seed){t_ns, seed};
 }

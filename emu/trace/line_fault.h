@@ -32,6 +32,13 @@ struct line_fault {
     struct rng rng;            /* NOISE */
 };
 
+#define LINE_FAULT_SEEDS 4u /* that come within TRACE_LAG_NS; one more replaces the last */
+
+struct line_fault_seed {
+    int64_t from_ns;
+    uint64_t seed;
+};
+
 struct line_fault_slot { /* a fault and where it is */
     struct line_fault f;
     uint32_t id;     /* 0: free */
@@ -39,6 +46,8 @@ struct line_fault_slot { /* a fault and where it is */
     bool flip;       /* the level is inverted now */
     int64_t next_ns; /* when flip changes; INT64_MAX: with a step, or never */
     unsigned pulses; /* of the frame so far */
+    struct line_fault_seed later[LINE_FAULT_SEEDS];
+    unsigned laters;
 };
 
 struct line_faults {
@@ -57,5 +66,8 @@ uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f);
 
 /* It ends at t_ns; harmless for one that has ended. */
 void line_fault_end(struct line_faults *l, uint32_t id, int64_t t_ns);
+
+/* From t_ns on draws are another seed's; a pulse or a pause that has begun keeps its end. Harmless for one that has ended. */
+void line_fault_reseed(struct line_faults *l, uint32_t id, uint64_t seed, int64_t t_ns);
 
 #endif

@@ -10,6 +10,7 @@ import pytest
 from psabench import Bench
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import BenchError
+from psabench.link.vcd import read_vcd
 from scipy import stats
 
 pytestmark = pytest.mark.host
@@ -130,3 +131,43 @@ def test_a_batch_of_children_has_the_law_of_a_batch_of_starts(tmp_path: Path, ch
         print(f"statistic {found.statistic:.3f}, p {found.pvalue:.3f}", file=sys.stderr)
         assert found.pvalue > 1e-4
         assert len(set(a)) > 0.9 * children  # readings are codes, so that two may be equal
+
+
+# What is drawn in faults that are active at the fork: noise, which frames are lost, when pulses come.
+DRAWN = {
+    "sensor.noise": ("a.sensor.x", {"rms_v": 1e-3}),
+    "link.drop": ("a.can", {"probability": 0.3, "can_id": 0x185}),
+    "line.noise": ("a.line.Res", {"rate_hz": 2000, "width_ns": 100}),
+}
+
+
+def effect(bench: Bench, kind: str, vcd: Path) -> list[float]:
+    """What the fault does from now on, without what a board of silent sensors and a quiet line adds."""
+    if kind == "line.noise":
+        with bench.trace(vcd):
+            bench.run_for(0.02)
+        return [float(t) for t in read_vcd(vcd).wires["Res"].t_ns]
+    bench.run_for(FILTERS_S)
+    got = bench.unit.stream(READINGS)
+    if kind == "link.drop":
+        return [float(n) for n in got.seq]
+    return list(got.axis("x"))
+
+
+@pytest.mark.parametrize("kind", DRAWN)
+def test_a_seed_reaches_what_is_drawn_in_active_faults(tmp_path: Path, kind: str) -> None:
+    point, args = DRAWN[kind]
+    with Bench.start("stream") as bench:
+        bench.run_for(0.1)
+        with bench.fault(kind, point, **args):
+            bench.run_for(0.1)
+            found = []
+            for n, seed in enumerate((None, 5, 5, 6)):
+                with bench.fork(seed=seed) as child:
+                    found.append(effect(child, kind, tmp_path / f"{n}.vcd"))
+    parents, fifth, again, sixth = found
+    assert fifth == again
+    if kind == "sensor.noise":
+        assert abs(np.corrcoef(fifth, sixth)[0, 1]) < 0.6
+        assert abs(np.corrcoef(fifth, parents)[0, 1]) < 0.6
+    assert parents != fifth != sixth != parents

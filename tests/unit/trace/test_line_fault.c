@@ -255,6 +255,31 @@ static void noise_has_its_rate_and_width_and_a_seed_the_same_pulses(void **state
     assert_int_equal(first_ns[0], first_ns[1]);
 }
 
+/* Three seeds on their way at once, each from its own instant, whether or not the edges before it have been computed. */
+static void another_seed_counts_from_its_instant_however_it_is_looked_at(void **state)
+{
+    (void)state;
+    static int64_t at_ns[3][512];
+    unsigned n[3] = {0, 0, 0};
+    for (int k = 0; k < 3; k++) {
+        struct bench *r = up();
+        struct line_fault f = fault(LINE_NOISE, OTHER);
+        f.rate_hz = 100000.0;
+        f.width_ns = 10;
+        const uint32_t id = line_fault_add(&r->l, &f);
+        for (int64_t t_ns = 1000000; t_ns <= 1100000 && k < 2; t_ns += 50000) {
+            if (k) trace_advance(&r->t, t_ns);
+            line_fault_reseed(&r->l, id, 7 + (uint64_t)(t_ns / 50000 % 2), t_ns);
+        }
+        trace_advance(&r->t, 2000000);
+        for (unsigned i = 0; i < r->n && n[k] < 512; i++) at_ns[k][n[k]++] = r->seen[i].t_ns;
+    }
+    assert_int_equal(n[0], n[1]);
+    assert_memory_equal(at_ns[0], at_ns[1], n[0] * sizeof **at_ns);
+    assert_true(n[0] != n[2] || memcmp(at_ns[0], at_ns[2], n[0] * sizeof **at_ns) != 0);
+    for (unsigned i = 0; at_ns[2][i] < 1000000; i++) assert_int_equal(at_ns[0][i], at_ns[2][i]);
+}
+
 static void who_listens_late_hears_the_faulty_levels(void **state)
 {
     (void)state;
@@ -391,6 +416,7 @@ int main(void)
         cmocka_unit_test(the_nth_pulse_of_each_frame_is_missing),
         cmocka_unit_test(a_pulse_too_many_follows_the_nth_of_each_frame),
         cmocka_unit_test(noise_has_its_rate_and_width_and_a_seed_the_same_pulses),
+        cmocka_unit_test(another_seed_counts_from_its_instant_however_it_is_looked_at),
         cmocka_unit_test(who_listens_late_hears_the_faulty_levels),
         cmocka_unit_test(who_listens_late_hears_where_healthy_lines_are),
         cmocka_unit_test(as_many_faults_as_there_is_room_for_and_no_more),
