@@ -23,7 +23,7 @@ TESTS     ?= $(if $(filter check,$(MAKECMDGOALS)),$(if $(T),$(foreach t,$(T),$(i
                  $(error no file $(t).c in tests/unit))),$(shell python3 tools/tiers.py $(TIER) $(if $(SAN),--sanitizers))))
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 ABI_psabench     := $(shell sed -n 's/^\#define PSABENCH_ABI \([0-9]*\)/\1/p' emu/api/psabench.h)
-ABI_psabench-nav := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' emu/nav/nav.h)
+ABI_psabench-nav := $(shell sed -n 's/^\#define NAV_ABI \([0-9]*\)$$/\1/p' nav/nav.h)
 export PYTHONPYCACHEPREFIX ?= $(CURDIR)/build/pycache#   else each program that a test starts compiles numpy again
 unexport PYTHONDONTWRITEBYTECODE
 # What correctness needs is before the user's CFLAGS. -ffp-contract=off: the same bytes on every machine. All objects are
@@ -35,13 +35,13 @@ INC   := -Iemu -Ibuild -isystem build/gen/mavlink $(shell $(PKGCONFIG) --cflags 
 LIBS  := $(shell $(PKGCONFIG) --libs libcjson libfyaml 2>/dev/null) -lm
 FLAGS   = $(STD) $(WARN) $(INC) $(CPPFLAGS)
 CXXFLAGS ?= $(patsubst -O0,-O1,$(patsubst -O2,-O3,$(CFLAGS)))#   without optimisation Eigen asks for C++'s runtime
-# C++ of emu/nav: Eigen without vectors of its own, which differ from machine to machine; no exceptions and no RTTI, so that it
+# C++ of nav, which includes from the root of the checkout and of emu only base/detmath.h (tools/check_includes.py): Eigen without vectors of its own, which differ from machine to machine; no exceptions and no RTTI, so that it
 # needs no runtime of C++ and links into C. Pairs of doubles in one register (SLP) cost gcc 12 a third of the Monte-Carlo's speed.
 CXXSTD := $(patsubst -std=c11,-std=c++17,$(STD)) -fno-exceptions -fno-rtti -fno-math-errno -fno-tree-slp-vectorize -DEIGEN_DONT_VECTORIZE -DEIGEN_NO_MALLOC -DEIGEN_MPL2_ONLY
 CXXWARN = $(filter-out -Wstrict-prototypes -Wmissing-prototypes,$(WARN)) -Wmissing-declarations
 EIGEN  := $(patsubst -I%,-isystem %,$(shell $(PKGCONFIG) --cflags eigen3 2>/dev/null))
 CXXSANFL := $(SANFL) $(if $(findstring undefined,$(SAN)),-fsanitize=float-cast-overflow) $(if $(SAN),$(if $(findstring clang,$(CXX)),-fno-sanitize=function))#  which asks for RTTI
-CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -Iemu $(EIGEN) $(CPPFLAGS) $(CXXSANFL) $(CXXFLAGS)
+CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -I. $(EIGEN) $(CPPFLAGS) $(CXXSANFL) $(CXXFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)
 # One word a step; V=1 shows the whole commands.
@@ -59,7 +59,7 @@ OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
 API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
 CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi scenario bench telemetry app,$(BUILD)/obj/emu/$(d)/%),$(OBJ))
-NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard emu/nav/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
+NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard nav/*/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
 INSTALL  = BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' LIBDIR='$(LIBDIR)' VERSION='$(VERSION)' ABI=$(ABI_psabench) NAV_ABI=$(ABI_psabench-nav) tools/install
 UNIT_BIN := $(patsubst %,$(BUILD)/tests/%,$(basename $(notdir $(UNIT))))
 FUZZ_SRC  := $(sort $(wildcard tests/fuzz/fuzz_*.c tests/fuzz/*/fuzz_*.c))
@@ -107,7 +107,7 @@ $(BUILD)/obj/%.o: %.c Makefile
 
 # Programs of tests: each names its objects, the rest comes from the archive.
 LINK_LIBS = $(LIBS)
-$(BUILD)/obj/tests/%.o: CPPFLAGS += -Itests/unit -Itests/fuzz/support#             rigs that several folders use
+$(BUILD)/obj/tests/%.o: CPPFLAGS += -I. -Itests/unit -Itests/fuzz/support#         nav/, rigs that several folders use
 $(BUILD)/obj/tests/unit/%.o: CFLAGS := $(if $(SAN),$(CFLAGS:-O1=-O0),$(CFLAGS))#   tested code is at -O1
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                clock_gettime
 $(UNIT_BIN): LINK_LIBS += -lcmocka
@@ -180,9 +180,9 @@ fuzz-bin: $(FUZZ_BIN)
 fuzz-each: $(FUZZ_BIN)
 	@tests/fuzz/run $(FUZZ_S) $(FUZZ_BIN)
 lint: all ## formats, warnings of gcc and clang, clang-tidy, includes, generated files, ruff, mypy (a part: LINT=test, LINT=rest)
-	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -Iemu $(EIGEN)' tools/lint $(LINT)
+	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -I. $(EIGEN)' tools/lint $(LINT)
 format: ## rewrite C and Python in the project's format
-	find emu tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp' | xargs clang-format -i
+	find emu nav tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp' | xargs clang-format -i
 	$(PY) -m ruff format .
 docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, requirements, tables of the pages, FIDELITY.md
 	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua && $(PY) -m psabench.logs.sessions
@@ -195,7 +195,7 @@ foreign: all ; @tools/foreign ## MAVProxy on a unit's MAVLink link, by hand; say
 wheel: all ## build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
 compile_commands.json: Makefile $(SRC) $(GEN_SRC) ## how each file is compiled, for editors and clang-tidy
-	@python3 tools/compile_commands.py '$(COMPILE)' $(SRC) $(GEN_SRC) -- '$(COMPILE) -Itests/unit' $(UNIT) > $@
+	@python3 tools/compile_commands.py '$(COMPILE)' $(SRC) $(GEN_SRC) -- '$(COMPILE) -I. -Itests/unit' $(UNIT) > $@
 lock: $(PY) ; tools/lock ## pin requirements*.in in requirements*.lock
 clean: ; rm -rf build build-* compile_commands.json ## remove everything that was built; .venv stays
 help: ## this list

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm, circles.
 
-Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/; those of link, scenario, bench and app
+Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ and nav/; those of link, scenario, bench and app
 may do all this, but for circles: files, or folders, that call each other, directly or through others. Two compilers or
 machines give equal bytes only while no result depends on a libm whose last digit is its own.
 """
@@ -13,6 +13,7 @@ from pathlib import Path
 
 FREE_FOLDERS = {"link", "app", "bench", "scenario"}
 CXX_FOLDERS = {"nav"}
+ROOTS = ("emu", "nav")
 CIRCLES = 0, 3  # of symbols between folders, and in all; the goal is 0 and 6
 ALLOCATOR_FOLDERS = {"command", "control", "fault", "scpi", "api"}  # through cJSON; the library's benches and parts
 LIBM = (
@@ -36,6 +37,12 @@ FORBIDDEN = {
     **dict.fromkeys("rand srand random srandom drand48 getrandom".split(), "is not ours to seed: use base/rng.h"),
     **dict.fromkeys("exit _exit abort getenv".split(), "is for emu/app to decide"),
 }
+
+
+def room_of(root: Path, path: Path) -> Path:
+    """base/sched of ROOT/emu/base/sched, nav/north of ROOT/nav/north."""
+    own = path.relative_to(root)
+    return own.relative_to("emu") if own.parts[0] == "emu" else own
 
 
 def tables(command: Sequence[str], objects: Sequence[Path]) -> Iterator[tuple[Path, str]]:
@@ -96,7 +103,7 @@ def circles(graph: dict[Path, set[Path]]) -> list[list[Path]]:
 
 def circle_breaches(root: Path, objects: list[Path], limits: tuple[int, int] = CIRCLES) -> list[str]:
     """Circles between folders, and those between files, where there are more than the limits."""
-    name = {path: path.relative_to(root / "emu").with_suffix("") for path in objects}
+    name = {path: room_of(root, path).with_suffix("") for path in objects}
     files = {name[a]: {name[b] for b in to} for a, to in calls(objects).items()}
     folders: dict[Path, set[Path]] = {}
     for a, to in files.items():
@@ -110,14 +117,14 @@ def circle_breaches(root: Path, objects: list[Path], limits: tuple[int, int] = C
 
 def main(root: Path) -> int:
     breaches = []
-    objects = sorted((root / "emu").rglob("*.o"))
+    objects = sorted(path for folder in ROOTS for path in (root / folder).rglob("*.o"))
     needed, writable = undefined(objects), mutable(objects)
     for path in objects:
-        room = path.parent.relative_to(root / "emu")
+        room = room_of(root, path.parent)
         folder = room.parts[0]
         if folder in FREE_FOLDERS:
             continue
-        source = f"emu/{room}/{path.stem}.{'cpp' if folder in CXX_FOLDERS else 'c'}"
+        source = path.relative_to(root).with_suffix(".cpp" if folder in CXX_FOLDERS else ".c")
         breaches += [f"{source}: mutable global {name}" for name in writable[path]]
         for name in needed[path]:
             if name in FORBIDDEN and not (folder in ALLOCATOR_FOLDERS and FORBIDDEN[name] == "allocates"):

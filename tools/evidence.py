@@ -36,15 +36,9 @@ from protogen.source import parse_yaml
 ROOT = Path(__file__).resolve().parents[1]
 LEDGER, LOCK = "docs/evidence.yaml", "docs/evidence.lock"
 MODELS = (
-    "base",
-    "board",
-    "canopen",
-    "chip",
+    *(f"emu/{folder}" for folder in ("base", "board", "canopen", "chip", "phys", "trace", "unit")),
     "nav",
-    "phys",
-    "trace",
-    "unit",
-)  # folders of emu whose files must be in a group
+)  # folders whose files must be in a group
 SOURCES = (".c", ".h", ".cpp", ".hpp")
 NO_RECORDINGS = "no recordings"  # how a test of recordings is skipped without them: tests/py/support/recordings.py
 RUNGS = ("E2", "E3", "E4", "E5", "E6")  # that a test can be on; what is our own test of our own code is on none
@@ -245,7 +239,7 @@ def faults(root: Path, ledger: Ledger) -> Iterator[str]:
                 yield f"{file} is in two groups, {owner[file]} and {group.name}"
             owner[file] = group.name
     for folder in MODELS:
-        for path in sorted((root / "emu" / folder).rglob("*")):
+        for path in sorted((root / folder).rglob("*")):
             if path.suffix in SOURCES and path.relative_to(root).as_posix() not in owner:
                 yield f"{path.relative_to(root)} is in no group of {LEDGER}: nothing says what proves it"
     subjects = {g.name for g in ledger.groups}

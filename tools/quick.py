@@ -56,7 +56,7 @@ def near_by_name(path: Path, test: Path) -> int | None:
         return 1
     if stem.startswith(f"{name}_") or stem.endswith(f"_{name}"):
         return 2
-    folder = path.parts[1:-1] if path.parts[0] in ("emu", "tests") else path.parts[2:-1]
+    folder = path.parts[1:-1] if path.parts[0] in ("emu", "nav", "tests") else path.parts[2:-1]
     if folder and test.parts[2:-1] == folder:
         return 3
     if len(folder) > 1 and (test.parent.name == folder[-1] or folder[-1] in stem.split("_")):
@@ -92,7 +92,7 @@ def c_choice(changed: Sequence[Path], root: Path, most: int = C_AT_MOST) -> Choi
         depends = root / OBJECTS / test.with_suffix(".d")
         if depends.exists():
             text = depends.read_text(encoding="utf-8")
-            near += [5 for path in headers if path.parts[0] in ("emu", "tests") and includes(text, path)]
+            near += [5 for path in headers if path.parts[0] in ("emu", "nav", "tests") and includes(text, path)]
         if near:
             found[test] = min(near)
     return Choice.of(found, most)

@@ -273,7 +273,7 @@ def test_another_reason_to_skip_does_not_pass_for_missing_recordings(recorded: P
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ({"emu/nav/new.cpp": "int n;\n"}, "emu/nav/new.cpp is in no group"),
+        ({"nav/north/new.cpp": "int n;\n"}, "nav/north/new.cpp is in no group"),
         ({"emu/board/b.h": "int n;\n"}, "emu/board/b.h is in no group"),
         ({"tests/py/test_chip.py": "def test_other(): ...\n"}, "tests/py/test_chip.py:test_it is no test that is run"),
     ],

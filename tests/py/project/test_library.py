@@ -24,7 +24,7 @@ from psabench.report.waveform import rdata_picture
 ROOT = Path(__file__).parents[3]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
 HEADER = (ROOT / "emu/api/psabench.h").read_text()
-NAV_HEADERS = "".join((ROOT / f"emu/nav/{name}.h").read_text() for name in ("nav", "nav_mc"))
+NAV_HEADERS = "".join((ROOT / f"nav/{name}.h").read_text() for name in ("nav", "nav_mc"))
 PAGE = ROOT / "docs/library.md"
 EXAMPLES = ("ads1256_read", "ads1282_read", "ad7712_read", "psa2_frames")
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wundef", "-Werror"]

@@ -1,4 +1,4 @@
-#include "nav/nav_fit.hpp"
+#include "nav/north/nav_fit.hpp"
 
 using qr_of_rows = Eigen::ColPivHouseholderQR<fit_design>;
 

@@ -1,4 +1,4 @@
-#include "nav/nav_mc.hpp"
+#include "nav/north/nav_mc.hpp"
 
 /* Runs are computed 32 at a time, one expression for all of them before the next: loops that a compiler turns into vectors. */
 constexpr int LANES = 32;

@@ -3,7 +3,7 @@
 #define PSABENCH_NAV_MODEL_HPP
 
 #include "nav/nav.h"
-#include "nav/nav_math.hpp"
+#include "nav/common/nav_math.hpp"
 
 struct nav_earth {
     double we_radps, wz_radps; /* (2): U cos lat, U sin lat */

@@ -1,6 +1,6 @@
-#include "nav/nav_check.hpp"
+#include "nav/common/nav_check.hpp"
 
-#include "nav/nav_math.hpp"
+#include "nav/common/nav_math.hpp"
 
 #include <cstring>
 

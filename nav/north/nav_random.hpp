@@ -4,8 +4,8 @@
 #ifndef PSABENCH_NAV_RANDOM_HPP
 #define PSABENCH_NAV_RANDOM_HPP
 
-#include "nav/nav_math.hpp"
-#include "nav/nav_width.hpp"
+#include "nav/common/nav_math.hpp"
+#include "nav/north/nav_width.hpp"
 
 #include <cstring>
 

@@ -1,4 +1,4 @@
-#include "nav/nav_fit.hpp"
+#include "nav/north/nav_fit.hpp"
 
 /* -cos b sin g = cos q u + sin q v: the upward parts u of x_c and v of y_c, which are -cos(pitch) sin(roll) and sin(pitch).
  * A constant error of gamma adds cos(g) of it to the left, 1 to the tilts that matter. */

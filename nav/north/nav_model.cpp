@@ -1,4 +1,4 @@
-#include "nav/nav_model.hpp"
+#include "nav/north/nav_model.hpp"
 
 struct nav_row nav_row_of(const struct nav_position *p, bool simplified)
 {

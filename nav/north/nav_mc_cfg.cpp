@@ -1,5 +1,5 @@
-#include "nav/nav_check.hpp"
-#include "nav/nav_mc.hpp"
+#include "nav/common/nav_check.hpp"
+#include "nav/north/nav_mc.hpp"
 
 void nav_mc_default(struct nav_mc_cfg *cfg)
 {

@@ -1,4 +1,4 @@
-#include "nav/nav_fit.hpp"
+#include "nav/north/nav_fit.hpp"
 
 double fit_mean_time(const struct nav_position *p, int count)
 {

@@ -1,5 +1,5 @@
-#include "nav/nav_check.hpp"
-#include "nav/nav_fit.hpp"
+#include "nav/common/nav_check.hpp"
+#include "nav/north/nav_fit.hpp"
 
 /* What a result is put together from; x and gain are of (s, c, drift, ramp) or, on the circle, of (alpha, drift, ramp). */
 struct solution {

@@ -3,7 +3,7 @@
 #ifndef PSABENCH_NAV_FIT_HPP
 #define PSABENCH_NAV_FIT_HPP
 
-#include "nav/nav_model.hpp"
+#include "nav/north/nav_model.hpp"
 
 #include <Eigen/Dense>
 

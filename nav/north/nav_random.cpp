@@ -1,4 +1,4 @@
-#include "nav/nav_random.hpp"
+#include "nav/north/nav_random.hpp"
 
 INLINE void fill_uniform(uint64_t state, int n, double *out)
 {

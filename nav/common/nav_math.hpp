@@ -6,7 +6,7 @@
 #include <cstdint>
 
 extern "C" {
-#include "base/detmath.h"
+#include "emu/base/detmath.h"
 }
 
 constexpr double NAV_PI = 3.14159265358979323846;

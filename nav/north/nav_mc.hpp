@@ -2,9 +2,9 @@
 #ifndef PSABENCH_NAV_MC_HPP
 #define PSABENCH_NAV_MC_HPP
 
-#include "nav/nav_fit.hpp"
+#include "nav/north/nav_fit.hpp"
 #include "nav/nav_mc.h"
-#include "nav/nav_random.hpp"
+#include "nav/north/nav_random.hpp"
 
 /* Middles and lengths of the windows, angles as increments; S, beta and gamma 0. The first window begins at t = 0. */
 void mc_schedule(const struct nav_mc_cfg *cfg, struct nav_position *p);

@@ -1,4 +1,4 @@
-#include "nav/nav_mc.hpp"
+#include "nav/north/nav_mc.hpp"
 
 constexpr int BLOCK = 512; /* random numbers made at once */
 constexpr int STRETCHES = 16;

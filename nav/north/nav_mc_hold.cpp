@@ -1,5 +1,5 @@
-#include "nav/nav_check.hpp"
-#include "nav/nav_mc.hpp"
+#include "nav/common/nav_check.hpp"
+#include "nav/north/nav_mc.hpp"
 
 /* Exact step of a Gauss-Markov drift and its integral over t: both Gaussian, correlated. */
 struct gm_step {
