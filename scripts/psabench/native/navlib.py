@@ -162,6 +162,12 @@ class McHoldOutStruct(c.Structure):
     _fields_ = [("end_rad", _DOUBLES), ("max_rad", _DOUBLES)]
 
 
+class StrapdownStruct(c.Structure):
+    """struct nav_strapdown; `at` is struct nav_state as a row."""
+
+    _fields_ = [("at", _D * 15), ("dtheta_rad", _D * 3), ("dv_mps", _D * 3), ("vertical", _I)]
+
+
 _P = c.POINTER
 _RANGE = (_U64, _U64, _U64)
 
@@ -193,6 +199,11 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "mc_closed": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
     "mc_samples": (_I, _P(McStruct), *_RANGE, _P(McOutStruct)),
     "mc_hold_default": (None, _P(McHoldStruct)),
+    "gravity_mps2": (_D, _D, _D),
+    "radii_m": (None, _D, _D, _DOUBLES, _DOUBLES),
+    "dcm": (None, _D, _D, _D, c.c_void_p),
+    "dcm_angles": (None, c.c_void_p, _DOUBLES, _DOUBLES, _DOUBLES),
+    "integrate": (_I, _P(StrapdownStruct), *(c.c_void_p,) * 2, c.c_int64, _D, c.c_void_p, _P(c.c_int64)),
     "mc_hold": (_I, _P(McHoldStruct), *_RANGE, _P(McHoldOutStruct)),
 }
 

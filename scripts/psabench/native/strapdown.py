@@ -1,0 +1,92 @@
+"""Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/strapdown.md), from Python.
+
+Frame n is east, north, up; b the unit's axes; `C_nb` takes coordinates in b to coordinates in n. Angles in rad, SI units.
+Increments are integrals over one interval of the rate in inertial space and of the specific force, in b.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from psabench.errors import BadInput, expected
+from psabench.native.navlib import StrapdownStruct, library
+
+Floats = npt.NDArray[np.float64]
+ROW = 15  # doubles of a state: place, velocity, C_nb
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """What is known at one instant (struct nav_state)."""
+
+    lat_rad: float
+    lon_rad: float
+    h_m: float
+    v_n_mps: Floats  # (3,)
+    C_nb: Floats  # (3, 3)
+
+    @staticmethod
+    def of(row: Floats) -> State:
+        """From one row of a path, (15,)."""
+        lat_rad, lon_rad, h_m = (float(x) for x in row[:3])
+        return State(lat_rad=lat_rad, lon_rad=lon_rad, h_m=h_m, v_n_mps=row[3:6].copy(), C_nb=row[6:].reshape(3, 3).copy())
+
+    def row(self) -> Floats:
+        return np.array([self.lat_rad, self.lon_rad, self.h_m, *np.ravel(self.v_n_mps), *np.ravel(self.C_nb)], np.float64)
+
+
+class Strapdown:
+    """An integration that goes on from call to call. `height_fixed`: the horizontal channel alone."""
+
+    def __init__(self, at: State, *, height_fixed: bool = False) -> None:
+        self._at = StrapdownStruct(vertical=int(height_fixed))
+        self._at.at[:] = list(at.row())
+
+    @property
+    def state(self) -> State:
+        return State.of(np.array(self._at.at))
+
+    def advance(self, dtheta_rad: Floats, dv_mps: Floats, dt_s: float) -> Floats:
+        """The states after each of n intervals, (n, 15), from increments (n, 3) and (n, 3), which are not copied where they
+        are rows of doubles already. Raises BadInput with the number of the interval; then nothing has moved."""
+        a, v = (np.ascontiguousarray(x, np.float64) for x in (dtheta_rad, dv_mps))
+        if a.ndim != 2 or a.shape[1] != 3 or a.shape != v.shape:
+            raise BadInput(expected("increments of shapes (n, 3) and (n, 3)", f"{a.shape} and {v.shape}", "strapdown"))
+        path, done = np.empty((len(a), ROW)), c.c_int64()
+        at = (c.byref(self._at), a.ctypes.data, v.ctypes.data, len(a), dt_s, path.ctypes.data, c.byref(done))
+        status = library().integrate(*at)
+        if status:
+            why = library().status_text(status).decode()
+            raise BadInput(f"strapdown: interval {done.value} of {len(a)}, {dt_s:g} s each: {why}")
+        return path
+
+
+def gravity_mps2(lat_rad: float, h_m: float) -> float:
+    """On the ellipsoid and near it: Somigliana's, linear in height."""
+    return float(library().gravity_mps2(lat_rad, h_m))
+
+
+def radii_m(lat_rad: float, h_m: float) -> tuple[float, float]:
+    """Radii of curvature plus height: of the meridian, of the prime vertical."""
+    meridian, vertical = c.c_double(), c.c_double()
+    library().radii_m(lat_rad, h_m, c.byref(meridian), c.byref(vertical))
+    return meridian.value, vertical.value
+
+
+def dcm(heading_rad: float, pitch_rad: float, roll_rad: float) -> Floats:
+    """C_nb, (3, 3), of a unit with axes right, forward, up; heading clockwise from north, pitch nose up, roll right wing down."""
+    out = np.empty((3, 3))
+    library().dcm(heading_rad, pitch_rad, roll_rad, out.ctypes.data)
+    return out
+
+
+def angles_rad(C_nb: Floats) -> tuple[float, float, float]:
+    """Heading, pitch and roll of C_nb, (3, 3)."""
+    out = [c.c_double() for _ in range(3)]
+    library().dcm_angles(np.ascontiguousarray(C_nb, np.float64).ctypes.data, *(c.byref(x) for x in out))
+    heading, pitch, roll = (x.value for x in out)
+    return heading, pitch, roll
