@@ -9,7 +9,7 @@
 #ifndef PSABENCH_STRAPDOWN_H
 #define PSABENCH_STRAPDOWN_H
 
-#include "nav.h"
+#include "nav/nav.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -1,7 +1,7 @@
 /* Strapdown integration (strapdown.h). Names of Savage's papers, in axes east, north, up. */
-#include "strapdown.h"
+#include "nav/strapdown.h"
 
-#include "nav_math.hpp"
+#include "nav/common/nav_math.hpp"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

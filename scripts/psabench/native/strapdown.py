@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.errors import BadInput, expected
+from psabench.native.nav import Status
 from psabench.native.navlib import StrapdownStruct, library
 
 Floats = npt.NDArray[np.float64]
@@ -56,13 +57,21 @@ class Strapdown:
         a, v = (np.ascontiguousarray(x, np.float64) for x in (dtheta_rad, dv_mps))
         if a.ndim != 2 or a.shape[1] != 3 or a.shape != v.shape:
             raise BadInput(expected("increments of shapes (n, 3) and (n, 3)", f"{a.shape} and {v.shape}", "strapdown"))
+        if not 0.0 < dt_s <= 1.0:
+            raise BadInput(expected("an interval above 0, up to 1 s", dt_s, "strapdown"))
         path, done = np.empty((len(a), ROW)), c.c_int64()
         at = (c.byref(self._at), a.ctypes.data, v.ctypes.data, len(a), dt_s, path.ctypes.data, c.byref(done))
         status = library().integrate(*at)
         if status:
-            why = library().status_text(status).decode()
-            raise BadInput(f"strapdown: interval {done.value} of {len(a)}, {dt_s:g} s each: {why}")
+            i = done.value
+            raise BadInput(f"strapdown: interval {i} of {len(a)}: {self._why(status, np.hstack([a[i : i + 1], v[i : i + 1]]))}")
         return path
+
+    def _why(self, status: int, interval: Floats) -> str:
+        numbers = np.append(np.array(self._at.at), interval)
+        if status == Status.NOT_FINITE:
+            return expected("finite numbers", numbers[~np.isfinite(numbers)][:1])
+        return expected("a latitude within 89.9 deg", "one beyond it")
 
 
 def gravity_mps2(lat_rad: float, h_m: float) -> float:

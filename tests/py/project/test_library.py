@@ -24,7 +24,7 @@ from psabench.report.waveform import rdata_picture
 ROOT = Path(__file__).parents[3]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
 HEADER = (ROOT / "emu/api/psabench.h").read_text()
-NAV_HEADERS = "".join((ROOT / f"nav/{name}.h").read_text() for name in ("nav", "nav_mc"))
+NAV_HEADERS = "".join(path.read_text() for path in sorted((ROOT / "nav").glob("*.h")))
 PAGE = ROOT / "docs/library.md"
 EXAMPLES = ("ads1256_read", "ads1282_read", "ad7712_read", "psa2_frames")
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wundef", "-Werror"]
@@ -298,7 +298,7 @@ def test_uninstall_leaves_nothing_of_it(tmp_path: Path) -> None:
     ours = [p for folder in ("include", "lib") for p in (tmp_path / "usr" / folder).rglob("*") if not p.is_dir()]
     names = {str(p.relative_to(tmp_path)) for p in ours}
     lib = "usr/lib/here/"
-    headers = {"usr/include/psabench.h", "usr/include/psabench/nav/nav.h", "usr/include/psabench/nav/nav_mc.h"}
+    headers = {"usr/include/psabench.h", *(f"usr/include/psabench/nav/{p.name}" for p in (ROOT / "nav").glob("*.h"))}
     assert names == headers | {f"{lib}pkgconfig/{x}.pc" for x in ("psabench", "psabench-nav")} | {
         f"{lib}lib{x}"
         for name, abi in (("psabench", 0), ("psabench-nav", 1))
