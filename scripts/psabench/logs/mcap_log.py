@@ -11,9 +11,9 @@ import io
 import json
 import struct
 import zlib
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import can
 import zstandard
@@ -37,6 +37,8 @@ from psabench.logs.records import (
     units,
 )
 from psabench.logs.segments import SegmentFile
+
+Found = TypeVar("Found")
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK = 1 << 18  # bytes before compression
@@ -152,6 +154,15 @@ class Mcap(Checked):
 
 def read_mcap(path: Path) -> Iterator[can.Message]:
     """Frames of /can_raw, in the order of the file. Raises BadInput for a damaged file, after the frames before it."""
+    yield from _messages(path, RAW_TOPIC, frame_of)
+
+
+def json_messages(path: Path, topic: str) -> Iterator[object]:
+    """Those of a topic, parsed, in the order of the file. Raises BadInput for a damaged file, after what is before it."""
+    yield from _messages(path, topic, lambda parsed: parsed)
+
+
+def _messages(path: Path, topic: str, made: Callable[[Any], Found]) -> Iterator[Found]:
     channels = set[int]()
     n = 0
     with path.open("rb") as file:
@@ -159,11 +170,11 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
             for opcode, data in _all_records(file):
                 if opcode == Opcode.CHANNEL:
                     c = Channel.read(ReadDataStream(io.BytesIO(data)))
-                    if c.topic == RAW_TOPIC and c.message_encoding == "json":
+                    if c.topic == topic and c.message_encoding == "json":
                         channels.add(c.id)
                 elif int.from_bytes(data[:2], "little") in channels:
                     n += 1
-                    yield frame_of(_parsed_json(data[MESSAGE_HEAD:]))
+                    yield made(_parsed_json(data[MESSAGE_HEAD:]))
         except DAMAGE as e:
             said = " ".join(str(e).split())[:120] or type(e).__name__
             raise BadInput(expected("a whole log", f"damage behind message {n} ({said})", path)) from e
