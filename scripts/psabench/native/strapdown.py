@@ -1,6 +1,6 @@
 """Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/strapdown.md), from Python.
 
-Frame n is east, north, up; b the unit's axes; `C_nb` takes coordinates in b to coordinates in n. Angles in rad, SI units.
+Frame n is east, north, up; b the unit's axes; `C_nb` takes coordinates in b to coordinates in n. SI units, rad.
 Increments are integrals over one interval of the rate in inertial space and of the specific force, in b.
 """
 
@@ -34,10 +34,12 @@ class State:
     def of(row: Floats) -> State:
         """From one row of a path, (15,)."""
         lat_rad, lon_rad, h_m = (float(x) for x in row[:3])
-        return State(lat_rad=lat_rad, lon_rad=lon_rad, h_m=h_m, v_n_mps=row[3:6].copy(), C_nb=row[6:].reshape(3, 3).copy())
+        velocity, matrix = row[3:6].copy(), row[6:].reshape(3, 3).copy()
+        return State(lat_rad=lat_rad, lon_rad=lon_rad, h_m=h_m, v_n_mps=velocity, C_nb=matrix)
 
     def row(self) -> Floats:
-        return np.array([self.lat_rad, self.lon_rad, self.h_m, *np.ravel(self.v_n_mps), *np.ravel(self.C_nb)], np.float64)
+        place = (self.lat_rad, self.lon_rad, self.h_m)
+        return np.concatenate([place, np.ravel(self.v_n_mps), np.ravel(self.C_nb)])
 
 
 class Strapdown:
@@ -52,8 +54,10 @@ class Strapdown:
         return State.of(np.array(self._at.at))
 
     def advance(self, dtheta_rad: Floats, dv_mps: Floats, dt_s: float) -> Floats:
-        """The states after each of n intervals, (n, 15), from increments (n, 3) and (n, 3), which are not copied where they
-        are rows of doubles already. Raises BadInput with the number of the interval; then nothing has moved."""
+        """The states after each of n intervals, (n, 15), from increments (n, 3) twice: rows of doubles are not copied.
+
+        Raises BadInput with the number of the interval; then nothing has moved.
+        """
         a, v = (np.ascontiguousarray(x, np.float64) for x in (dtheta_rad, dv_mps))
         if a.ndim != 2 or a.shape[1] != 3 or a.shape != v.shape:
             raise BadInput(expected("increments of shapes (n, 3) and (n, 3)", f"{a.shape} and {v.shape}", "strapdown"))
@@ -64,7 +68,8 @@ class Strapdown:
         status = library().integrate(*at)
         if status:
             i = done.value
-            raise BadInput(f"strapdown: interval {i} of {len(a)}: {self._why(status, np.hstack([a[i : i + 1], v[i : i + 1]]))}")
+            why = self._why(status, np.hstack([a[i : i + 1], v[i : i + 1]]))
+            raise BadInput(f"strapdown: interval {i} of {len(a)}: {why}")
         return path
 
     def _why(self, status: int, interval: Floats) -> str:
@@ -87,7 +92,7 @@ def radii_m(lat_rad: float, h_m: float) -> tuple[float, float]:
 
 
 def dcm(heading_rad: float, pitch_rad: float, roll_rad: float) -> Floats:
-    """C_nb, (3, 3), of a unit with axes right, forward, up; heading clockwise from north, pitch nose up, roll right wing down."""
+    """C_nb, (3, 3), of a unit with axes right, forward, up. Heading clockwise from north, nose up, right wing down."""
     out = np.empty((3, 3))
     library().dcm(heading_rad, pitch_rad, roll_rad, out.ctypes.data)
     return out

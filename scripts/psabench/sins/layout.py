@@ -1,16 +1,16 @@
 """What the columns of somebody's file of increments are, as data: a layout in YAML (docs/sins_data.md).
 
-    gyro: [wx, wy, wz]          # names of columns; in a file of raw numbers: their places from 1
-    gyro_unit: deg/s            # rad, deg, arcsec: increments; rad/s, deg/s, deg/h: rates
-    accel: [ax, ay, az]
-    accel_unit: m/s2            # m/s: increments; m/s2, g, ug: specific force
-    time: t                     # where it has one
-    time_unit: s
-    interval_s: 0.01            # in place of the time column, or instead of the median of its steps
-    axes: "+x +y +z"            # the unit's x, y, z (right, forward, up) from the file's
-    format: float32             # float32, float64: little-endian rows; else by the file's ending
-    columns: 7                  # of a row of raw numbers
-    topic: /imu                 # of an MCAP file
+gyro: [wx, wy, wz]          # names of columns; in a file of raw numbers: their places from 1
+gyro_unit: deg/s            # rad, deg, arcsec: increments; rad/s, deg/s, deg/h: rates
+accel: [ax, ay, az]
+accel_unit: m/s2            # m/s: increments; m/s2, g, ug: specific force
+time: t                     # where it has one
+time_unit: s
+interval_s: 0.01            # in place of the time column, or instead of the median of its steps
+axes: "+x +y +z"            # the unit's x, y, z (right, forward, up) from the file's
+format: float32             # float32, float64: little-endian rows; else by the file's ending
+columns: 7                  # of a row of raw numbers
+topic: /imu                 # of an MCAP file
 """
 
 from __future__ import annotations
@@ -136,10 +136,11 @@ def layout_of(found: object) -> Layout:
         raise ValueError(expected(", ".join(Layout.__dataclass_fields__), unknown[0], "layout"))
     fields = dict(found)
     for name in ("gyro", "accel"):
-        if name in fields and not (isinstance(fields[name], list) and all(isinstance(x, str | int) for x in fields[name])):
-            raise ValueError(expected("a list of three columns", fields[name], name))
+        given = fields.get(name, [])
+        if not isinstance(given, list) or not all(isinstance(x, str | int) for x in given):
+            raise ValueError(expected("a list of three columns", given, name))
         if name in fields:
-            fields[name] = tuple(fields[name])
+            fields[name] = tuple(given)
     for name, kind in (("columns", int), ("axes", str), ("topic", str), ("interval_s", (int, float, type(None)))):
         if name in fields and not isinstance(fields[name], kind):
             raise ValueError(expected("a number" if name in ("columns", "interval_s") else "text", fields[name], name))

@@ -16,7 +16,7 @@ asammdf: Any = __import__("asammdf")  # before the bounds: how long it takes to 
 
 
 def columns_of(path: str, names: list[str]) -> np.ndarray:
-    """(n, columns); channels of one length. `time` stands for the time of the first channel where no channel has the name.
+    """(n, columns); channels of one length. `time` is the time of the first channel, where no channel has the name.
 
     Raises ValueError and whatever asammdf raises.
     """

@@ -28,7 +28,9 @@ def read_increments(path: Path, layout: Layout | None = None) -> Increments:
         raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
     read = _read_raw if given.format else READERS.get(path.suffix.lower())
     if read is None:
-        raise BadInput(expected(f"an ending of {' '.join(READERS)}, or a layout with format", path.suffix or "none", path))
+        raise BadInput(
+            expected(f"an ending of {' '.join(READERS)}, or a layout with format", path.suffix or "none", path)
+        )
     try:
         columns = read(path, given)
     except OSError as e:
@@ -37,12 +39,14 @@ def read_increments(path: Path, layout: Layout | None = None) -> Increments:
 
 
 def _in_si(columns: Floats, layout: Layout, path: Path) -> Increments:
-    """columns: (n, 6 or 7), as the layout names them. An interval that is given counts instead of that of the stamps, whose order
-    and gaps are looked at all the same."""
+    """columns: (n, 6 or 7), as the layout names them.
+
+    An interval that is given counts instead of that of the stamps, whose order and gaps are looked at all the same.
+    """
     if len(columns) == 0:
         raise BadInput(expected("rows of numbers", "none", path))
-    given_s = (layout.interval_s or 1.0) * np.arange(1, len(columns) + 1)
-    end_s = given_s if layout.time is None else columns[:, 6] * TIME_UNITS[layout.time_unit]
+    given_s: Floats = (layout.interval_s or 1.0) * np.arange(1, len(columns) + 1, dtype=np.float64)
+    end_s: Floats = given_s if layout.time is None else columns[:, 6] * TIME_UNITS[layout.time_unit]
     raw = Increments.of(end_s, columns[:, :3], columns[:, 3:6], where=path)
     dt_s = layout.interval_s or raw.dt_s
     gyro, gyro_rate = GYRO_UNITS[layout.gyro_unit]
@@ -60,7 +64,9 @@ def _read_raw(path: Path, layout: Layout) -> Floats:
     row = np.dtype("<f4" if layout.format == "float32" else "<f8").itemsize * layout.columns
     size = path.stat().st_size
     if size % row or size == 0:
-        raise BadInput(expected(f"whole rows of {layout.columns} {layout.format}, {row} bytes each", f"{size} bytes", path))
+        raise BadInput(
+            expected(f"whole rows of {layout.columns} {layout.format}, {row} bytes each", f"{size} bytes", path)
+        )
     if size // row > MOST_ROWS:
         raise BadInput(expected(f"{MOST_ROWS} rows at most", size // row, path))
     numbers = np.fromfile(path, "<f4" if layout.format == "float32" else "<f8").reshape(-1, layout.columns)
@@ -70,7 +76,9 @@ def _read_raw(path: Path, layout: Layout) -> Floats:
 def _places(names: Sequence[str | int], there: Sequence[str], path: Path) -> list[int]:
     missing = [str(n) for n in names if n not in there]
     if missing:
-        raise BadInput(expected(f"columns {', '.join(map(str, names))}", f"no {missing[0]} among {', '.join(there)[:200]}", path))
+        raise BadInput(
+            expected(f"columns {', '.join(map(str, names))}", f"no {missing[0]} among {', '.join(there)[:200]}", path)
+        )
     return [there.index(str(n)) for n in names]
 
 
@@ -101,7 +109,9 @@ def _read_mcap(path: Path, layout: Layout) -> Floats:
         try:
             found.append([_member(message, str(name)) for name in layout.names()])
         except (KeyError, TypeError, ValueError) as e:
-            raise BadInput(expected(f"numbers {', '.join(map(str, layout.names()))}", e, f"{path}: message {number}")) from e
+            raise BadInput(
+                expected(f"numbers {', '.join(map(str, layout.names()))}", e, f"{path}: message {number}")
+            ) from e
     if not found:
         raise BadInput(expected(f"messages of topic {layout.topic} in JSON", "none", path))
     return np.array(found, np.float64)

@@ -21,7 +21,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Flight:
-    """Place and attitude as functions of t, which may be complex: the imaginary step gives derivatives to the last digit."""
+    """Place and attitude as functions of t, which may be complex: an imaginary step gives exact derivatives."""
 
     def place(self, t: Floats) -> tuple[Floats, Floats, Floats]:
         lat = math.radians(55.7) + 2e-5 * t + 1e-5 * np.sin(t / 20)
@@ -30,7 +30,11 @@ class Flight:
 
     def angles(self, t: Floats) -> tuple[Floats, Floats, Floats]:
         """Heading, pitch, roll."""
-        return 1.0 + 0.5 * np.sin(t / 25) + 0.01 * t, 0.1 * np.sin(t / 7 + 1), 0.4 * np.sin(t / 11) + 0.01 * np.sin(3 * t)
+        return (
+            1.0 + 0.5 * np.sin(t / 25) + 0.01 * t,
+            0.1 * np.sin(t / 7 + 1),
+            0.4 * np.sin(t / 11) + 0.01 * np.sin(3 * t),
+        )
 
 
 def matrix(heading: Floats, pitch: Floats, roll: Floats) -> Floats:
@@ -99,9 +103,7 @@ def increments(flight: Flight, first_s: float, n: int) -> tuple[Floats, Floats]:
 def state(flight: Flight, t_s: float) -> State:
     t = np.array([t_s])
     lat, lon, h = (float(x[0]) for x in flight.place(t))
-    return State(
-        lat_rad=lat, lon_rad=lon, h_m=h, v_n_mps=velocity(flight, t)[0], C_nb=matrix(*flight.angles(t))[0]
-    )
+    return State(lat_rad=lat, lon_rad=lon, h_m=h, v_n_mps=velocity(flight, t)[0], C_nb=matrix(*flight.angles(t))[0])
 
 
 def test_a_flight_in_closed_form_comes_back() -> None:
@@ -133,8 +135,10 @@ def test_a_unit_at_rest_stays_for_an_hour() -> None:
 
 @pytest.mark.parametrize("height_fixed", [True, False])
 def test_python_ins_goes_the_same_way_for_an_hour(height_fixed: bool) -> None:
-    """On the same raw increments with the same formula of coning; limits 1 mm and 1e-6 m/s in the horizontal channel. With
-    the free vertical channel, ours and theirs differ by the digits of the ellipsoid's constants, which it makes grow."""
+    """On the same raw increments with the same formula of coning; limits 1 mm and 1e-6 m/s in the horizontal channel.
+
+    With the free vertical channel, both differ by the digits of the ellipsoid's constants, which it makes grow.
+    """
     import pandas as pd
     from pyins import strapdown as other
 
@@ -142,16 +146,20 @@ def test_python_ins_goes_the_same_way_for_an_hour(height_fixed: bool) -> None:
     t = DT_S * np.arange(n + 1)
     turn = np.stack([0.3 * np.sin(0.9 * t), 0.2 * np.sin(1.3 * t + 1), 0.1 * np.sin(0.1 * t)], -1) * DT_S
     push = np.stack([0.5 * np.sin(0.6 * t), 0.3 * np.cos(0.5 * t), 9.81 + 0.2 * np.sin(2 * t)], -1) * DT_S
-    to_other = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # right, forward, up: forward, right, down
+    to_other = np.array(
+        [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+    )  # right, forward, up: forward, right, down
     names = [f"{s}_{a}" for s in ("gyro", "accel") for a in "xyz"]
     imu = pd.DataFrame(np.hstack([turn @ to_other.T, push @ to_other.T]), index=t, columns=names)
-    began = dict(lat=55.7, lon=37.5, alt=150.0, VN=30.0, VE=-20.0, VD=0.0, roll=3.0, pitch=-5.0, heading=77.0)
-    theirs = other.Integrator(pd.Series(began), with_altitude=not height_fixed)
+    names_of_theirs = ["lat", "lon", "alt", "VN", "VE", "VD", "roll", "pitch", "heading"]
+    began = pd.Series([55.7, 37.5, 150.0, 30.0, -20.0, 0.0, 3.0, -5.0, 77.0], names_of_theirs)
+    theirs = other.Integrator(began, with_altitude=not height_fixed)
     seen = theirs.integrate(other.compute_increments_from_imu(imu, "increment")).iloc[-n:]
     C = strapdown.dcm(*np.radians([77.0, -5.0, 3.0]))
     lat, lon = np.radians([55.7, 37.5])
     unit = Strapdown(
-        State(lat_rad=lat, lon_rad=lon, h_m=150.0, v_n_mps=np.array([-20.0, 30.0, 0.0]), C_nb=C), height_fixed=height_fixed
+        State(lat_rad=lat, lon_rad=lon, h_m=150.0, v_n_mps=np.array([-20.0, 30.0, 0.0]), C_nb=C),
+        height_fixed=height_fixed,
     )
     unit._at.dtheta_rad[:], unit._at.dv_mps[:] = turn[0], push[0]  # the interval before, which theirs knows
     path = unit.advance(turn[1:], push[1:], DT_S)
@@ -174,6 +182,7 @@ def test_calls_of_one_interval_are_one_call_of_all() -> None:
 
 def test_coning_and_sculling_need_the_interval_before() -> None:
     """A coning motion of 0.1 rad at 5 Hz drifts about its axis unless neighbours are crossed."""
+
     def at(t: Floats) -> Rotation:
         return Rotation.from_rotvec(np.stack([0.1 * np.cos(10 * np.pi * t), 0.1 * np.sin(10 * np.pi * t), 0 * t], -1))
 

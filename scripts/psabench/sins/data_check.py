@@ -1,0 +1,137 @@
+"""What is wrong with a recording before anything is estimated from it, judged by the data alone.
+
+Sensors that stick or saturate, axes in another order, a unit that does not turn.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from psabench.sins.increments import Floats, Increments
+
+Ints = npt.NDArray[np.int64]
+
+CHANNELS = ("gyro x", "gyro y", "gyro z", "accelerometer x", "accelerometer y", "accelerometer z")
+STUCK_S = 1.0  # of equal values where neighbours differ elsewhere
+NOISY = 0.9  # share of neighbours that differ: below it equal values say nothing (a recording without noise)
+SATURATED = 5  # equal values in a row at the extreme of a channel
+STILL_RADPS = np.radians(0.1)  # 24 times the Earth's rate
+TURN_RAD = np.radians(30.0)  # that a recording needs before axes can be compared
+LOOK_S = 600.0  # of the recording that axes are compared in: a drift of 0.5 deg/h is 5' then
+WRONG_RAD, RIGHT_RAD = np.radians(5.0), np.radians(2.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """`refuse`: an estimate from this recording would be wrong; else it is worth a word."""
+
+    what: str
+    refuse: bool = True
+
+
+def findings(data: Increments) -> list[Finding]:
+    """Everything that is found, in the order of the list above."""
+    return [*_equal_values(data), *_no_turn(data), *_axes(data)]
+
+
+def _runs(x: Floats) -> tuple[Ints, Ints]:
+    """First row and length of each run of equal values."""
+    first = np.flatnonzero(np.append(True, np.diff(x) != 0.0))
+    return first.astype(np.int64), np.diff(np.append(first, len(x))).astype(np.int64)
+
+
+def _equal_values(data: Increments) -> list[Finding]:
+    found = []
+    for name, x in zip(CHANNELS, np.hstack([data.dtheta_rad, data.dv_mps]).T, strict=True):
+        first, length = _runs(x)
+        elsewhere = len(x) - int(length.max())
+        if len(first) < max(NOISY * elsewhere, len(x) / 10):
+            continue
+        k = int(length.argmax())
+        at_s = data.end_s[first[k]]
+        extreme = np.abs(x[first[k]]) == np.abs(x).max()
+        if length[k] >= SATURATED and extreme:
+            found.append(
+                Finding(what=f"{name} is at its limit for {length[k]} intervals from {at_s:.2f} s on: saturated")
+            )
+        elif length[k] * data.dt_s >= STUCK_S:
+            found.append(Finding(what=f"{name} sticks for {length[k] * data.dt_s:.2f} s from {at_s:.2f} s on"))
+    return found
+
+
+def _no_turn(data: Increments) -> list[Finding]:
+    second = max(1, round(1.0 / data.dt_s))
+    rows = len(data) // second * second
+    if rows == 0:
+        return [Finding(what=f"the recording has {len(data) * data.dt_s:.2f} s: expected 1 s or more")]
+    rate = np.linalg.norm(data.dtheta_rad[:rows].reshape(-1, second, 3).mean(axis=1), axis=1) / data.dt_s
+    if rate.max() >= STILL_RADPS:
+        return []
+    return [Finding(what=f"the unit does not turn: {np.degrees(rate.max()) * 3600:.0f} deg/h at most")]
+
+
+def _product(turns: Rotation) -> Rotation:
+    """Of all, in their order, in a tree."""
+    while len(turns) > 1:
+        odd = turns[-1:] if len(turns) % 2 else None
+        turns = turns[0 : len(turns) - len(turns) % 2 : 2] * turns[1::2]
+        turns = Rotation.concatenate([turns, odd]) if odd is not None else turns
+    return turns[0]
+
+
+def _attitudes(data: Increments) -> tuple[list[Rotation], Floats]:
+    """By the gyros, at the middle of each second against the beginning; and the mean specific force there, (n, 3)."""
+    half = max(1, round(0.5 / data.dt_s))
+    n = int(min(len(data), LOOK_S / data.dt_s)) // (2 * half)
+    at, found = Rotation.identity(), []
+    for k in range(n):
+        halves = [Rotation.from_rotvec(data.dtheta_rad[i * half : (i + 1) * half]) for i in (2 * k, 2 * k + 1)]
+        at = at * _product(halves[0])
+        found.append(at)
+        at = at * _product(halves[1])
+    force = data.dv_mps[: n * 2 * half].reshape(n, 2 * half, 3).mean(axis=1) / data.dt_s
+    return found, force
+
+
+def _axes(data: Increments) -> list[Finding]:
+    """At rest on the Earth the specific force keeps its direction in space: axes in another order break it."""
+    at, force = _attitudes(data)
+    if not at or max(x.magnitude() for x in at) < TURN_RAD:
+        return []
+    C = np.array([x.as_matrix() for x in at])
+    error = {name: _wander_rad(C, force @ turn.T) for name, turn in signed_axes()}
+    as_given = error["+x +y +z"]
+    best = min(error, key=lambda name: error[name])
+    if as_given < WRONG_RAD:
+        return []
+    wander = f"the force wanders by {np.degrees(as_given):.0f} deg against the gyros' attitude"
+    if error[best] > RIGHT_RAD:
+        return [Finding(what=f"{wander}: the unit does not rest on a table")]
+    return [Finding(what=f"{wander}: axes in another order; as {best} of the accelerometers they agree")]
+
+
+def _wander_rad(C: Floats, force: Floats) -> float:
+    """Largest angle between the force's direction, turned back, and its mean."""
+    back = np.einsum("nij,nj->ni", C, force)
+    back /= np.linalg.norm(back, axis=1)[:, None]
+    mean = back.mean(axis=0)
+    size = np.linalg.norm(mean)
+    if size < 0.5:
+        return float(np.pi)
+    return float(np.arccos(np.clip(back @ mean / size, -1.0, 1.0)).max())
+
+
+def signed_axes() -> list[tuple[str, Floats]]:
+    """All 48 orders and signs of three axes: name as in a layout, (3, 3)."""
+    found = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            found.append((" ".join(f"{'-+'[s > 0]}{'xyz'[i]}" for s, i in zip(signs, order, strict=True)), matrix))
+    return found

@@ -1,0 +1,68 @@
+"""Recordings that are wrong in one way each, and good ones: what is said of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from psabench.sins.data_check import findings, signed_axes
+from psabench.sins.increments import Increments
+from scipy.spatial.transform import Rotation
+
+DT_S, G_MPS2 = 0.01, 9.81
+
+
+def recording(noise: float = 1.0, turn_dps: float = 10.0) -> Increments:
+    """Rest of 2 s, turn of 9 s about x, which points north, rest; seed 5."""
+    n, rng = 1300, np.random.default_rng(5)
+    rate = np.zeros((n, 3))
+    rate[200:1100, 0] = np.radians(turn_dps)
+    turned = Rotation.from_rotvec(np.cumsum(rate * DT_S, axis=0))
+    force = (turned.inv() * Rotation.from_euler("y", 5, degrees=True)).apply([0.0, 0.0, G_MPS2])
+    return Increments(
+        end_s=DT_S * np.arange(1, n + 1),
+        dt_s=DT_S,
+        dtheta_rad=(rate + noise * rng.normal(0, 1e-6, (n, 3))) * DT_S,
+        dv_mps=(force + noise * rng.normal(0, 1e-3, (n, 3))) * DT_S,
+    )
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_nothing_is_said_of_a_good_recording(noise: float) -> None:
+    assert findings(recording(noise)) == []
+
+
+def test_a_stuck_and_a_saturated_channel_are_named() -> None:
+    good = recording()
+    stuck = good.dtheta_rad.copy()
+    stuck[500:700, 1] = stuck[500, 1]
+    assert [f.what for f in findings(replace(good, dtheta_rad=stuck))] == ["gyro y sticks for 2.00 s from 5.01 s on"]
+    limited = np.clip(good.dv_mps, -0.5 * G_MPS2 * DT_S, 0.5 * G_MPS2 * DT_S)
+    said = [f.what for f in findings(replace(good, dv_mps=limited))]
+    assert any(s.startswith("accelerometer z is at its limit for ") and s.endswith("saturated") for s in said)
+
+
+def test_a_unit_that_does_not_turn() -> None:
+    said = findings(recording(turn_dps=0.0))
+    assert [f.what[:24] for f in said] == ["the unit does not turn: "]
+    assert said[0].refuse
+
+
+@pytest.mark.parametrize("name", [name for name, _ in signed_axes()][1::5])
+def test_another_order_of_axes_is_found_with_the_right_one(name: str) -> None:
+    """Where a recording cannot tell two orders apart, one of those that agree is named: it turns the force back."""
+    good, wrong = recording(), dict(signed_axes())[name]
+    (said,) = findings(replace(good, dv_mps=good.dv_mps @ wrong.T))
+    assert said.refuse
+    named = said.what.split("; as ")[1].split(" of ")[0]
+    repaired = replace(good, dv_mps=good.dv_mps @ wrong.T @ dict(signed_axes())[named].T)
+    assert findings(repaired) == []
+
+
+def test_a_unit_that_is_carried_about_is_no_calibration() -> None:
+    good = recording()
+    pushed = good.dv_mps.copy()
+    pushed[600:, 1] += 3.0 * DT_S
+    (said,) = findings(replace(good, dv_mps=pushed))
+    assert "does not rest on a table" in said.what
