@@ -158,7 +158,7 @@ def read_mcap(path: Path) -> Iterator[can.Message]:
 
 
 def json_messages(path: Path, topic: str) -> Iterator[object]:
-    """Those of a topic, parsed, in the order of the file. Raises BadInput for a damaged file, after what is before it."""
+    """Those of a topic, parsed, in the order of the file. Raises BadInput for a damaged file, after those before it."""
     yield from _messages(path, topic, lambda parsed: parsed)
 
 
