@@ -43,6 +43,16 @@ static enum control_outcome do_unit_reset(const struct control_call *call)
     return CONTROL_DONE;
 }
 
+static enum control_outcome do_unit_sensors(const struct control_call *call)
+{
+    const struct control_bench *b = call->bench;
+    const char *why;
+    struct unit *u = b->unit[call->v[0].unit];
+    control_settle_inputs(b, call->t_ns);
+    if (unit_exchange_sensors(u, (uint32_t)call->v[1].count, call->t_ns, &why)) return CONTROL_DONE;
+    return control_reject(call->control, "state", "unit %s: %s", u->cfg.name, why);
+}
+
 static enum control_outcome do_frames(const struct control_call *call)
 {
     describe_clients(call->bench, call->result);
@@ -98,6 +108,9 @@ static const struct control_command rows[] = {
     {"units", "Lists the units: name, board type, serial number, CAN node, profile.", NULL, .run = describe_units},
     {"endpoints", "Lists the endpoints as the ready lines do: CAN adapters, instruments, line port, sockets.", NULL, .run = do_endpoints},
     {"unit.reset", "Resets a unit (PSA-2: a pulse on Res).", CONTROL_ARGS(CONTROL_UNIT_ARG(true)), .run = do_unit_reset, .changes = true},
+    {"unit.sensors", "Exchanges the quartz sensors of a unit for those of another serial number of its batch, as warm as they are; the board stays.",
+     CONTROL_ARGS(CONTROL_UNIT_ARG(false),
+      {"serial", CONTROL_COUNT, false, NULL, 1, 4294967295.0, .what = "serial number that the sensors are drawn by, with their noise and their starts"}), .run = do_unit_sensors, .changes = true},
     {"quit", "Terminates the emulator as SIGTERM does.", NULL, .run = do_quit},
 };
 // clang-format on

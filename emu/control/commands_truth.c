@@ -48,6 +48,7 @@ static void add_unit_truth(struct unit *u, cJSON *to, int64_t t_ns)
     static const char *const axis[] = {"x", "y", "z"};
     cJSON_AddStringToObject(to, "board", u->type->name);
     add_count(to, "serial", u->cfg.board.serial);
+    if (u->sensors_serial != u->cfg.board.serial) add_count(to, "sensors_serial", u->sensors_serial);
     add_count(to, "node", u->cfg.node);
     cJSON_AddStringToObject(to, "profile", u->profile);
     add_noise(u, to);

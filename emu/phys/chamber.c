@@ -124,6 +124,14 @@ enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_
     return CHAMBER_OK;
 }
 
+/* Where it stands already it stays, whatever its controller would do on the way. */
+void chamber_renew(struct chamber *c, struct chamber_body *b, int64_t t_ns)
+{
+    assert(chamber_stable(c, t_ns));
+    plan_ramp(c, c->set_degc, t_ns);
+    chamber_body_forget(b);
+}
+
 void chamber_hinder(struct chamber *c, double rate_part, int64_t t_ns)
 {
     assert(rate_part > 0.0);

@@ -100,6 +100,9 @@ enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_
 /* It follows the element of a body from power-on, where it is as warm; half_k at least 0. */
 void chamber_play_add(struct chamber_body *b, struct chamber_play *p, double half_k);
 
+/* What is in the body is exchanged: no thermal cycle, no play taken, as warm as what was there. The chamber is stable. */
+void chamber_renew(struct chamber *c, struct chamber_body *b, int64_t t_ns);
+
 /* Faults: the air makes this part of its ramp from now on (above 0; 1: none); it goes so far past its set point, but no farther
  * than the step and -100 to 200 degC, and comes back with its ramp (0: none); the thermometer reads so much more (0: none). */
 void chamber_hinder(struct chamber *c, double rate_part, int64_t t_ns);

@@ -201,6 +201,13 @@ void chamber_body_arrive(const struct chamber *c, struct chamber_body *b, int64_
     b->case_degc[0] = case_degc;
 }
 
+void chamber_body_forget(struct chamber_body *b)
+{
+    b->cycles = (struct chamber_cycles){0};
+    count_cycles(&b->cycles, b->element_degc[0]);
+    for (struct chamber_play *p = b->plays; p; p = p->next) p->felt_degc = b->element_degc[0];
+}
+
 void chamber_body_plan(const struct chamber *c, struct chamber_body *b)
 {
     for (unsigned i = 0; i + 1 < c->legs; i++) {

@@ -16,4 +16,7 @@ static inline unsigned chamber_leg_at(const struct chamber *c, double t_s)
 void chamber_body_arrive(const struct chamber *c, struct chamber_body *b, int64_t t_ns);
 void chamber_body_plan(const struct chamber *c, struct chamber_body *b);
 
+/* At the instant of the latest command: what the body has been through is over. */
+void chamber_body_forget(struct chamber_body *b);
+
 #endif

@@ -45,6 +45,7 @@ static void draw_unit(const struct scenario *s, struct scenario_unit *u)
         draw_parameters(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
         if (s->spread.quartz_given && u->cfg.axis[i].sensor == UNIT_QUARTZ) draw_quartz(s, serial, i, &u->cfg.axis[i]);
     }
+    if (s->spread.quartz_given) u->cfg.batch = &s->spread.quartz;
 }
 
 void scenario_bind(struct scenario *s)

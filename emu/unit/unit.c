@@ -303,17 +303,27 @@ static void init_board(struct unit *u, struct sched *s)
     u->board->type = u->type;
 }
 
+/* Draws are keyed by the sensor's own number, so that it has the same noise and the same starts on any board. */
+static void init_quartz(struct unit *u, unsigned axis)
+{
+    static const char *const noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
+    static const char *const scatter[UNIT_AXES] = {"quartz.start.x", "quartz.start.y", "quartz.start.z"};
+    const uint64_t seed = u->cfg.board.seed;
+    quartz_init(&u->quartz[axis], &u->cfg.axis[axis].quartz, u->lab->site.g_mps2,
+                draws_of(seed, u->sensors_serial, noise[axis]), draws_of(seed, u->sensors_serial, scatter[axis]));
+}
+
 void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
     static const char *const slow_noise[UNIT_AXES] = {"mems.slow.x", "mems.slow.y", "mems.slow.z"};
-    static const char *const quartz_noise[UNIT_AXES] = {"quartz.x", "quartz.y", "quartz.z"};
-    static const char *const quartz_scatter[UNIT_AXES] = {"quartz.start.x", "quartz.start.y", "quartz.start.z"};
     u->cfg = *cfg;
     u->lab = lab;
     u->type = cfg->type;
     u->board = (struct board *)&u->store;
     u->can = NULL;
+    u->on = false;
+    u->sensors_serial = cfg->board.serial;
     u->observers = u->next_observer = NULL;
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         u->sensor_faults[i] = NULL;
@@ -321,9 +331,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
         mems_init(&u->mems[i], &m, draws_of(cfg->board.seed, cfg->board.serial, noise[i]),
                   draws_of(cfg->board.seed, cfg->board.serial, slow_noise[i]));
-        quartz_init(&u->quartz[i], &cfg->axis[i].quartz, lab->site.g_mps2,
-                    draws_of(cfg->board.seed, cfg->board.serial, quartz_noise[i]),
-                    draws_of(cfg->board.seed, cfg->board.serial, quartz_scatter[i]));
+        init_quartz(u, i);
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
         const struct det_pair alpha0 = det_sin_cos(alpha0_rad);
@@ -346,6 +354,7 @@ void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bu
 
 void unit_power_up(struct unit *u, int64_t t_ns)
 {
+    u->on = true;
     for (unsigned i = 0; i < UNIT_AXES; i++) quartz_start(&u->quartz[i]);
     u->type->power_up(u->board, t_ns);
     if (u->can) u->type->can->power_up(u->can, t_ns);
@@ -353,6 +362,7 @@ void unit_power_up(struct unit *u, int64_t t_ns)
 
 void unit_power_down(struct unit *u, int64_t t_ns)
 {
+    u->on = false;
     u->type->power_down(u->board, t_ns);
     if (u->can) u->type->can->power_down(u->can);
 }
@@ -372,6 +382,37 @@ void unit_reseed(struct unit *u, uint64_t seed, int64_t t_ns)
         quartz_reseed(&u->quartz[i], seed);
     }
     board_reseed(u->board, seed);
+}
+
+/* Why sensors cannot be exchanged; NULL: they can. */
+static const char *why_kept(const struct unit *u, int64_t t_ns)
+{
+    bool any = false;
+    if (!u->cfg.batch) return "its sensors are of no batch: expected spread: true, and quartz in the scenario's spread";
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        any |= is_quartz(u, i);
+        if (u->sensor_faults[i]) return "one of its sensors has a fault; clear it first";
+    }
+    if (!any) return "it has no quartz sensor";
+    if (u->lab->chamber.cfg.present && !chamber_stable(&u->lab->chamber, t_ns))
+        return "the chamber is on its way to its set point";
+    return NULL;
+}
+
+bool unit_exchange_sensors(struct unit *u, uint32_t serial, int64_t t_ns, const char **why)
+{
+    *why = why_kept(u, t_ns);
+    if (*why) return false;
+    u->sensors_serial = serial;
+    for (unsigned i = 0; i < UNIT_AXES; i++) {
+        if (!is_quartz(u, i)) continue;
+        (void)quartz_batch_draw(u->cfg.batch, u->cfg.board.seed, serial, i, &u->cfg.axis[i].quartz);
+        init_quartz(u, i);
+        u->warm_step[i] = -1;
+        if (u->on) quartz_start(&u->quartz[i]);
+    }
+    if (u->lab->chamber.cfg.present) chamber_renew(&u->lab->chamber, &u->body, t_ns);
+    return true;
 }
 
 const char *unit_why_eager(struct unit *u, int64_t t_ns)

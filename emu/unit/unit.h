@@ -9,7 +9,7 @@
 #include "phys/lab.h"
 #include "phys/sensor/fault.h"
 #include "phys/sensor/mems.h"
-#include "phys/sensor/quartz.h"
+#include "phys/sensor/quartz_batch.h"
 #include "phys/sensor/series.h"
 #include "unit/boards.h"
 
@@ -37,6 +37,7 @@ struct unit_cfg {
     struct unit_axis_cfg axis[UNIT_AXES];
     double temp_degc[UNIT_TEMPS];     /* where the lab has no chamber */
     double tau_case_s, tau_element_s; /* in the chamber; 0: the chamber's own */
+    const struct quartz_batch *batch; /* of which its quartz sensors are; kept by pointer; NULL: of none */
     struct lab_mounting mounting;
     uint8_t node; /* CAN node id, for those above */
 };
@@ -52,6 +53,8 @@ struct unit {
     struct unit_cfg cfg;
     struct lab *lab;
     struct chamber_body body;
+    bool on;                      /* it has power */
+    uint32_t sensors_serial;      /* the board's, until its sensors are exchanged */
     int64_t warm_step[UNIT_AXES]; /* at which the sensor's temperature was taken */
     const struct board_type *type;
     struct board *board; /* in store, of the type */
@@ -84,6 +87,10 @@ void unit_power_down(struct unit *u, int64_t t_ns);
 void unit_sample_until(struct unit *u, int64_t t_ns); /* before the physics change abruptly */
 void unit_reseed(struct unit *u, uint64_t seed,
                  int64_t t_ns); /* noise from t_ns on and later starts alone; unit_sample_until() before it */
+/* Other quartz sensors on the same board: those with this serial number of its batch, from the shelf, as warm as the ones that
+ * they replace; from here on they give what they would give in a unit of that number. False, with the reason: they are of no
+ * batch, one has a fault, the chamber is under way. unit_sample_until() before it. */
+bool unit_exchange_sensors(struct unit *u, uint32_t serial, int64_t t_ns, const char **why);
 /* Why it computes what no one looks at from t_ns on; NULL: it does not. */
 const char *unit_why_eager(struct unit *u, int64_t t_ns);
 struct trace *unit_trace(const struct unit *u);
