@@ -1,4 +1,7 @@
-"""Units of a run-in on the bench: an emulator each, chamber, head and supply over SCPI, PSA-2 over CAN.
+"""Units of a run-in on the bench: chamber, head and supply over SCPI, PSA-2 over CAN.
+
+One bench is started and forked for each unit: the child has noise and head errors of a seed of its own, and on its
+board the sensors of that serial number, to the bit as in a bench that was started with them.
 
 The same serial numbers, course and starts as on the sensor model, with all that a bench adds: the converter with its
 offset, noise and reference, the head's setting error. What a change from start to start may differ by:
@@ -16,7 +19,8 @@ The unit is off during a cycle.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,6 +34,7 @@ from psabench.errors import BenchError
 from psabench.native.quartz_model import Readings
 from psabench.places import find_emulator, proto_file
 from psabench.quartz.batch import QUANTITIES
+from psabench.quartz.draws import draw_source
 from psabench.quartz.plate import Array
 from psabench.quartz.run_in import Chain, RunIn, estimate_units
 
@@ -37,13 +42,15 @@ SCENARIO = "scenarios/quartz_chamber.yaml"
 FILES = (SCENARIO, "psabench.dbc", "psa2.eds")
 HEAD_DEG = (270.0, 90.0, 180.0, 0.0)  # g along +x, -x, +y, -y of the unit
 SAMPLE_HZ = 1000.0
+LOAD_OHM = 937.5  # of the scenario
+FORK_SEEDS = 2**53  # that `fork` takes
 SETTLE_S, OFF_S = 1.0, 1.0
 LOOKS, NEAR_S = 20, 10.0  # at a chamber on its way; a way that is worth no look
 HEAD_ARCSEC = 2.0  # setting error of the scenario's head, rms
 BATCHES = 20  # of a reading, for its type A uncertainty
 
 
-def make_scenario(what: RunIn, serial: int) -> dict[str, Any]:
+def make_scenario(what: RunIn, serial: int = 1) -> dict[str, Any]:
     """The shipped scenario with this unit, course and batch."""
     import yaml
 
@@ -60,8 +67,10 @@ def make_scenario(what: RunIn, serial: int) -> dict[str, Any]:
 
 
 def measure_wire(what: RunIn, first_serial: int, units: int) -> tuple[Array, Array]:
-    """As `measure_model`, through the wire; the uncertainties include the bench's."""
-    found = [read_unit(what, first_serial + k) for k in range(units)]
+    """As `measure_model`, through the wire; the uncertainties include the bench's. Raises BenchError."""
+    with start_bench(make_scenario(what), what.seed) as warm:
+        warm.unit.wait_ready()
+        found = [_read_forked(warm, what, first_serial + k) for k in range(units)]
     values, noise = estimate_units(
         Readings(mean_a=np.stack([r.mean_a for r in found]), sd_a=np.stack([r.sd_a for r in found]))
     )
@@ -69,21 +78,30 @@ def measure_wire(what: RunIn, first_serial: int, units: int) -> tuple[Array, Arr
     return values, np.hypot(noise, bench)
 
 
-def read_unit(what: RunIn, serial: int) -> Readings:
-    """Every start of one unit, (starts, positions). Raises BenchError."""
+@contextmanager
+def start_bench(scenario: Mapping[str, Any], seed: int) -> Iterator[Bench]:
+    """An emulator with this scenario."""
     import yaml
 
     with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
         path = Path(folder) / "unit.yaml"
-        scenario = make_scenario(what, serial)
         path.write_text(yaml.dump(scenario, Dumper=yaml.SafeDumper), encoding="utf-8")
-        load_ohm = float(scenario["units"][0]["axes"]["x"]["afe"]["load_ohm"])
-        with Bench.start(path, seed=what.seed) as bench:
-            for _ in range(serial):  # the head's errors are of the seed and its turns: another series for each unit
-                bench.head.turn(HEAD_DEG[0])
-            starts = [_read_start(bench, what, n) for n in range(what.schedule.cycles + 1)]
-    volts = np.array(starts)
-    return Readings(mean_a=volts[..., 0] / load_ohm, sd_a=volts[..., 1] / load_ohm)
+        with Bench.start(path, seed=seed) as bench:
+            yield bench
+
+
+def _read_forked(warm: Bench, what: RunIn, serial: int) -> Readings:
+    """The same whichever units were measured before."""
+    seed = int(draw_source(what.seed, f"run-in bench {serial}").integers(FORK_SEEDS))
+    with warm.fork(seed=seed) as bench:
+        bench.exchange_sensors(serial)
+        return read_unit(bench, what)
+
+
+def read_unit(bench: Bench, what: RunIn) -> Readings:
+    """Every start of the unit on the bench, (starts, positions). Raises BenchError."""
+    volts = np.array([_read_start(bench, what, n) for n in range(what.schedule.cycles + 1)])
+    return Readings(mean_a=volts[..., 0] / LOAD_OHM, sd_a=volts[..., 1] / LOAD_OHM)
 
 
 def _read_start(bench: Bench, what: RunIn, cycle: int) -> Sequence[tuple[float, float]]:
@@ -133,7 +151,7 @@ def wire_digest() -> str:
     return builds.digest([find_emulator(), *map(proto_file, FILES), *builds.sources("psabench.quartz.run_in_wire")])
 
 
-WIRE = Chain(name="through the wire", part_units=1, unit_s=30.0, digest=wire_digest, measure=measure_wire)
+WIRE = Chain(name="through the wire", part_units=10, unit_s=1.5, digest=wire_digest, measure=measure_wire)
 
 
 # ---- beside the model
