@@ -150,3 +150,4 @@ def test_children_measure_what_starts_with_the_same_sensors_measure() -> None:
         print(f"{q}: forked {rms[0]:.2f}, started {rms[1]:.2f} u, p {found.pvalue:.3f}", file=sys.stderr)
         assert max(rms) < 1.6, (q, rms)
         assert found.pvalue > 1e-4
+        assert forked[:, k].std(ddof=1) > 0.5, q  # children of one seed would share the errors of the head

@@ -280,6 +280,13 @@ def test_changes_that_differ_by_more_than_their_uncertainty_are_out_of_limits() 
     assert run_in_figures.wire_checks(found[:1]) == []  # too few to tell
 
 
+def test_a_unit_through_the_wire_is_the_same_whichever_came_before_it() -> None:
+    what = RunIn(schedule=Schedule(cycles=1, reading_s=0.04), batch=BATCH, seed=3)
+    three, third = run_in_wire.measure_wire(what, 1, 3), run_in_wire.measure_wire(what, 3, 1)
+    for whole, alone in zip(three, third, strict=True):
+        np.testing.assert_array_equal(whole[2:], alone)
+
+
 def test_a_unit_through_the_wire_changes_as_the_model_does(tmp_path: Path) -> None:
     """One unit, two starts with a cycle between: PSA-2 over CAN; chamber, head and supply over SCPI."""
     what = RunIn(schedule=Schedule(cycles=1), batch=BATCH, seed=3)
