@@ -11,6 +11,7 @@ static const struct {
 } places[FAULT_PLACES] = {
     [FAULT_AT_SENSOR] = {"UNIT.sensor.x|y|z", "the output of a sensor"},
     [FAULT_AT_AFE] = {"UNIT.afe.x|y|z", "the analog chain of a channel"},
+    [FAULT_AT_TEMP] = {"UNIT.temp.x|y|z|board", "a temperature sensor"},
     [FAULT_AT_CHIP] = {"UNIT.CHIP", "a chip of a board"},
     [FAULT_AT_CONTROLLER] = {"UNIT.CONTROLLER", "the controller of a board"},
     [FAULT_AT_LINE] = {"UNIT.line.NAME", "a line of a board"},
@@ -42,7 +43,7 @@ static const struct {
     enum fault_place place;
     const char *infix;
 } of_unit[] = {
-    {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},   {FAULT_AT_CHIP, ""},
+    {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},    {FAULT_AT_TEMP, "temp."}, {FAULT_AT_CHIP, ""},
     {FAULT_AT_CONTROLLER, ""},    {FAULT_AT_LINE, "line."}, {FAULT_AT_NODE, "can"},
 };
 
@@ -56,6 +57,8 @@ static const char *point_suffix(const struct board_type *t, enum fault_place pla
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
         return axis[index];
+    case FAULT_AT_TEMP:
+        return t->temps[index];
     case FAULT_AT_CHIP:
     case FAULT_AT_CONTROLLER:
         return t->parts[index].name;
@@ -66,6 +69,13 @@ static const char *point_suffix(const struct board_type *t, enum fault_place pla
     }
 }
 
+static unsigned temp_count(const struct board_type *t)
+{
+    unsigned n = 0;
+    while (t->temps && t->temps[n]) n++;
+    return n;
+}
+
 /* Indices at a place of a board: from `first`, `count` of them. */
 static unsigned index_count(const struct board_type *t, enum fault_place place, unsigned *first)
 {
@@ -74,6 +84,8 @@ static unsigned index_count(const struct board_type *t, enum fault_place place, 
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
         return t->analog ? UNIT_AXES : 0;
+    case FAULT_AT_TEMP:
+        return temp_count(t);
     case FAULT_AT_CHIP:
         return t->part_count - 1;
     case FAULT_AT_LINE:

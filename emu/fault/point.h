@@ -9,6 +9,7 @@
 enum fault_place {
     FAULT_AT_SENSOR,     /* a.sensor.x */
     FAULT_AT_AFE,        /* a.afe.x */
+    FAULT_AT_TEMP,       /* a.temp.x: by the row of board_type.temps */
     FAULT_AT_CHIP,       /* a.adc.x, a.tadc: board_type.parts but the first */
     FAULT_AT_CONTROLLER, /* a.kpsa: the first */
     FAULT_AT_LINE,       /* a.line.Int */

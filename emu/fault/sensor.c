@@ -152,6 +152,28 @@ static void reseed_sensor(struct fault *f, uint64_t seed, int64_t t_ns)
     draws_reseed(&f->as.sensor.noise, seed);
 }
 
+/* ---- temperature sensors */
+
+static bool reads_temp(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    const unsigned count = u->type->temp_count(u->board);
+    if (f->point.index < count) return true;
+    return why_fail(why, CONTROL_WHY_MAX, "%s: expected one of the %u channels that the board scans", f->name, count);
+}
+
+static void refresh_temps(struct fault *f, int64_t t_ns)
+{
+    struct unit *u = settled_unit(f, t_ns);
+    uint32_t open = 0;
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        const bool of_unit = other->point.place == FAULT_AT_TEMP && other->point.unit == f->point.unit;
+        if (other->id && other->state == FAULT_ACTIVE && of_unit) open |= UINT32_C(1) << other->point.index;
+    }
+    u->type->open_temps(u->board, open);
+}
+
 // clang-format off
 #define SENSOR(v) .variant = (v), .places = FAULT_BIT(FAULT_AT_SENSOR), .apply = apply_sensor, .lift = lift_sensor, .reseed = reseed_sensor
 static const struct fault_kind sensor[] = {
@@ -165,6 +187,8 @@ static const struct fault_kind sensor[] = {
      SENSOR(SENSOR_SCALE), .need = FAULT_BIT(FAULT_SCALE_PPM), .nonzero = FAULT_BIT(FAULT_SCALE_PPM), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_scale},
     {"sensor.noise", "Adds white noise of rms rms_v in a settled reading at 1000 SPS.", "more scatter in the codes of the axis",
      SENSOR(SENSOR_NOISE), .need = FAULT_BIT(FAULT_RMS_V), .unless = "the channel has no sensor; it is less than a code of the board", .fits = seen_volts},
+    {"sensor.open", "The lead of a temperature sensor is open: no current, the load alone is left at the input.", "the temperature codes of that channel stay near 0, which is 0 K",
+     .places = FAULT_BIT(FAULT_AT_TEMP), .unless = "the profile does not scan that channel", .fits = reads_temp, .lift = refresh_temps},
     {"sensor.saturation", "The sensor output saturates at low_v and high_v.", "the codes of the axis stop below the converter's full scale",
      SENSOR(SENSOR_SATURATION), .may = FAULT_BIT(FAULT_LOW_V) | FAULT_BIT(FAULT_HIGH_V), .unless = "the channel has no sensor; low_v is not below high_v; a limit is beyond what the chain passes", .fits = has_limits},
 };

@@ -165,6 +165,19 @@ static void digest(const struct board *board, struct sha256 *s)
     add_ads1256(s, &b->tadc);
 }
 
+static const char *const temps[] = {"x", "y", "z", "board", NULL};
+
+static unsigned temp_count(const struct board *board)
+{
+    const unsigned scanned = ((const struct psa2 *)board)->profile.temp_channels, there = sizeof temps / sizeof *temps - 1;
+    return scanned < there ? scanned : there;
+}
+
+static void open_temps(struct board *board, uint32_t open)
+{
+    ((struct psa2 *)board)->open_temps = open;
+}
+
 static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};
 
 static const struct board_controller_fault controller_faults[] = {
@@ -187,6 +200,9 @@ const struct board_type psa2_board = {
     .frame_line = PSA2_LINE_INT,
     .pulse_line = PSA2_LINE_CLK,
     .pulses = pulses,
+    .temps = temps,
+    .temp_count = temp_count,
+    .open_temps = open_temps,
     .analog = true,
     .why_eager = why_eager,
     .noises = list_noises,

@@ -22,6 +22,7 @@ double psa2_temp_ain_v(void *ctx, unsigned ain, int64_t t_ns)
 {
     const struct psa2 *b = ctx;
     if (ain >= SENSORS || ain >= b->profile.temp_channels) return 0.0;
+    if (b->open_temps >> ain & 1) return 0.0; /* no current: the load alone holds the input at AINCOM */
     return psa2_temp_v(b, b->base.io.temp_degc(b->base.io.ctx, ain, t_ns));
 }
 

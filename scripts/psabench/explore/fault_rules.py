@@ -40,6 +40,7 @@ RULES: Mapping[str, Rule] = {
     "sensor.bias": Rule(VALUES, {"bias_v": (0.1, -2.0)}),
     "sensor.drift": Rule(VALUES, {"drift_v_per_s": (1.0, -5.0)}),
     "sensor.noise": Rule(VALUES, {"rms_v": (0.01, 1.0)}),
+    "sensor.open": Rule(VALUES, {}),
     "sensor.saturation": Rule(VALUES, {"low_v": (-0.5,), "high_v": (0.5,)}),
     "analog.reference": Rule(VALUES, {"reference_ppm": (10_000, -100_000)}),
     "analog.ripple": Rule(VALUES, {"amplitude_v": (0.1, 1.0), "frequency_hz": (20.0, 400.0)}),

@@ -46,6 +46,7 @@ SCENARIO = HERE / "faults_boards.yaml"
 SETUP_S = 0.5
 # What must be accepted; everything else must be refused.
 ACCEPTED = {
+    "sensor.open": r"none",
     "sensor": r"[dmp]\.sensor\.[xyz]",
     "analog.load_open": r"[dmp]\.afe\.z",
     "analog.load_short": r"[dmp]\.afe\.z",

@@ -94,6 +94,20 @@ def sensor_saturation(c: Case) -> None:
     near(c.mean_v(), limit_v, 1e-3)
 
 
+@DETECT.look("sensor.open")
+def sensor_open(c: Case) -> None:
+    """Of all channels that one alone; the inputs do not feel it."""
+    channel = ["x", "y", "z", "board"].index(c.point.split(".")[-1])
+    healthy = c.settled(0.1)
+    c.add()
+    c.watch(0.1)  # each channel once
+    seen = c.watch(0.1)
+    for k, codes in seen.temperatures().items():
+        near(float(np.mean(codes)), 0.0 if k == channel else float(np.mean(healthy.temperatures()[k])), 30)
+    assert min(abs(x) for x in healthy.temperatures()[channel]) > 1000
+    near(seen.mean_v(0), healthy.mean_v(0), 1e-4)
+
+
 @DETECT.look("analog.load_open")
 def load_open(c: Case) -> None:
     c.add()
@@ -407,6 +421,7 @@ def line_extra_pulse(c: Case) -> None:
 
 # What must be accepted; everything else must be refused.
 ACCEPTED = {
+    "sensor.open": r"[ab]\.temp\.(x|y|z|board)",
     "sensor": r"[ab]\.sensor\.[xyz]",
     "analog.load_open": r"b\.afe\.[xyz]",
     "analog.load_short": r"b\.afe\.[xyz]",

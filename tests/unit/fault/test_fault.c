@@ -281,7 +281,7 @@ static void points_have_names_of_their_own(void **state)
         assert_true(fault_point_find(&r.view, name, &q, found));
         if (p.place != q.place || p.unit != q.unit || p.index != q.index) fail_msg("%s is %s", name, found);
     }
-    assert_int_equal(n, UNITS * (9 + 16 + 3) + 1 + 1 + 1 + 3 + 1 +
+    assert_int_equal(n, UNITS * (9 + 16 + 3 + 4) + 1 + 1 + 1 + 3 + 1 +
                             2); /* bus, client, supply, platform, head, its link and the supply's */
     assert_true(fault_point_find(&r.view, "b.line.CLK", &p, name));
     assert_int_equal(p.unit, 1);
