@@ -41,7 +41,8 @@ class _Followed:
 
 class Compensator:
     """Takes the readings of one log, some at a time. clamped: how many were outside of a curve's range; blind: how many
-    came before a temperature of the case that its sensor can have.
+    came before a temperature of the case that its sensor can have; open: how many had one that it cannot have, so that
+    the last one holds.
 
     filter_gain: of the converters at DC, which a thermal run takes out of its readings, too (`Psa2.filter_gain`).
     """
@@ -53,7 +54,7 @@ class Compensator:
         self._curves, self._gain = curves, filter_gain
         self._taus = {c.lag.tau_s for c in curves.values() if c.lag}
         self._past: _Followed | None = None
-        self.clamped = self.blind = 0
+        self.clamped = self.blind = self.open = 0
 
     def accelerations_g(self, frames: Frames) -> Array:
         """Along the axes of the case, g, (n, 3); NaN up to the first temperature of the case.
@@ -78,7 +79,9 @@ class Compensator:
                 expected("frames with temperatures, as each form but 1 (fast) has them", "none", "--passport")
             )
         degc = frames.temp_degc  # NaN, or near 0 K, where the sensor is open
-        told = (frames.temp_channel == CASE_CHANNEL) & (degc >= SENSOR_LOW_C) & (degc <= SENSOR_HIGH_C)
+        of_case = frames.temp_channel == CASE_CHANNEL
+        told = of_case & (degc >= SENSOR_LOW_C) & (degc <= SENSOR_HIGH_C)
+        self.open += int(np.count_nonzero(of_case & ~told))
         known_t, known_c = t_s[told], frames.temp_degc[told]
         if self._past is not None:
             known_t, known_c = np.append(self._past.t_s, known_t), np.append(self._past.case_c, known_c)

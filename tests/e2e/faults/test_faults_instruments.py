@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from psabench import Bench, instruments
 from psabench.errors import BenchError, LinkError, TimeOut
+from psabench.thermal.bench import WireThermal
 from rig import HOST, TIMEOUT_S
 
 pytestmark = HOST
@@ -193,6 +194,29 @@ def test_a_snapshot_and_a_fork_keep_them(tmp_path: Path) -> None:
         assert again.control.call("fault.list").result == listed
         with pytest.raises(TimeOut, match="head: 90 deg not reached"):
             again.head.turn(90.0)
+
+
+@pytest.mark.parametrize(("sensor", "channel"), [("x", "x"), ("y", "y"), ("z", "z"), ("board", "case")])
+def test_a_thermal_run_names_the_temperature_sensor_that_is_open(sensor: str, channel: str, tmp_path: Path) -> None:
+    with bench(tmp_path, CHAMBER + UNITS) as b:
+        wire = WireThermal(b.unit, b.head, b.chamber, 1000)
+        wire.prepare()
+        healthy = wire.record(0.5)
+        with b.fault("sensor.open", f"a.temp.{sensor}"):
+            b.run_for(0.1)
+            words = f"sensor of channel {channel}: expected -90 to 130 degC, got 0 K: it is open"
+            with pytest.raises(LinkError, match=words):
+                wire.record(0.5)
+        b.run_for(0.1)
+        assert wire.record(0.5).temps_degc == pytest.approx(healthy.temps_degc, abs=0.02)
+
+
+def test_a_sensor_that_the_profile_does_not_scan_cannot_open(tmp_path: Path) -> None:
+    (tmp_path / "two.yaml").write_text("board: psa2\nname: two\ntemp_channels: 2\n", encoding="utf-8")
+    with bench(tmp_path, f"units: [{{profile: {tmp_path / 'two.yaml'}}}]\n") as b:
+        b.fault("sensor.open", "a.temp.y").clear()
+        with pytest.raises(BenchError, match=r"a\.temp\.z: expected one of the 2 channels that the board scans"):
+            b.fault("sensor.open", "a.temp.z")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from psabench.boards.decode_command import _report_compensation
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import BadInput
 from psabench.thermal.apply import Compensator
@@ -124,7 +125,7 @@ def test_frames_without_temperatures_and_half_a_passport_are_refused() -> None:
 
 
 @pytest.mark.parametrize("code", [3, 32767])
-def test_a_sensor_that_is_open_is_no_temperature(code: int) -> None:
+def test_a_sensor_that_is_open_is_no_temperature(code: int, capsys: pytest.CaptureFixture[str]) -> None:
     """From half of the log on; the last temperature before holds, and from the beginning there is none."""
     curves = drawn_curves()
     f = frames_of(curves, FELT_G)
@@ -134,7 +135,9 @@ def test_a_sensor_that_is_open_is_no_temperature(code: int) -> None:
     compensator = Compensator(curves)
     held = compensator.accelerations_g(Frames(**fields | {"temp_code": late}))
     assert np.abs(held[: len(f) // 2] - FELT_G).max() < 1e-6
-    assert compensator.blind == 0
+    assert (compensator.blind, compensator.open) == (0, np.count_nonzero(f.temp_channel[len(f) // 2 :] == CASE_CHANNEL))
+    assert _report_compensation(compensator, len(f)) == 1
+    assert capsys.readouterr().err.count("its sensor is open, the last one holds") == 1
     blind = Compensator(curves)
     assert np.all(np.isnan(blind.accelerations_g(Frames(**fields | {"temp_code": whole}))))
     assert blind.blind == len(f)
