@@ -195,7 +195,7 @@ class Bench(AbstractContextManager["Bench"]):
         return Bench._of(Forked(self.control, can=can, seed=seed))
 
     def exchange_sensors(self, serial: int, unit: str | None = None) -> None:
-        """Other quartz sensors on the board of a unit (the first): those with this number of its batch, as warm as those.
+        """Other quartz sensors on the board of a unit (the first): those with this number of its batch, as warm.
 
         From here on they are to the bit what they would be in a unit of that number. Raises BenchError for a unit whose
         sensors are of no batch.

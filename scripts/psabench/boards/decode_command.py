@@ -108,10 +108,8 @@ def _report_compensation(compensator: Compensator, frames: int) -> int:
         what = "frames at temperatures outside of the compensation; taken at the end of its range"
         print(f"{compensator.clamped} {what}", file=sys.stderr)
     if compensator.open:
-        what = (
-            f"temperatures of the case that are none: expected {SENSOR_LOW_C:g} to {SENSOR_HIGH_C:g} degC, got others"
-        )
-        print(f"{compensator.open} {what}; its sensor is open, the last one holds", file=sys.stderr)
+        what = f"temperatures of the case outside {SENSOR_LOW_C:g} to {SENSOR_HIGH_C:g} degC"
+        print(f"{compensator.open} {what}: its sensor is open, the last one holds", file=sys.stderr)
     if compensator.blind:
         print(f"{compensator.blind} frames without acceleration: no temperature of the case", file=sys.stderr)
     return 1 if compensator.open or compensator.blind >= frames else 0
