@@ -75,8 +75,8 @@ struct board_type {
     const struct board_part *parts; /* [0] is the controller */
     unsigned part_count;
     const char *const *temps; /* its temperature sensors whose leads may open, up to NULL; NULL: none */
-    unsigned (*temp_count)(const struct board *b);             /* how many of them it reads, by its profile */
-    void (*open_temps)(struct board *b, uint32_t open);        /* bit n: the lead of the n-th, from now on */
+    unsigned (*temp_count)(const struct board *b);          /* how many of them it reads, by its profile */
+    void (*open_temps)(struct board *b, uint32_t open);     /* bit n: the lead of the n-th, from now on */
     const struct board_controller_fault *controller_faults; /* up to a NULL kind */
     const struct board_can *can;
     const struct board_bus *bus;           /* NULL: no parallel bus */

@@ -43,7 +43,7 @@ static const struct {
     enum fault_place place;
     const char *infix;
 } of_unit[] = {
-    {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},    {FAULT_AT_TEMP, "temp."}, {FAULT_AT_CHIP, ""},
+    {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},   {FAULT_AT_TEMP, "temp."}, {FAULT_AT_CHIP, ""},
     {FAULT_AT_CONTROLLER, ""},    {FAULT_AT_LINE, "line."}, {FAULT_AT_NODE, "can"},
 };
 

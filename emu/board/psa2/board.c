@@ -169,7 +169,8 @@ static const char *const temps[] = {"x", "y", "z", "board", NULL};
 
 static unsigned temp_count(const struct board *board)
 {
-    const unsigned scanned = ((const struct psa2 *)board)->profile.temp_channels, there = sizeof temps / sizeof *temps - 1;
+    const unsigned scanned = ((const struct psa2 *)board)->profile.temp_channels,
+                   there = sizeof temps / sizeof *temps - 1;
     return scanned < there ? scanned : there;
 }
 

@@ -107,7 +107,7 @@ struct psa2 {
     struct ads1282 adc[3];
     struct ads1256 tadc;
     struct psa2_port port[3];
-    double board_degc; /* refreshed at each DRD_A */
+    double board_degc;   /* refreshed at each DRD_A */
     uint32_t open_temps; /* bit n: the lead of temperature sensor n is open; outlives resets and power */
     struct psa2_counters counters;
 

@@ -93,7 +93,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--seed", type=natural, default=usual.seed, help="random seed (%(default)s)")
     text = "change the schedule; names below"
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help=text)
-    text = "measure the first N units again through the wire, an emulator each; half a minute a unit (%(default)s)"
+    text = (
+        "measure the first N units again through the wire, each on a fork of one bench; a second a unit (%(default)s)"
+    )
     p.add_argument("--wire", type=natural, default=usual.wire, metavar="N", help=text)
     p.add_argument("--workers", type=natural, help="processes (one per core for long runs); 1: this process alone")
     p.add_argument(
