@@ -124,7 +124,7 @@ enum chamber_result chamber_ramp(struct chamber *c, double k_per_min, int64_t t_
     return CHAMBER_OK;
 }
 
-/* Where it stands already it stays, whatever its controller would do on the way. */
+/* No step, no overshoot: the air stays at its set point. */
 void chamber_renew(struct chamber *c, struct chamber_body *b, int64_t t_ns)
 {
     assert(chamber_stable(c, t_ns));

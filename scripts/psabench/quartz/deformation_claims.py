@@ -12,11 +12,9 @@ from psabench.quartz import deformation as study
 from psabench.quartz.batch import QUANTITIES, SERIAL
 from psabench.quartz.deformation import CLAIM_PERCENT, CYCLES, Spread, Study
 from psabench.quartz.element import change_figures
+from psabench.quartz.limits import LAW_GAINS
 
 ENOUGH = 1000  # elements and units for a limit to mean anything
-# Means of the instability at the first cycle over those at the fifth: what the batch is tuned to (instruments 3.5).
-GAINS = {"zero": (2.2, 0.15), "scale": (1.65, 0.12), "base": (3.2, 0.25)}
-ARTICLE_GAINS = {"zero": "more than 2", "scale": "1.6", "base": "more than 3"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +110,7 @@ def _batch_checks(s: Study) -> Iterator[Check]:
     yield Check(what="ratio of the units, least", value=float(ratio.min()), low=low, high=high)
     yield Check(what="ratio of the units, greatest", value=float(ratio.max()), low=low, high=high)
     for q in QUANTITIES:
-        value, by = GAINS[q]
+        value, by = LAW_GAINS[q]
         yield Check(what=f"run-in, {q}, times", value=run_in_gain(s, q), low=value - by, high=value + by)
     for y in study.batch_yields(s):
         less = y.out_after / y.out_before if y.out_before > 0.0 else np.inf

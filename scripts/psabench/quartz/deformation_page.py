@@ -12,6 +12,7 @@ from typing import Any
 from psabench.quartz import deformation as study
 from psabench.quartz import deformation_claims as claims
 from psabench.quartz import deformation_plots as plots
+from psabench.quartz import limits
 from psabench.quartz.deformation import DEGC, READINGS, Spread, Study
 from psabench.quartz.element import Figure
 from psabench.report.grading import aligned
@@ -39,10 +40,9 @@ NOTES = (
 
 def verdict_words(s: Study) -> str:
     """One line."""
-    found = claims.limit_checks(s)
-    if not found:
-        return "no limits apply to other figures, another batch, or less than 1000 elements or units."
-    return f"{sum(c.within for c in found)} of {len(found)} figures lie within their limits."
+    return limits.verdict_words(
+        claims.limit_checks(s), "other figures, another batch, or less than 1000 elements or units"
+    )
 
 
 def is_within(s: Study) -> bool:
@@ -92,7 +92,7 @@ def yield_table(s: Study) -> list[list[str]]:
         means = ["", "", ""] if math.isnan(y.tolerance) else [f"{y.tolerance:g}", f"{y.before:.3g}", f"{y.after:.3g}"]
         gain = "" if y.quantity == "all" else f"{claims.run_in_gain(s, y.quantity):.2f}"
         name = f"{y.quantity}{y.unit and ', '}{'µg' if y.unit == 'ug' else y.unit}"
-        said = claims.ARTICLE_GAINS.get(y.quantity, "")
+        said = limits.ARTICLE.get(y.quantity, ("",))[0]
         rows.append([name, *means, gain, said, *(f"{100 * (1 - x):.1f}" for x in (y.out_before, y.out_after))])
     head = [
         "start to start",
@@ -126,9 +126,7 @@ def console_lines(s: Study) -> Iterator[str]:
     for v in claims.judge_article(s):
         yield f"{v.says}: {v.verdict}"
         yield f"  {v.found}"
-    for c in claims.limit_checks(s):
-        if not c.within:
-            yield f"out of limits: {c.what}: expected {c.low:.4g} to {c.high:.4g}, got {c.value:.4g}"
+    yield from limits.outside_lines(claims.limit_checks(s))
 
 
 # ---- files
@@ -192,14 +190,6 @@ def html_page(s: Study) -> str:
         section("A serial batch", html_table(yield_table(s)), figure(drawn["batch"], fig_5)),
         section("Figures of the element", html_table(figure_table(s), numeric=False)),
         section("What is derived, and what is ours", bullets([escape(n) for n in NOTES])),
-        _limits_section(s),
+        limits.limits_section(claims.limit_checks(s)),
     ]
     return whole_page(TITLE, _facts_dict(s), body)
-
-
-def _limits_section(s: Study) -> str:
-    found = claims.limit_checks(s)
-    if not found:
-        return ""
-    rows = [[c.what, f"{c.value:.4g}", f"{c.low:.4g}", f"{c.high:.4g}", "" if c.within else "out"] for c in found]
-    return section("Limits", html_table([["", "value", "from", "to", ""], *rows]))

@@ -12,13 +12,12 @@ from psabench.campaign.claims import Check
 from psabench.quartz import batch as law
 from psabench.quartz.batch import QUANTITIES, Batch
 from psabench.quartz.draws import draw_source
+from psabench.quartz.limits import ARTICLE, LAW_GAINS
 from psabench.quartz.plate import Array
 
 if TYPE_CHECKING:
     from psabench.quartz.run_in_wire import Agreement
 
-LAW_GAINS = {"zero": (2.2, 0.15), "scale": (1.65, 0.12), "base": (3.2, 0.25)}  # instruments 3.5, 1000 units and more
-ARTICLE = {"zero": ("more than 2", 2.0), "scale": ("1.6", 1.6), "base": ("more than 3", 3.0)}
 ENOUGH = 1000  # units for a limit to mean anything
 NORMAL95 = 1.96
 SMALL, DRAWS = 30, 20000  # the article's batch has "more than 30"; how many of them are drawn from the units

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from psabench.campaign.claims import Check
+from psabench.quartz import limits
 from psabench.quartz import run_in_plots as plots
 from psabench.quartz.batch import UNITS
 from psabench.quartz.run_in import RunIn
 from psabench.quartz.run_in_figures import (
-    ARTICLE,
-    LAW_GAINS,
     SMALL,
     STOP_AT,
     STOP_PERCENT,
@@ -65,9 +64,7 @@ class Report:
 
 def verdict_words(r: Report) -> str:
     """One line."""
-    if not r.checks:
-        return "no limits apply to another schedule, another batch, or less than 1000 units."
-    return f"{sum(c.within for c in r.checks)} of {len(r.checks)} figures lie within their limits."
+    return limits.verdict_words(r.checks, "another schedule, another batch, or less than 1000 units")
 
 
 # ---- tables, for the console and the page
@@ -89,9 +86,9 @@ def gain_table(r: Report) -> list[list[str]]:
     """Gains by run-in: found, by the batch's law, in the article."""
     rows = []
     for q, f in r.figures.items():
-        middle, by = LAW_GAINS[q]
+        middle, by = limits.LAW_GAINS[q]
         tuned = f"{middle:g} ± {by:g}"
-        rows.append([q, _with_half(f.gain, 2), f"{f.law_gain:.2f}", tuned, ARTICLE[q][0]])
+        rows.append([q, _with_half(f.gain, 2), f"{f.law_gain:.2f}", tuned, limits.ARTICLE[q][0]])
     return [["gain", "found, 95 %", "the law", "limits", "the article"], *rows]
 
 
@@ -111,7 +108,7 @@ def small_table(r: Report) -> list[list[str]]:
     for q, f in r.figures.items():
         s = f.small
         shown = [f"{x:.2f}" for x in (s.low, s.median, s.high)]
-        rows.append([q, *shown, f"> {ARTICLE[q][1]:g}", f"{100 * s.share:.0f}"])
+        rows.append([q, *shown, f"> {limits.ARTICLE[q][1]:g}", f"{100 * s.share:.0f}"])
     return [[f"batches of {SMALL}", "5 %", "median", "95 %", "the article", "share that shows it, %"], *rows]
 
 
@@ -144,9 +141,7 @@ def console_lines(r: Report) -> Iterator[str]:
     for rows in (*tables, *([wire_table(r)] if r.agreements else [])):
         yield from aligned(rows)
         yield ""
-    for c in r.checks:
-        if not c.within:
-            yield f"out of limits: {c.what}: expected {c.low:.4g} to {c.high:.4g}, got {c.value:.4g}"
+    yield from limits.outside_lines(r.checks)
 
 
 # ---- files
@@ -209,7 +204,7 @@ def html_page(r: Report) -> str:
         section(f"What a batch of {SMALL} shows", html_table(small_table(r)), figure(drawn["small"], small)),
         section(f"Estimates against truth, the first {r.graded_units} units", html_table(grade_table(r))),
         _wire_section(r),
-        _limits_section(r),
+        limits.limits_section(r.checks),
     ]
     return whole_page(TITLE, _facts_dict(r), body)
 
@@ -227,10 +222,3 @@ def _wire_section(r: Report) -> str:
         return ""
     words = "The same serial numbers on the bench: chamber, head and supply over SCPI, PSA-2 over CAN."
     return section(f"{r.wire_units} units through the wire", f"<p>{words}</p>", html_table(wire_table(r)))
-
-
-def _limits_section(r: Report) -> str:
-    if not r.checks:
-        return ""
-    rows = [[c.what, f"{c.value:.4g}", f"{c.low:.4g}", f"{c.high:.4g}", "" if c.within else "out"] for c in r.checks]
-    return section("Limits", html_table([["", "value", "from", "to", ""], *rows]))

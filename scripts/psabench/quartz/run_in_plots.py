@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from psabench.quartz.run_in_figures import ARTICLE, SMALL, Figures
+from psabench.quartz.limits import ARTICLE
+from psabench.quartz.run_in_figures import SMALL, Figures
 from psabench.report import plots as style
 
 SHOWN_CYCLES = (2, 3, 4)  # of the article's fig. 8

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import QUIET
 from psabench.campaign import chains, claims, command, emulated, page, report, runner, workers
 from psabench.campaign.cases import STUDIES, Case
 from psabench.campaign.chains import CHAINS, Wanted
@@ -31,10 +32,8 @@ from psabench.campaign.setup import Hold, Setup
 from psabench.campaign.store import CELL, Rows, Store
 from psabench.campaign.workers import Dask, ThisProcess, spread
 from psabench.errors import BadInput, BenchError, LinkError
-from psabench.progress import Bar
 from psabench.report.diff import report_without_provenance
 
-QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
 READINGS = {c.name: c for c in STUDIES["readings"].cases(Setup())}
 TWO = [READINGS["R0"], READINGS["R5n"]]
 

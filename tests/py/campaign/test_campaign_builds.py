@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import QUIET
 from psabench.campaign import builds, chains, command, runner, workers
 from psabench.campaign.cases import STUDIES
 from psabench.campaign.command import Options
@@ -22,9 +22,7 @@ from psabench.campaign.store import Store
 from psabench.errors import BadInput, BenchError
 from psabench.native.navlib import NAME, library
 from psabench.places import PACKAGE, proto_file
-from psabench.progress import Bar
 
-QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
 (R0,) = [c for c in STUDIES["readings"].cases(Setup()) if c.name == "R0"]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import re
 from dataclasses import fields, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 import yaml
+from command_line import QUIET
 from psabench import cli
 from psabench.campaign import cases, chains, command, emulated, page, report, settings
 from psabench.campaign.cases import STUDIES
@@ -21,9 +21,6 @@ from psabench.campaign.runner import Plan
 from psabench.campaign.setup import Setup, changed
 from psabench.errors import BadInput
 from psabench.places import proto_file
-from psabench.progress import Bar
-
-QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
 
 
 def test_settings_change_the_instrument_of_every_study() -> None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
 import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
-from psabench.progress import Bar
+from command_line import QUIET
 
 ROOT = Path(__file__).resolve().parents[3]
-QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from command_line import QUIET, mistake_line
 from psabench import cli
 from psabench.campaign.store import Store
 from psabench.campaign.workers import ThisProcess
 from psabench.errors import BadInput
 from psabench.native import clib, quartz_model
 from psabench.native.quartz_model import Schedule
-from psabench.progress import Bar
-from psabench.quartz import run_in, run_in_command, run_in_figures, run_in_page, run_in_wire
+from psabench.quartz import limits, run_in, run_in_command, run_in_figures, run_in_page, run_in_wire
 from psabench.quartz.batch import draw_instability, load_batch
 from psabench.quartz.run_in import RunIn
 from psabench.quartz.run_in_command import Options
@@ -27,7 +26,6 @@ from psabench.quartz.run_in_page import Report
 from psabench.report.page import page_without_foot
 
 ROOT = Path(__file__).resolve().parents[3]
-QUIET = Bar(Path(os.devnull).open("w"))  # noqa: SIM115  # for as long as the tests run
 BATCH = load_batch()
 QUIET_BATCH = {**BATCH, "start_ug": 0.0, "start_ppm": 0.0, "start_arcsec": 0.0, "glue_keep_spread": 0.0}
 SILENT = Schedule(noise_a_rthz=0.0)
@@ -127,7 +125,7 @@ def test_the_campaign_finds_what_the_batch_was_made_for(report: Report) -> None:
     assert report.within
     assert len(report.checks) == 11
     gains = {q: f.gain for q, f in report.figures.items()}
-    for q, (middle, by) in run_in_figures.LAW_GAINS.items():
+    for q, (middle, by) in limits.LAW_GAINS.items():
         assert gains[q].value == pytest.approx(middle, abs=by)
         assert 0.02 < gains[q].sd / middle < 0.06
     assert report.figures["zero"].stop == 4
@@ -243,10 +241,7 @@ def test_a_mistake_gets_one_line(
 ) -> None:
     (tmp_path / "README.md").write_text("no store, and longer than the hundred bytes of a header would be " * 3)
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["campaign", "run-in", *line.split()]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1), err
-    assert words in err
+    assert words in mistake_line(["campaign", "run-in", *line.split()], capsys)
 
 
 def test_the_help_names_every_setting_with_its_default() -> None:
