@@ -24,7 +24,8 @@ MAY_INCLUDE = {
     "nav": set(),  # the installed headers
     "nav/common": {"nav"},
     "nav/north": {"nav", "nav/common"},
-    "nav/sins": {"nav", "nav/common"},
+    "nav/filter": {"nav", "nav/common"},
+    "nav/sins": {"nav", "nav/common", "nav/filter"},
     "gen": {"base", "canopen"},
     "link": {"base"},
     "board": _MODELS,  # the contract of boards, and what boards share

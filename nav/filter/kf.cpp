@@ -1,0 +1,151 @@
+#include "nav/filter/kf_form.hpp"
+
+#include "nav/common/nav_math.hpp"
+
+#include <cstring>
+
+static bool all_finite(const double *a, int count)
+{
+    bool finite = true;
+    for (int i = 0; i < count; i++) finite &= std::isfinite(a[i]);
+    return finite;
+}
+
+size_t nav_kf_bytes(void)
+{
+    return sizeof(struct nav_kf);
+}
+
+int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_kf **out)
+{
+    if (!memory || bytes < sizeof(struct nav_kf)) return NAV_RANGE;
+    if (n < 1 || n > KF_MAX || dynamic < 0 || dynamic > n || form < NAV_KF_JOSEPH || form > NAV_KF_UD) return NAV_RANGE;
+    memset(memory, 0, sizeof(struct nav_kf));
+    struct nav_kf *kf = (struct nav_kf *)memory;
+    kf->n = n;
+    kf->dynamic = dynamic;
+    kf->form = form;
+    for (int i = 0; form == NAV_KF_UD && i < n; i++) kf->p[i * n + i] = 1.0;
+    *out = kf;
+    return NAV_OK;
+}
+
+static bool symmetric(int n, const double *p)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < i; j++) {
+            const double gap = p[i * n + j] - p[j * n + i];
+            if (gap * gap > 1e-20 * std::fabs(p[i * n + i] * p[j * n + j])) return false;
+        }
+    return true;
+}
+
+int nav_kf_set(nav_kf *kf, const double *x, const double *p)
+{
+    const int n = kf->n;
+    double d[KF_MAX];
+    if (!all_finite(p, n * n) || (x && !all_finite(x, n))) return NAV_NOT_FINITE;
+    if (!symmetric(n, p) || !kf_factor(n, p, kf->work, d)) return NAV_SINGULAR;
+    memcpy(kf->p, kf->form == NAV_KF_UD ? kf->work : p, sizeof *p * (size_t)(n * n));
+    memcpy(kf->d, d, sizeof *d * (size_t)n);
+    for (int i = 0; i < n; i++) kf->x[i] = x ? x[i] : 0.0;
+    return NAV_OK;
+}
+
+int nav_kf_get(const nav_kf *kf, double *x, double *p)
+{
+    const int n = kf->n;
+    if (x) memcpy(x, kf->x, sizeof *x * (size_t)n);
+    if (p && kf->form == NAV_KF_UD) kf_ud_full(kf, p);
+    if (p && kf->form == NAV_KF_JOSEPH) memcpy(p, kf->p, sizeof *p * (size_t)(n * n));
+    return NAV_OK;
+}
+
+static void gather_rows(struct nav_kf *kf, const double *phi)
+{
+    for (int i = 0; i < kf->dynamic; i++) {
+        int count = 0;
+        for (int k = 0; k < kf->n; k++) {
+            const double value = phi[i * kf->n + k];
+            if (value == 0.0) continue;
+            kf->rows.at[i][count] = k;
+            kf->rows.value[i][count++] = value;
+        }
+        kf->rows.count[i] = count;
+    }
+}
+
+static void move_state(struct nav_kf *kf)
+{
+    double moved[KF_MAX];
+    for (int i = 0; i < kf->dynamic; i++) {
+        moved[i] = 0.0;
+        for (int k = 0; k < kf->rows.count[i]; k++) moved[i] += kf->rows.value[i][k] * kf->x[kf->rows.at[i][k]];
+    }
+    memcpy(kf->x, moved, sizeof *moved * (size_t)kf->dynamic);
+}
+
+int nav_kf_predict(nav_kf *kf, const double *phi, const double *q)
+{
+    if (!all_finite(phi, kf->dynamic * kf->n) || !all_finite(q, kf->dynamic * kf->dynamic)) return NAV_NOT_FINITE;
+    gather_rows(kf, phi);
+    if (kf->form == NAV_KF_JOSEPH) kf_full_predict(kf, q);
+    else if (!kf_ud_predict(kf, q)) return NAV_SINGULAR;
+    move_state(kf);
+    return NAV_OK;
+}
+
+static int find_gain(const nav_kf *kf, const double *h, double z, double r, struct kf_gain *g,
+                     struct nav_kf_innovation *out)
+{
+    if (!all_finite(h, kf->n) || !std::isfinite(z) || !std::isfinite(r)) return NAV_NOT_FINITE;
+    if (!(r > 0.0)) return NAV_RANGE;
+    (kf->form == NAV_KF_UD ? kf_ud_gain : kf_full_gain)(kf, h, r, g);
+    if (!(g->variance > 0.0)) return NAV_SINGULAR;
+    out->variance = g->variance;
+    out->value = z;
+    for (int i = 0; i < kf->n; i++) out->value -= h[i] * kf->x[i];
+    return NAV_OK;
+}
+
+int nav_kf_innovate(const nav_kf *kf, const double *h, double z, double r, struct nav_kf_innovation *out)
+{
+    struct kf_gain g;
+    struct nav_kf_innovation found;
+    const int status = find_gain(kf, h, z, r, &g, &found);
+    if (status == NAV_OK) *out = found;
+    return status;
+}
+
+int nav_kf_update(nav_kf *kf, const double *h, const double *z, const double *r, int count,
+                  struct nav_kf_innovation *out)
+{
+    struct kf_gain g;
+    struct nav_kf_innovation found;
+    for (int m = 0; m < count; m++) {
+        const int status = find_gain(kf, h + m * kf->n, z[m], r[m], &g, &found);
+        if (status != NAV_OK) return status;
+        const double step = found.value / found.variance;
+        for (int i = 0; i < kf->n; i++) kf->x[i] += g.w[i] * step;
+        if (kf->form == NAV_KF_UD) kf_ud_update(kf, h + m * kf->n, r[m], &g);
+        else kf_full_update(kf, &g);
+        if (out) out[m] = found;
+    }
+    return NAV_OK;
+}
+
+double nav_kf_nees(int n, const double *error, const double *p)
+{
+    double ut[KF_MAX * KF_MAX];
+    double d[KF_MAX];
+    if (n < 1 || n > KF_MAX || !all_finite(p, n * n) || !kf_factor(n, p, ut, d)) return NAV_NAN;
+    double sum = 0.0;
+    double e[KF_MAX];
+    memcpy(e, error, sizeof *e * (size_t)n);
+    for (int j = n - 1; j >= 0; j--) { /* U y = e from the last row, then y' D^-1 y */
+        if (!(d[j] > 0.0)) return NAV_NAN;
+        for (int i = 0; i < j; i++) e[i] -= ut[j * n + i] * e[j];
+        sum += e[j] * e[j] / d[j];
+    }
+    return sum;
+}
