@@ -2,8 +2,8 @@
 #ifndef PSABENCH_NAV_MC_HPP
 #define PSABENCH_NAV_MC_HPP
 
-#include "nav/north/nav_fit.hpp"
 #include "nav/nav_mc.h"
+#include "nav/north/nav_fit.hpp"
 #include "nav/north/nav_random.hpp"
 
 /* Middles and lengths of the windows, angles as increments; S, beta and gamma 0. The first window begins at t = 0. */

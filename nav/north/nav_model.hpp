@@ -2,8 +2,8 @@
 #ifndef PSABENCH_NAV_MODEL_HPP
 #define PSABENCH_NAV_MODEL_HPP
 
-#include "nav/nav.h"
 #include "nav/common/nav_math.hpp"
+#include "nav/nav.h"
 
 struct nav_earth {
     double we_radps, wz_radps; /* (2): U cos lat, U sin lat */

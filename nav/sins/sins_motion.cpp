@@ -1,0 +1,84 @@
+#include "nav/sins/sins_model.hpp"
+
+#include "nav/common/nav_math.hpp"
+
+void sins_use_model(struct nav_sins *s)
+{
+    const mat3 theta = Eigen::Map<const mat3_rows>(s->model.theta);
+    const mat3 gamma = Eigen::Map<const mat3_rows>(s->model.gamma);
+    s->gyro_back = (mat3::Identity() + theta).inverse();
+    s->accel_back = (mat3::Identity() + gamma).inverse();
+}
+
+/* What an accelerometer at r sees beside f, row i of [w x][w x] + [dw/dt x] times r_i, as a matrix: L(i, :) of accelerometer i. */
+static mat3 lever_rows(const vec3 &w, const vec3 &dw)
+{
+    return w * w.transpose() - w.squaredNorm() * mat3::Identity() + sins_cross(dw);
+}
+
+/* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (sins 1, below (3)). */
+static void add_drift(struct nav_sins *s, const mat3 &middle, const vec3 &dtheta)
+{
+    const mat3 m = middle * s->gyro_back;
+    s->now.drift.leftCols<3>() += m * s->cfg.sample_s;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) s->now.drift.col(3 + 3 * i + j) += m.col(i) * dtheta(j);
+    s->now.time_s += s->cfg.sample_s;
+}
+
+/* Sensitivity of z_a: f is C' g, free of the accelerometers' noise. */
+static void add_accel(struct nav_sins *s, const mat3 &middle, const mat3 &lever)
+{
+    const double dt = s->cfg.sample_s;
+    const mat3 m = middle * s->accel_back * dt;
+    const vec3 f = middle.transpose() * s->gravity_n;
+    s->accel.leftCols<3>() += m;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            s->accel.col(3 + 3 * i + j) += m.col(i) * f(j);
+            if (s->cfg.lever) s->accel.col(12 + 3 * i + j) += m.col(i) * lever(i, j);
+        }
+}
+
+/* C of the sample's start times this is the integral of C f: exact to the third order of the turn for a force constant in n. */
+static vec3 undo_turn(const vec3 &dtheta, const vec3 &dv)
+{
+    const vec3 once = dtheta.cross(dv);
+    return dv + 0.5 * once + dtheta.cross(once) / 12.0;
+}
+
+static vec3 without_lever(const struct nav_sins *s, const vec3 &dv, const mat3 &lever)
+{
+    vec3 left = dv;
+    for (int i = 0; i < 3; i++)
+        left(i) -= lever.row(i).dot(Eigen::Map<const vec3>(s->model.lever_m + 3 * i)) * s->cfg.sample_s;
+    return left;
+}
+
+void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv_raw)
+{
+    const double dt = s->cfg.sample_s;
+    const vec3 dtheta = s->gyro_back * (dtheta_raw - Eigen::Map<const vec3>(s->model.nu_radps) * dt);
+    const vec3 w = dtheta / dt;
+    const mat3 lever =
+        s->cfg.lever ? lever_rows(w, s->samples ? vec3((w - s->w_before) / dt) : vec3::Zero()) : mat3::Zero();
+    vec3 dv = dv_raw - Eigen::Map<const vec3>(s->model.df_mps2) * dt;
+    if (s->cfg.lever) dv = without_lever(s, dv, lever);
+    dv = s->accel_back * dv;
+
+    const vec3 turn = dtheta + s->dtheta_before.cross(dtheta) / 12.0; /* coning of two samples */
+    const mat3 after = s->earth_turn * (s->c * sins_exp(turn));
+    const mat3 middle = 0.5 * (s->c + after);
+    add_drift(s, middle, dtheta);
+    add_accel(s, middle, lever);
+    s->z_sum += s->c * undo_turn(dtheta, dv);
+
+    s->c = after;
+    s->dtheta_before = dtheta;
+    s->w_before = w;
+    s->samples++;
+    struct sins_ring_entry *kept = &s->ring[s->samples % SINS_RING];
+    kept->t_s = s->start_s + (double)s->samples * dt;
+    kept->c = s->c;
+    kept->w_rel_b = w - middle.transpose() * s->earth_n;
+}
