@@ -101,7 +101,7 @@ NAV_API int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg
                            int feedback, nav_sins **out);
 
 /* A table's angles at stand time t_s, as the rotation C_st. Before the increments that follow it by more than stand_guard_s;
- * 64 can wait. */
+ * 256 can wait. */
 NAV_API int nav_sins_stand(nav_sins *s, double t_s, const double c_st[9]);
 /* count increments (rad, m/s), rows of three, the first one over t_s to t_s + sample_s. NAV_TIMES: t_s is not the end of those before,
  * within half a sample: time runs backwards or there is a gap. */

@@ -1,4 +1,4 @@
-"""libpsabench-nav as ctypes sees it: declared here, used by `nav` and `nav_mc`. Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here and in `sinslib`, used by `nav`, `nav_mc`, `sins`. Manual: nav.h."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from psabench.native.shared_library import SharedLibrary
+from psabench.native.sinslib import PROTOTYPES as SINS_PROTOTYPES
 
 ABI = 1  # NAV_ABI of the header that this was written from
 NAME = f"libpsabench-nav.so.{ABI}"
@@ -209,9 +210,9 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 
 
 class NavLibrary(SharedLibrary):
-    """The functions of nav.h and nav_mc.h."""
+    """The functions of nav.h, nav_mc.h, kf.h and sins.h."""
 
-    abi, prefix, variable, prototypes = ABI, "nav_", "PSABENCH_NAV_LIB", PROTOTYPES
+    abi, prefix, variable, prototypes = ABI, "nav_", "PSABENCH_NAV_LIB", PROTOTYPES | SINS_PROTOTYPES
 
 
 @cache
