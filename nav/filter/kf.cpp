@@ -61,6 +61,14 @@ int nav_kf_get(const nav_kf *kf, double *x, double *p)
     return NAV_OK;
 }
 
+double kf_variance(const nav_kf *kf, int i)
+{
+    if (kf->form == NAV_KF_JOSEPH) return kf->p[i * (kf->n + 1)];
+    double sum = 0.0;
+    for (int k = i; k < kf->n; k++) sum += kf->p[k * kf->n + i] * kf->p[k * kf->n + i] * kf->d[k];
+    return sum;
+}
+
 static void gather_rows(struct nav_kf *kf, const double *phi)
 {
     for (int i = 0; i < kf->dynamic; i++) {

@@ -38,6 +38,7 @@ void kf_full_predict(struct nav_kf *kf, const double *q);
 void kf_ud_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
 void kf_ud_update(struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
 bool kf_ud_predict(struct nav_kf *kf, const double *q);
+double kf_variance(const struct nav_kf *kf, int i); /* P_ii */
 void kf_ud_full(const struct nav_kf *kf, double *p);
 
 #endif

@@ -63,6 +63,23 @@ static vec3 set_rows(struct nav_sins *s, const struct sins_angle *angle, double 
     return sins_log(c * sins_exp(delta) * angle->c_st.transpose() * sins_exp(eps));
 }
 
+static double trace_of(const struct nav_sins *s, int block)
+{
+    double sum = 0.0;
+    for (int k = 0; k < s->at[block].size; k++) sum += kf_variance(&s->kf, s->at[block].offset + k);
+    return sum;
+}
+
+/* Products of two unknown rotations, beta, delta and w tau, that (4) leaves out: half of each cross product. While they are unknown
+ * by degrees this exceeds the table's noise a hundredfold, and a first pass would believe what is wrong. */
+static double second_order(const struct nav_sins *s, const vec3 &w_rel_b)
+{
+    const double late = w_rel_b.squaredNorm() * trace_of(s, NAV_SINS_TAU);
+    const double beta = trace_of(s, NAV_SINS_BETA);
+    const double delta = trace_of(s, NAV_SINS_DELTA);
+    return 0.25 * (beta * delta + beta * late + delta * late);
+}
+
 static int take_angle(struct nav_sins *s, const struct sins_angle *angle, double t_filter_s)
 {
     const double t_s = angle->t_s + s->model.tau_s;
@@ -72,7 +89,8 @@ static int take_angle(struct nav_sins *s, const struct sins_angle *angle, double
     }
     const vec3 z = set_rows(s, angle, t_s, t_filter_s - t_s);
     const double density2 = s->cfg.stand_sd_rad * s->cfg.stand_sd_rad / s->cfg.stand_noise_rate_hz;
-    const double r = density2 / s->cfg.stand_interval_s;
+    const double left_out = s->feedback ? second_order(s, sample_at(s, t_s)->w_rel_b) : 0.0;
+    const double r = density2 / s->cfg.stand_interval_s + left_out;
     const double rs[3] = {r, r, r};
     const int status = nav_kf_update(&s->kf, s->h + 3 * s->n, z.data(), rs, 3, s->found.last + 3);
     if (status != NAV_OK) return status;
