@@ -100,6 +100,9 @@ NAV_API size_t nav_sins_bytes(void);
 NAV_API int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, const double c_nb[9],
                            int feedback, nav_sins **out);
 
+/* Before the first increments: about this model instead of zeros, as a coarse calibration gives it. The prior stays about zero. */
+NAV_API int nav_sins_about(nav_sins *s, const struct nav_sins_params *model);
+
 /* A table's angles at stand time t_s, as the rotation C_st. Before the increments that follow it by more than stand_guard_s;
  * 256 can wait. */
 NAV_API int nav_sins_stand(nav_sins *s, double t_s, const double c_st[9]);
@@ -131,7 +134,8 @@ struct nav_sins_state {
 };
 NAV_API int nav_sins_get(const nav_sins *s, struct nav_sins_state *state);
 NAV_API int nav_sins_covariance(const nav_sins *s, double *x, double *p); /* n, n x n; x counts from the model */
-/* Rows of (2) and (3) of the last step for tests and own filters: phi (moving x n), h (3 x n). Either may be NULL. */
+/* Of the last step, for tests and own filters: phi (moving x n) and q of (2), h (6 x n): rows of (3), and of (4) for the last angle of
+ * the stand that was taken. Each may be NULL. */
 NAV_API int nav_sins_jacobians(const nav_sins *s, double *phi, double *q, double *h);
 
 #ifdef __cplusplus

@@ -42,6 +42,14 @@ static bool are_finite(const double *a, int count)
     return finite;
 }
 
+int nav_sins_about(nav_sins *s, const struct nav_sins_params *model)
+{
+    if (!are_finite((const double *)model, (int)(sizeof *model / sizeof(double)))) return NAV_NOT_FINITE;
+    if (s->started) return NAV_TIMES;
+    s->model = *model;
+    return sins_reset(s);
+}
+
 static int take_time(nav_sins *s, double t_s)
 {
     if (!std::isfinite(t_s)) return NAV_NOT_FINITE;
@@ -95,6 +103,6 @@ int nav_sins_jacobians(const nav_sins *s, double *phi, double *q, double *h)
 {
     if (phi) memcpy(phi, s->phi, sizeof *phi * (size_t)(s->dynamic * s->n));
     if (q) memcpy(q, s->q, sizeof *q * (size_t)(s->dynamic * s->dynamic));
-    if (h) memcpy(h, s->h, sizeof *h * (size_t)(3 * s->n));
+    if (h) memcpy(h, s->h, sizeof *h * (size_t)(6 * s->n));
     return NAV_OK;
 }

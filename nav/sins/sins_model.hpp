@@ -13,8 +13,8 @@ using mat3_rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using sens_drift = Eigen::Matrix<double, 3, 12>; /* of beta to nu and Theta, row-major */
 using sens_accel = Eigen::Matrix<double, 3, 21>; /* of z_a to df, Gamma, lever */
 
-constexpr int SINS_RING = 256;   /* samples of attitude that the stand's angles are compared with */
-constexpr int SINS_PENDING = 256;/* angles of the stand that wait for the motion after them */
+constexpr int SINS_RING = 256;    /* samples of attitude that the stand's angles are compared with */
+constexpr int SINS_PENDING = 256; /* angles of the stand that wait for the motion after them */
 
 struct sins_gauge {
     int count;

@@ -144,6 +144,10 @@ class Sins:
         status = lib.sins_start(at, lib.sins_bytes(), struct, _doubles(c_nb, 9), int(feedback), c.byref(self._s))
         _check("start", status)
 
+    def about(self, params: Params) -> None:
+        """Before the first increments: linearised about this model, with the prior as it is."""
+        _check("model", library().sins_about(self._s, c.byref(_params_struct(params))))
+
     def samples(self, t_s: float, dtheta_rad: Floats, dv_mps: Floats) -> None:
         """Increments, rows of three; the first over t_s to t_s + sample_s."""
         count = len(dtheta_rad)
@@ -195,9 +199,9 @@ class Sins:
         return np.asarray(np.sqrt(np.diag(self.covariance()[1])[self.rows[block]]))
 
     def jacobians(self) -> tuple[Floats, Floats, Floats]:
-        """phi, q and h of the last step."""
+        """phi, q and h of the last step; rows 3 to 5 of h: of the last angle of the stand."""
         moving = self.rows["nu"].start
-        phi, q, h = np.empty((moving, self.states)), np.empty((moving, moving)), np.empty((3, self.states))
+        phi, q, h = np.empty((moving, self.states)), np.empty((moving, moving)), np.empty((6, self.states))
         library().sins_jacobians(self._s, *(_doubles(a, a.size) for a in (phi, q, h)))
         return phi, q, h
 

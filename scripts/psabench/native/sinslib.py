@@ -95,6 +95,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "sins_to_gauge": (_I, _I, _P(ParamsStruct), _DOUBLES),
     "sins_bytes": (c.c_size_t,),
     "sins_start": (_I, _V, c.c_size_t, _P(SinsConfigStruct), _DOUBLES, _I, _P(_V)),
+    "sins_about": (_I, _V, _P(ParamsStruct)),
     "sins_stand": (_I, _V, _D, _DOUBLES),
     "sins_samples": (_I, _V, _D, _DOUBLES, _DOUBLES, _I),
     "sins_plan": (_I, _V, _P(TurnStruct), _I),
