@@ -194,6 +194,18 @@ static bool all_at_rest(const struct table *t, int64_t t_ns)
     return true;
 }
 
+int64_t table_smooth_ns(const struct table *t, int64_t t_ns)
+{
+    int64_t first_ns = INT64_MAX;
+    for (unsigned i = 0; i < t->cfg.axes; i++) {
+        const int64_t at_ns = motion_smooth_ns(&t->axis[i], t_ns);
+        if (at_ns < first_ns) first_ns = at_ns;
+    }
+    for (const struct table_ripple *r = t->ripples; r; r = r->next)
+        if (r->from_ns > t_ns && r->from_ns < first_ns) first_ns = r->from_ns;
+    return first_ns;
+}
+
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns)
 {
     assert(axis < t->cfg.axes);

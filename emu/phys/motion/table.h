@@ -88,6 +88,9 @@ struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_
 /* Truth. */
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns);
 
+/* The first instant after t_ns at which an acceleration may jump without a further command; INT64_MAX: none. */
+int64_t table_smooth_ns(const struct table *t, int64_t t_ns);
+
 /* Attitude and motion of t. Cached: valid until the next call. */
 const struct pose *table_pose(struct table *t, int64_t t_ns);
 
