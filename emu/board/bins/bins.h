@@ -74,6 +74,7 @@ struct bins_sums {
     bool based; /* from which a reading begins is known */
     uint32_t word;  /* next that is expected */
     uint32_t words; /* in the sums */
+    int64_t delay_ns; /* of the converters, known from the first word on */
     int64_t sum[3];
     uint8_t status;   /* of all of them: enum psa2_status, SETTLED and CLIP turned into what is wrong */
     bool incomplete, temp_new;

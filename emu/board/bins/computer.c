@@ -132,7 +132,7 @@ static void latch_gyros(void *ctx, int64_t t_ns)
 static int64_t latch_ns(const struct bins *b, const struct psa2_frame *f)
 {
     const int64_t words = (int64_t)last_word_of(b, b->sums.next) - (int64_t)f->seq;
-    return f->t_sample_ns + words * bins_word_ns(b) - (b->profile.aligned ? delay_ns(b) : 0);
+    return f->t_sample_ns + words * bins_word_ns(b) - (b->profile.aligned ? b->sums.delay_ns : 0);
 }
 
 /* Of the first interval whose end is still to come. */
@@ -170,7 +170,8 @@ static void add_word(struct bins *b, const struct psa2_frame *f)
 static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 {
     struct bins *b = ctx;
-    if (f->seq > 0) complete_until(b, f->seq - 1, t_ns);
+    if (b->sums.word == 0) b->sums.delay_ns = delay_ns(b);
+    else complete_until(b, f->seq - 1, t_ns);
     add_word(b, f);
     complete_until(b, f->seq, t_ns);
     arm_latch(b, f, t_ns);

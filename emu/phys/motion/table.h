@@ -49,6 +49,13 @@ struct table_ripple {
     struct table_ripple *next;
 };
 
+/* Turns of an axis at an angle: kept while it rests. */
+struct table_turns {
+    double angle_rad; /* NaN: none are kept */
+    double cone_rad[2]; /* about the two axes across */
+    struct pose_angle cone[2], angle;
+};
+
 struct table {
     struct table_cfg cfg;
     struct site site;
@@ -56,6 +63,8 @@ struct table {
     struct motion axis[TABLE_AXES_MAX];
     double set_zero_rad[TABLE_AXES_MAX]; /* by table_zero() */
     struct table_ripple *ripples;
+    struct pose base; /* at the site, tilted */
+    struct table_turns turns[TABLE_AXES_MAX];
     int64_t cached_from_ns, cached_to_ns;
     struct pose cached;
 };
