@@ -37,7 +37,7 @@ struct bins_reading {
     uint32_t seq;    /* from power-up or reset, from 1 */
     int64_t t_ns;    /* end of the interval of the gyros */
     int32_t gyro[3]; /* counts */
-    int32_t accel[3]; /* sums of codes */
+    int32_t accel[3]; /* sums of codes; a code is truncated: half of one is missing in each word */
     uint8_t words, flags;
 };
 
@@ -72,7 +72,8 @@ struct bins_gyros {
 /* The computer's sums and latches. */
 struct bins_sums {
     bool based; /* from which a reading begins is known */
-    uint32_t word;  /* next that is expected */
+    uint32_t word;   /* number of the last, from 0 */
+    int64_t word_ns; /* its data-ready; -1: none has come */
     uint32_t words; /* in the sums */
     int64_t delay_ns; /* of the converters, known from the first word on */
     int64_t sum[3];

@@ -104,6 +104,7 @@ static void add_sums(struct sha256 *s, const struct bins_sums *m)
 {
     board_digest_u64(s, (uint64_t)m->based << 2 | (uint64_t)m->incomplete << 1 | m->temp_new);
     board_digest_u64(s, (uint64_t)m->word << 32 | m->words);
+    board_digest_u64(s, (uint64_t)m->word_ns);
     board_digest_u64(s, (uint64_t)m->next << 32 | m->status);
     board_digest_u64(s, (uint64_t)(m->ev.queued ? m->ev.due_ns : -1));
     for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)m->sum[i]);

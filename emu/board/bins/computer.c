@@ -131,7 +131,7 @@ static void latch_gyros(void *ctx, int64_t t_ns)
 
 static int64_t latch_ns(const struct bins *b, const struct psa2_frame *f)
 {
-    const int64_t words = (int64_t)last_word_of(b, b->sums.next) - (int64_t)f->seq;
+    const int64_t words = (int64_t)last_word_of(b, b->sums.next) - (int64_t)b->sums.word;
     return f->t_sample_ns + words * bins_word_ns(b) - (b->profile.aligned ? b->sums.delay_ns : 0);
 }
 
@@ -151,13 +151,23 @@ static void arm_latch(struct bins *b, const struct psa2_frame *f, int64_t t_ns)
 
 /* ---- frames of the PSA-2 */
 
-static void add_word(struct bins *b, const struct psa2_frame *f)
+/* Its number, by the time since the word before: a lost data-ready counts, a lost frame too. */
+static uint32_t number_of(const struct bins *b, const struct psa2_frame *f)
+{
+    const struct bins_sums *s = &b->sums;
+    const int64_t word_ns = bins_word_ns(b), words = (f->t_sample_ns - s->word_ns + word_ns / 2) / word_ns;
+    if (s->word_ns < 0) return 0;
+    return s->word + (uint32_t)(words > 1 ? words : 1);
+}
+
+static void add_word(struct bins *b, const struct psa2_frame *f, uint32_t number)
 {
     struct bins_sums *s = &b->sums;
-    const uint32_t missing = f->seq - s->word;
+    const uint32_t missing = s->word_ns < 0 ? 0 : number - s->word - 1;
     b->counters.missed_words += missing;
     s->incomplete |= missing != 0;
-    s->word = f->seq + 1;
+    s->word = number;
+    s->word_ns = f->t_sample_ns;
     s->words++;
     for (unsigned i = 0; i < 3; i++) s->sum[i] += f->code[i];
     s->status = (uint8_t)((s->status & f->status & PSA2_ST_SETTLED) | ((s->status | f->status) & PSA2_ST_CLIP));
@@ -170,10 +180,11 @@ static void add_word(struct bins *b, const struct psa2_frame *f)
 static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 {
     struct bins *b = ctx;
-    if (b->sums.word == 0) b->sums.delay_ns = delay_ns(b);
-    else complete_until(b, f->seq - 1, t_ns);
-    add_word(b, f);
-    complete_until(b, f->seq, t_ns);
+    const uint32_t number = number_of(b, f);
+    if (number == 0) b->sums.delay_ns = delay_ns(b);
+    else complete_until(b, number - 1, t_ns);
+    add_word(b, f, number);
+    complete_until(b, number, t_ns);
     arm_latch(b, f, t_ns);
 }
 
@@ -189,7 +200,7 @@ static void restart(struct bins *b)
 {
     struct sched *s = b->psa2.base.sched;
     sched_cancel(s, &b->sums.ev);
-    b->sums = (struct bins_sums){.based = false};
+    b->sums = (struct bins_sums){.word_ns = -1};
     sched_ev_inner(&b->sums.ev, latch_gyros, b);
     b->latest = (struct bins_reading){.seq = 0};
     memset(b->temp_code, 0, sizeof b->temp_code);
@@ -205,6 +216,7 @@ void bins_init(struct bins *b, const struct bins_profile *p, const struct board_
     b->profile = *p;
     b->errors = bins_profile_errors(p, cfg->seed, cfg->serial);
     b->psa2.host = (struct psa2_host){.ctx = b, .frame = on_frame, .fault = on_fault};
+    b->sums.word_ns = -1;
     sched_ev_inner(&b->sums.ev, latch_gyros, b);
     bins_gyro_init(b);
 }

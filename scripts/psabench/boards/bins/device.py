@@ -49,7 +49,8 @@ def increments(readings: Readings, weights: Weights) -> Increments:
     return Increments(
         end_s=readings.t_sample_s,
         dtheta_rad=np.stack([readings[f"G{axis}"] for axis in "XYZ"], axis=1) * weights.gyro_rad,
-        dv_mps=np.stack([readings[f"A{axis}"] for axis in "XYZ"], axis=1) * weights.accel_mps,
+        dv_mps=(np.stack([readings[f"A{axis}"] for axis in "XYZ"], axis=1) + readings["WORDS"][:, None] / 2)
+        * weights.accel_mps,
         seq=np.asarray(readings["SEQ"], np.int64),
         whole=whole,
     )
