@@ -54,6 +54,11 @@ struct motion_state motion_at(const struct motion *m, int64_t t_ns)
     return coast_from(&piece->from, t_s - piece->t_s);
 }
 
+int64_t motion_known_ns(const struct motion *m)
+{
+    return m->plan[(m->latest + 1) % MOTION_HISTORY].start_ns;
+}
+
 /* Pieces begin between two nanoseconds: the later one is told. */
 int64_t motion_smooth_ns(const struct motion *m, int64_t t_ns)
 {

@@ -147,12 +147,23 @@ static double readout_noise_rad(const struct table *t, unsigned axis, int64_t t_
     return rms_rad * rng_gauss(&r);
 }
 
+static int64_t delay_ns(const struct table *t, unsigned axis)
+{
+    return (int64_t)nearbyint(t->cfg.axis[axis].readout_delay_s * (double)NS_PER_S);
+}
+
+int64_t table_known_ns(const struct table *t, unsigned axis)
+{
+    const int64_t known_ns = motion_known_ns(&t->axis[axis]);
+    return known_ns > 0 ? known_ns + delay_ns(t, axis) : 0;
+}
+
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns)
 {
     assert(axis < t->cfg.axes);
     const struct table_axis_cfg *c = &t->cfg.axis[axis];
     const struct motion *m = &t->axis[axis];
-    const int64_t shown_ns = t_ns - (int64_t)nearbyint(c->readout_delay_s * (double)NS_PER_S);
+    const int64_t shown_ns = t_ns - delay_ns(t, axis);
     const struct motion_state s = axis_state(t, axis, shown_ns);
     const double angle_rad = det_quantise(s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns),
                                           c->readout_resolution_arcsec * RAD_PER_ARCSEC);

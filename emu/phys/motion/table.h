@@ -28,6 +28,7 @@ struct table_axis_cfg {
 
 struct table_cfg {
     unsigned axes; /* 0: there is no table */
+    bool coarse;   /* it shows no angles */
     double base_tilt_x_arcsec, base_tilt_y_arcsec;
     struct table_axis_cfg axis[TABLE_AXES_MAX]; /* from the outermost */
 };
@@ -93,6 +94,9 @@ void table_ripple_remove(struct table *t, struct table_ripple *r); /* the axis i
 
 /* Pure: the same instant shows the same noise. The axis exists. */
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns);
+
+/* From which instant on table_read() can be asked. */
+int64_t table_known_ns(const struct table *t, unsigned axis);
 
 /* Truth. */
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns);
