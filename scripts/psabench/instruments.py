@@ -266,7 +266,9 @@ class Table(Instrument):
         while len(angles) < count:
             part = min(count - len(angles), LOG_COUNT)
             at_s = from_s + len(angles) * every_s
-            answer = self.query(f"AXIS{axis}:LOG? {at_s:.9f},{every_s:.9f},{part}")
+            command = f"AXIS{axis}:LOG? {at_s:.9f},{every_s:.9f},{part}"
+            answer, _, error = self.query(f"{command};:SYST:ERR?").partition(";")
+            self._raise_error(command, error if '"' not in answer else f"{answer};{error}")
             angles += [float(a) for a in answer.split(",")]
         return np.array(angles)
 

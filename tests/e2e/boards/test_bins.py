@@ -102,18 +102,65 @@ def test_noise_is_that_of_the_article_at_all_averages() -> None:
             assert np.std(means, axis=0) == pytest.approx(want, rel=0.06 if n < 100 else 0.18)
 
 
-@pytest.mark.parametrize("scenario", ["sins_table", "sins_coarse"])
-def test_three_cycles_of_fifteen_minutes_in_seconds(scenario: str) -> None:
-    """The article's plan through CAN: 45 minutes. The wall time is of the emulator and this host together."""
-    begun_s = time.monotonic()
-    with Bench.start(scenario) as bench:
+def test_what_the_unit_shows_is_what_was_drawn_for_it() -> None:
+    """There and back about x on a coarse table: drift and scale of gyro X, zero and scale of accelerometers Y and Z."""
+    with Bench.start("sins_coarse") as bench:
+        bench.board(Bins).wait_ready()
+        turns = []
+        for angle_deg in (360.0, 0.0):
+            bench.table.position(angle_deg, 12.0, wait=False)
+            turns.append(taken(bench, 3500))
+        specimen = bench.truth()["units"]["sins"]["specimen"]
+    there, back = (t.dtheta_rad[:, 0].sum() for t in turns)
+    scale = (there - back) / (4.0 * np.pi) - 1.0
+    drift_radps = (there + back) / 70.0 - EARTH_RADPS * np.cos(LATITUDE)
+    assert scale == pytest.approx(specimen["theta_11"], abs=1.3e-6)  # four times 0.1 deg/h over 35 s
+    assert drift_radps == pytest.approx(specimen["nu0_1_radps"], abs=0.06 * ARCSEC)
+    # in a turn at a constant rate gravity is a circle in y and z: centre and axes of what is measured
+    steady = turns[0].dv_mps[400:2700, 1:] / 0.01
+    angle = np.cumsum(turns[0].dtheta_rad[:, 0])[400:2700]
+    base = np.stack([np.ones_like(angle), np.sin(angle), np.cos(angle)], axis=1)
+    (zero_y, sin_y, cos_y), (zero_z, sin_z, cos_z) = np.linalg.lstsq(base, steady, rcond=None)[0].T
+    noise = 5 * 1e-3 / np.sqrt(23.0)
+    assert zero_y == pytest.approx(specimen["df0_2_mps2"], abs=noise)
+    assert zero_z == pytest.approx(specimen["df0_3_mps2"], abs=noise)
+    assert np.hypot(sin_y, cos_y) / G_MPS2 - 1 == pytest.approx(specimen["gamma_22"], abs=noise / 5)
+    assert np.hypot(sin_z, cos_z) / G_MPS2 - 1 == pytest.approx(specimen["gamma_33"], abs=noise / 5)
+
+
+def test_faults_show_in_the_flags_and_end(tmp_path: Path) -> None:
+    with Bench.start(ideal(tmp_path)) as bench:
         unit = bench.board(Bins)
         unit.wait_ready()
-        for pose in ((0.0, 0.0), (0.0, -90.0), (90.0, 0.0)):
-            for axis, angle_deg in zip((2, 3), pose, strict=True):
-                bench.table.position(angle_deg, 10.0, axis=axis)
+        with bench.fault("controller.frozen_words", "sins.computer"):
+            got = taken(bench, 20)
+            assert (got.dtheta_rad == got.dtheta_rad[0]).all()
+        with bench.fault("chip.dout_dead", "sins.adc.y", level="high"):
+            assert np.ptp(taken(bench, 20).dv_mps[5:, 1]) == 0.0
+        with bench.fault("sensor.bias", "sins.sensor.x", bias_v=12.0):
+            assert unit.stream(20)["CLIP"][5:].all()
+        with bench.fault("chip.drdy_stuck", "sins.adc.x", level="high"):
+            bench.run_for(0.5)
+            assert unit.node.read(0x1001) & 0x81 == 0x81
+        bench.run_for(0.2)
+        assert taken(bench, 20).whole.all()
+        assert unit.counters()["Missed words"] > 100
+        assert unit.node.read(0x1001) == 0
+
+
+def test_three_cycles_of_fifteen_minutes_in_seconds() -> None:
+    """The article's plan through CAN: 45 minutes. What is printed is the wall time of emulator and host together."""
+    begun_s = time.monotonic()
+    with Bench.start("sins_table") as bench:
+        bench.board(Bins).wait_ready()
+        for axis, pose in enumerate(((0.0, 0.0), (0.0, -90.0), (90.0, 0.0))):
+            for which, angle_deg in zip((2, 3), pose, strict=True):
+                bench.table.position(angle_deg, 10.0, axis=which)
             bench.table.profile([0.0, 450.0, 900.0], [10.0, -10.0, 0.0])
             got = taken(bench, 90_000)
             assert got.whole.all()
             assert np.unique(np.diff(got.seq) % 65536).tolist() == [1]
+            most = np.abs(np.cumsum(got.dtheta_rad, axis=0)).max(axis=0)
+            assert np.degrees(most[axis]) == pytest.approx(4500.0, abs=15.0)
+            assert np.degrees(np.delete(most, axis)).max() < 20.0
     print(f"{time.monotonic() - begun_s:.1f} s")
