@@ -10,6 +10,7 @@ import pytest
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, Increments, increments
 from psabench.errors import InstrumentError
+from psabench.link.vcd import read_vcd
 
 pytestmark = pytest.mark.host
 
@@ -164,3 +165,14 @@ def test_three_cycles_of_fifteen_minutes_in_seconds() -> None:
             assert np.degrees(most[axis]) == pytest.approx(4500.0, abs=15.0)
             assert np.degrees(np.delete(most, axis)).max() < 20.0
     print(f"{time.monotonic() - begun_s:.1f} s")
+
+
+def test_tick_is_where_the_interval_ends(tmp_path: Path) -> None:
+    with Bench.start(ideal(tmp_path)) as bench:
+        bench.board(Bins).wait_ready()
+        with bench.trace(tmp_path / "tick.vcd") as path:
+            got = taken(bench, 30)
+    tick = read_vcd(Path(path)).wires["TICK"]
+    rises_us = np.round(tick.edges_ns(1) / 1e3)
+    assert set(np.round(got.end_s * 1e6)[1:-1]) <= set(rises_us)
+    assert np.unique(tick.edges_ns(0)[-20:] - tick.edges_ns(1)[-20:]).tolist() == [100_000]
