@@ -21,11 +21,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-import numpy as np
-
 from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut, expected
 from psabench.estimate.face import Face
-from psabench.link.signals import Floats
 
 if TYPE_CHECKING:
     from pyvisa.resources import MessageBasedResource
@@ -260,7 +257,7 @@ class Table(Instrument):
         t_s, angle_deg = self.query(f"AXIS{axis}:STAM?").split(",")
         return float(t_s), float(angle_deg)
 
-    def log(self, from_s: float, every_s: float, count: int, *, axis: int = 1) -> Floats:
+    def log(self, from_s: float, every_s: float, count: int, *, axis: int = 1) -> list[float]:
         """Angles of the readout at past instants, deg: its log goes back to the last four motions of the axis."""
         angles: list[float] = []
         while len(angles) < count:
@@ -270,7 +267,7 @@ class Table(Instrument):
             answer, _, error = self.query(f"{command};:SYST:ERR?").partition(";")
             self._raise_error(command, error if '"' not in answer else f"{answer};{error}")
             angles += [float(a) for a in answer.split(",")]
-        return np.array(angles)
+        return angles
 
     def rate_dps(self, *, axis: int = 1) -> float:
         return self.number(f"AXIS{axis}:RATE?")

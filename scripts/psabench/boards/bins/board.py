@@ -14,7 +14,12 @@ SESSION = Session(
     comment="Opens on the first readings; the lines carry\nthe names of docs/boards/bins.md.",
     gtk_from_ns=195_000_000,
     gtk_cursor_ns=200_000_000,
-    groups={"Gyros": "TICK", "Accelerometers": "DRD_A SClk Int Data CLK"},
+    groups={
+        "Gyros": "TICK",
+        "Accelerometers": "SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ",
+        "Temperatures": "SYNC_T CST DRD_T DInT DOutT",
+        "To the computer": "Res Int Data CLK",
+    },
 )
 
 BOARD = Board(
