@@ -96,7 +96,7 @@ struct board_type {
                        struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
     /* Its own accelerometer of a channel, where the bench puts no other sensor there; g: the site's. NULL: it has none. */
     void (*accelerometer)(const struct board *b, unsigned axis, double g_mps2, struct mems_g *m);
-    bool analog;                                            /* it has analog inputs; for faults: sample_until() first */
+    bool analog; /* it has analog inputs; for faults: sample_until() first */
     void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const struct board *b, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */

@@ -36,7 +36,7 @@ struct board_io {
      * smooth, if nothing changes abruptly before. */
     void (*kinematics)(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3]);
     int64_t (*smooth_ns)(void *ctx, int64_t t_ns);
-    void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
+    void (*event)(void *ctx, unsigned event, int64_t t_ns); /* number in board_type.events; may be NULL */
     /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
     double (*supply_ratio)(void *ctx, int64_t t_ns);
     const struct board_platform_io *platform; /* NULL: there is none */

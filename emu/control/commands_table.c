@@ -86,7 +86,8 @@ static bool is_kept(const struct control_call *call, int64_t from_ns, int64_t la
 static enum control_outcome do_log(const struct control_call *call)
 {
     const struct table *t = &call->bench->lab->table;
-    const int64_t from_ns = (int64_t)nearbyint(call->v[1].real * 1e9), every_ns = (int64_t)nearbyint(call->v[2].real * 1e9);
+    const int64_t from_ns = (int64_t)nearbyint(call->v[1].real * 1e9),
+                  every_ns = (int64_t)nearbyint(call->v[2].real * 1e9);
     const unsigned count = (unsigned)call->v[3].count;
     if (!check_log(call->bench, call->v, &call->control->error)) return CONTROL_REJECTED;
     if (!is_kept(call, from_ns, from_ns + (int64_t)(count - 1) * every_ns)) return CONTROL_REJECTED;

@@ -115,10 +115,14 @@ void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const do
 int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
 {
     switch (mounting->on) {
-    case LAB_TABLE: return table_smooth_ns(&l->table, t_ns);
-    case LAB_HEAD: return head_smooth_ns(&l->head, t_ns);
-    case LAB_PLATFORM: return platform_smooth_ns(&l->platform, t_ns);
-    case LAB_FIXED: break;
+    case LAB_TABLE:
+        return table_smooth_ns(&l->table, t_ns);
+    case LAB_HEAD:
+        return head_smooth_ns(&l->head, t_ns);
+    case LAB_PLATFORM:
+        return platform_smooth_ns(&l->platform, t_ns);
+    case LAB_FIXED:
+        break;
     }
     return INT64_MAX;
 }

@@ -195,7 +195,7 @@ static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
     for (unsigned i = 0; i < 3; i++) w_ib_b[i] = kin.w_radps[i];
 }
 
-static void kinematics(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3])
+static void case_kinematics(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3])
 {
     static const double origin_m[3] = {0.0, 0.0, 0.0};
     const struct unit *u = ctx;
@@ -305,7 +305,7 @@ static void init_board(struct unit *u, struct sched *s)
     io.accel_range = accel_range;
     io.accel_past_ns = accel_past_ns;
     io.skip_accel = skip_accel;
-    io.kinematics = kinematics;
+    io.kinematics = case_kinematics;
     io.smooth_ns = smooth_ns;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;

@@ -21,22 +21,24 @@ enum bins_event { BINS_EV_LATCH = PSA2_EVENTS, BINS_EV_READING, BINS_EVENTS };
 extern const char *const bins_events[BINS_EVENTS];
 
 /* Faults of the controller: bits of board.faults, beside those of a PSA-2. */
-enum bins_controller_fault { BINS_FAULT_FROZEN_WORDS = 0x100 }; /* the increments of the reading before, over and over */
+enum bins_controller_fault {
+    BINS_FAULT_FROZEN_WORDS = 0x100
+}; /* the increments of the reading before, over and over */
 
 /* bins_reading.flags */
 enum bins_flag {
-    BINS_SETTLED = 1,     /* the converters had settled in each word */
-    BINS_CLIP = 2,        /* a word was at its limit */
-    BINS_INCOMPLETE = 4,  /* words are missing in the sums */
-    BINS_STRETCHED = 8,        /* the interval is longer than one period: a latch is missing */
-    BINS_TEMP_NEW = 16    /* a temperature has come since the reading before */
+    BINS_SETTLED = 1,    /* the converters had settled in each word */
+    BINS_CLIP = 2,       /* a word was at its limit */
+    BINS_INCOMPLETE = 4, /* words are missing in the sums */
+    BINS_STRETCHED = 8,  /* the interval is longer than one period: a latch is missing */
+    BINS_TEMP_NEW = 16   /* a temperature has come since the reading before */
 };
 
 /* Increments since the reading before, in the instrument's axes. */
 struct bins_reading {
-    uint32_t seq;    /* from power-up or reset, from 1 */
-    int64_t t_ns;    /* end of the interval of the gyros */
-    int32_t gyro[3]; /* counts */
+    uint32_t seq;     /* from power-up or reset, from 1 */
+    int64_t t_ns;     /* end of the interval of the gyros */
+    int32_t gyro[3];  /* counts */
     int32_t accel[3]; /* sums of codes; a code is truncated: half of one is missing in each word */
     uint8_t words, flags;
 };
@@ -71,13 +73,13 @@ struct bins_gyros {
 
 /* The computer's sums and latches. */
 struct bins_sums {
-    bool based; /* from which a reading begins is known */
-    uint32_t word;   /* number of the last, from 0 */
-    int64_t word_ns; /* its data-ready; -1: none has come */
-    uint32_t words; /* in the sums */
+    bool based;       /* from which a reading begins is known */
+    uint32_t word;    /* number of the last, from 0 */
+    int64_t word_ns;  /* its data-ready, when it was due; -1: none has come */
+    uint32_t words;   /* in the sums */
     int64_t delay_ns; /* of the converters, known from the first word on */
     int64_t sum[3];
-    uint8_t status;   /* of all of them: enum psa2_status, SETTLED and CLIP turned into what is wrong */
+    uint8_t status; /* of all of them: enum psa2_status, SETTLED and CLIP turned into what is wrong */
     bool incomplete, temp_new;
     struct bins_latch from; /* of the reading before */
     uint32_t next;          /* interval whose latch comes next */
@@ -106,8 +108,9 @@ void bins_reset(struct bins *b, int64_t t_ns);
 void bins_sample_until(struct bins *b, int64_t t_ns);
 
 /* What the unit knows of itself. */
-int64_t bins_word_ns(const struct bins *b);        /* between two words */
-int64_t bins_accel_age_ns(const struct bins *b);   /* by how much the sums' interval is older than the gyros'; 0: aligned */
+int64_t bins_word_ns(const struct bins *b); /* between two words */
+int64_t
+bins_accel_age_ns(const struct bins *b); /* by how much the sums' interval is older than the gyros'; 0: aligned */
 double bins_accel_mps_per_code(const struct bins *b); /* a code of a word, as velocity */
 
 /* ---- bins/gyro.c: counts of the angle about each axis, exact integrals of what the lab has as functions of time ---- */

@@ -7,7 +7,7 @@
 
 /* ---- profile ---- */
 
-static void about(const void *profile, char *out, size_t cap)
+static void describe_profile(const void *profile, char *out, size_t cap)
 {
     const struct bins_profile *p = profile;
     (void)snprintf(out, cap, "increments each %.4g ms of %u words, %.4g arcsec a count of the gyros",
@@ -21,12 +21,10 @@ static void about(const void *profile, char *out, size_t cap)
 static const struct board_counter counters[] = {COUNT(readings), COUNT(resets), COUNT(missed_words),
                                                 COUNT(missed_latches), COUNT(saturated)};
 
-static const struct board_part parts[] = {{.name = "computer",
-                                           .label = "board",
-                                           .offset = offsetof(struct bins, counters),
-                                           BOARD_COUNTERS(counters)},
-                                          PSA2_KPSA_PART(NULL, "kpsa"),
-                                          PSA2_CHIP_PARTS};
+static const struct board_part parts[] = {
+    {.name = "computer", .label = "board", .offset = offsetof(struct bins, counters), BOARD_COUNTERS(counters)},
+    PSA2_KPSA_PART(NULL, "kpsa"),
+    PSA2_CHIP_PARTS};
 
 static const struct board_controller_fault controller_faults[] = {
     {"controller.frozen_words", BINS_FAULT_FROZEN_WORDS},
@@ -36,7 +34,7 @@ static const char *const port_lines[] = {"TICK", "Int", "Data", "CLK", NULL};
 static const char *const capabilities[] = {"adc_chain", "temp_adc_offset_v", "temp_adc_gain_error", "temp_noise_scale",
                                            NULL};
 
-static unsigned pulses(const struct board *board)
+static unsigned clk_pulses(const struct board *board)
 {
     return PSA2_WORDS * ((const struct psa2 *)board)->profile.word_bits;
 }
@@ -44,7 +42,7 @@ static unsigned pulses(const struct board *board)
 /* ---- the accelerometers */
 
 /* Of a sensor that feels a = -f on its own axes, x y z turned on by the channel (unit.h): volts for positive force. */
-static void accelerometer(const struct board *board, unsigned axis, double g_mps2, struct mems_g *m)
+static void fit_accelerometer(const struct board *board, unsigned axis, double g_mps2, struct mems_g *m)
 {
     const struct bins *b = (const struct bins *)board;
     const double v_per_mps2 = b->profile.accel_v_per_g / BINS_STANDARD_G_MPS2;
@@ -54,14 +52,15 @@ static void accelerometer(const struct board *board, unsigned axis, double g_mps
     m->kx_v_per_g = -row[axis] * v_per_mps2 * g_mps2;
     m->ky_v_per_g = -row[(axis + 1) % 3] * v_per_mps2 * g_mps2;
     m->kz_v_per_g = -row[(axis + 2) % 3] * v_per_mps2 * g_mps2;
-    m->noise_v_rthz = b->profile.accel_noise_mps2 * v_per_mps2 * 1.4142135623730951; /* one-sided: a mean of 1 s passes half */
+    m->noise_v_rthz =
+        b->profile.accel_noise_mps2 * v_per_mps2 * 1.4142135623730951; /* one-sided: a mean of 1 s passes half */
 }
 
 /* ---- life ---- */
 
 BOARD_LIFE(bins);
 
-static bool ready(const struct board *board)
+static bool is_ready(const struct board *board)
 {
     const struct bins *b = (const struct bins *)board;
     return psa2_ready(&b->psa2) && b->sums.based;
@@ -81,7 +80,7 @@ static void put_matrix(board_truth_fn *put, void *ctx, const char *name, const d
         for (unsigned j = 0; j < 3; j++) board_put_truth(put, ctx, m[i][j], "%s_%u%u", name, i + 1, j + 1);
 }
 
-static void truth(const struct board *board, board_truth_fn *put, void *ctx)
+static void put_truth(const struct board *board, board_truth_fn *put, void *ctx)
 {
     const struct inertial_errors *e = &((const struct bins *)board)->errors;
     for (unsigned i = 0; i < 3; i++) board_put_truth(put, ctx, e->nu0_radps[i], "nu0_%u_radps", i + 1);
@@ -126,7 +125,7 @@ static void add_latest(struct sha256 *s, const struct bins_reading *r)
     for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)(uint32_t)r->gyro[i] << 32 | (uint32_t)r->accel[i]);
 }
 
-static void digest(const struct board *board, struct sha256 *s)
+static void add_digest(const struct board *board, struct sha256 *s)
 {
     const struct bins *b = (const struct bins *)board;
     psa2_digest(&b->psa2, s);
@@ -139,7 +138,23 @@ static void digest(const struct board *board, struct sha256 *s)
 }
 
 const struct board_type bins_board = {
-    BOARD_COMMON(bins, BINS),
+    .name = "bins",
+    .size = sizeof(struct bins),
+    .fields = &bins_fields,
+    .profile_check = bins_profile_check,
+    .about = describe_profile,
+    .lines = bins_lines,
+    .line_count = BINS_LINES,
+    .port_lines = port_lines,
+    .events = bins_events,
+    .event_count = BINS_EVENTS,
+    .parts = parts,
+    .part_count = sizeof parts / sizeof *parts,
+    .controller_faults = controller_faults,
+    .can = &bins_can,
+    BOARD_LIFE_FUNCTIONS,
+    .ready = is_ready,
+    .digest = add_digest,
     .title = "BINS",
     .profile_name = "bins",
     .capabilities = capabilities,
@@ -147,9 +162,9 @@ const struct board_type bins_board = {
     .period_ns = bins_period_ns,
     .frame_line = PSA2_LINE_INT,
     .pulse_line = PSA2_LINE_CLK,
-    .pulses = pulses,
-    .accelerometer = accelerometer,
+    .pulses = clk_pulses,
+    .accelerometer = fit_accelerometer,
     .noises = list_noises,
     .analog = true,
-    .truth = truth,
+    .truth = put_truth,
 };

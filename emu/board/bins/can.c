@@ -100,8 +100,10 @@ static double read_timing(const struct board_node *n, const struct co_entry *e)
 }
 
 static const struct board_object objects[] = {
-    {BINS_OD_INCREMENTS, .value = read_increments}, {BINS_OD_READING, .value = read_head},
-    {BINS_OD_TEMPERATURES, .value = read_temperature}, {BINS_OD_WEIGHTS, .value = read_weight},
+    {BINS_OD_INCREMENTS, .value = read_increments},
+    {BINS_OD_READING, .value = read_head},
+    {BINS_OD_TEMPERATURES, .value = read_temperature},
+    {BINS_OD_WEIGHTS, .value = read_weight},
     {BINS_OD_TIMING, .value = read_timing},
 };
 

@@ -1,12 +1,11 @@
 /* The unit's computer: sums the words of the PSA-2, latches the gyros where a sum ends, and hands out the increments. */
 #include "board/bins/bins.h"
-#include "board/psa2/internal.h"
 
 #include <string.h>
 
 #define NS_A_SECOND  INT64_C(1000000000)
-#define WORDS_AHEAD  1.5 /* words: a latch is armed no sooner; the next frame may be as late as half a word */
 #define CODE_FULL    8388608.0
+#define LATE_PART    8 /* of a word: later than that it is late */
 #define TEMPERATURES 4u
 
 const struct board_line bins_lines[BINS_LINES] = {PSA2_LINE_ROWS, [BINS_LINE_TICK] = {"TICK", false}};
@@ -20,7 +19,7 @@ int64_t bins_word_ns(const struct bins *b)
     return NS_A_SECOND / b->profile.accel_sps;
 }
 
-/* A word is of the instant one delay ago, and stands for half a word before and after it. */
+/* A word is of the instant one delay ago, and covers half a word before and after it. */
 static int64_t delay_ns(const struct bins *b)
 {
     return ads1282_delay_ns(&b->psa2.adc[0]) - bins_word_ns(b) / 2;
@@ -69,7 +68,7 @@ static void take_increments(struct bins *b, const struct bins_latch *at)
     r->flags = flags_of(b, at);
 }
 
-static void publish(struct bins *b, const struct bins_latch *at, int64_t t_ns)
+static void send_reading(struct bins *b, const struct bins_latch *at, int64_t t_ns)
 {
     if (!(b->psa2.base.faults & BINS_FAULT_FROZEN_WORDS)) take_increments(b, at);
     b->latest.seq++;
@@ -99,7 +98,7 @@ static void complete_until(struct bins *b, uint32_t word, int64_t t_ns)
         const struct bins_latch at = s->latch[s->first];
         s->first = (s->first + 1) % BINS_LATCHES;
         s->count--;
-        if (s->based) publish(b, &at, t_ns);
+        if (s->based) send_reading(b, &at, t_ns);
         begin_sums(s, &at);
     }
 }
@@ -129,24 +128,21 @@ static void latch_gyros(void *ctx, int64_t t_ns)
     board_notify(&b->psa2.base, BINS_EV_LATCH, t_ns);
 }
 
-static int64_t latch_ns(const struct bins *b, const struct psa2_frame *f)
+static int64_t latch_ns(const struct bins *b)
 {
     const int64_t words = (int64_t)last_word_of(b, b->sums.next) - (int64_t)b->sums.word;
-    return f->t_sample_ns + words * bins_word_ns(b) - (b->profile.aligned ? b->sums.delay_ns : 0);
+    return b->sums.word_ns + words * bins_word_ns(b) - (b->profile.aligned ? b->sums.delay_ns : 0);
 }
 
-/* Of the first interval whose end is still to come. */
-static void arm_latch(struct bins *b, const struct psa2_frame *f, int64_t t_ns)
+/* Of the first interval whose end is still to come; each frame tells it better, and one that is lost leaves it. */
+static void arm_latch(struct bins *b, int64_t t_ns)
 {
     struct bins_sums *s = &b->sums;
-    if (s->ev.queued) return;
-    while (latch_ns(b, f) <= t_ns) {
+    while (latch_ns(b) <= t_ns) {
         b->counters.missed_latches += s->based;
         s->next++;
     }
-    const int64_t at_ns = latch_ns(b, f);
-    if (at_ns - t_ns <= (int64_t)(WORDS_AHEAD * (double)bins_word_ns(b)))
-        sched_at(b->psa2.base.sched, &s->ev, at_ns);
+    sched_at(b->psa2.base.sched, &s->ev, latch_ns(b));
 }
 
 /* ---- frames of the PSA-2 */
@@ -155,9 +151,17 @@ static void arm_latch(struct bins *b, const struct psa2_frame *f, int64_t t_ns)
 static uint32_t number_of(const struct bins *b, const struct psa2_frame *f)
 {
     const struct bins_sums *s = &b->sums;
-    const int64_t word_ns = bins_word_ns(b), words = (f->t_sample_ns - s->word_ns + word_ns / 2) / word_ns;
+    const int64_t word_ns = bins_word_ns(b), words = (f->t_sample_ns - s->word_ns + word_ns / LATE_PART) / word_ns;
     if (s->word_ns < 0) return 0;
     return s->word + (uint32_t)(words > 1 ? words : 1);
+}
+
+/* When it was due: a data-ready is late where its pin was stuck, and does not move what follows. */
+static int64_t due_ns(const struct bins *b, const struct psa2_frame *f, uint32_t number)
+{
+    const struct bins_sums *s = &b->sums;
+    const int64_t word_ns = bins_word_ns(b), at_ns = s->word_ns + (int64_t)(number - s->word) * word_ns;
+    return s->word_ns >= 0 && f->t_sample_ns - at_ns > word_ns / LATE_PART ? at_ns : f->t_sample_ns;
 }
 
 static void add_word(struct bins *b, const struct psa2_frame *f, uint32_t number)
@@ -166,8 +170,8 @@ static void add_word(struct bins *b, const struct psa2_frame *f, uint32_t number
     const uint32_t missing = s->word_ns < 0 ? 0 : number - s->word - 1;
     b->counters.missed_words += missing;
     s->incomplete |= missing != 0;
+    s->word_ns = due_ns(b, f, number);
     s->word = number;
-    s->word_ns = f->t_sample_ns;
     s->words++;
     for (unsigned i = 0; i < 3; i++) s->sum[i] += f->code[i];
     s->status = (uint8_t)((s->status & f->status & PSA2_ST_SETTLED) | ((s->status | f->status) & PSA2_ST_CLIP));
@@ -185,7 +189,7 @@ static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
     else complete_until(b, number - 1, t_ns);
     add_word(b, f, number);
     complete_until(b, number, t_ns);
-    arm_latch(b, f, t_ns);
+    arm_latch(b, t_ns);
 }
 
 static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
@@ -196,7 +200,7 @@ static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
 
 /* ---- life */
 
-static void restart(struct bins *b)
+static void clear_sums(struct bins *b)
 {
     struct sched *s = b->psa2.base.sched;
     sched_cancel(s, &b->sums.ev);
@@ -223,14 +227,14 @@ void bins_init(struct bins *b, const struct bins_profile *p, const struct board_
 
 void bins_power_up(struct bins *b, int64_t t_ns)
 {
-    restart(b);
+    clear_sums(b);
     bins_gyro_power(b, true, t_ns);
     psa2_power_up(&b->psa2, t_ns);
 }
 
 void bins_power_down(struct bins *b, int64_t t_ns)
 {
-    restart(b);
+    clear_sums(b);
     bins_gyro_power(b, false, t_ns);
     psa2_power_down(&b->psa2, t_ns);
 }
@@ -239,7 +243,7 @@ void bins_power_down(struct bins *b, int64_t t_ns)
 void bins_reset(struct bins *b, int64_t t_ns)
 {
     if (b->psa2.mode == PSA2_OFF) return;
-    restart(b);
+    clear_sums(b);
     b->counters.resets++;
     psa2_reset(&b->psa2, t_ns);
 }

@@ -5,7 +5,8 @@
 
 #include <math.h>
 
-#define PANEL_NS       INT64_C(10000000) /* of the quadrature, and step of the noise: whole ones since power-on of the bench */
+#define PANEL_NS                                                                                                       \
+    INT64_C(10000000) /* of the quadrature, and step of the noise: whole ones since power-on of the bench */
 #define NS_PER_SECOND  1e9
 #define GAUSS_FROM_END 0.21132486540518713 /* (1 - 1/sqrt 3)/2: nodes of Gauss-Legendre with two points */
 
@@ -48,7 +49,7 @@ static void walk_step(struct bins_gyros *g)
     for (unsigned i = 0; i < 3; i++) g->angle_rad[i] += g->walk_rad * draws_gauss(&g->noise[i], g->t_ns / PANEL_NS);
 }
 
-static int64_t earlier(int64_t a_ns, int64_t b_ns)
+static int64_t earlier_of(int64_t a_ns, int64_t b_ns)
 {
     return a_ns < b_ns ? a_ns : b_ns;
 }
@@ -60,7 +61,7 @@ void bins_gyro_until(struct bins *b, int64_t t_ns)
     while (g->t_ns < t_ns) {
         const int64_t step_ns = (g->t_ns / PANEL_NS + 1) * PANEL_NS;
         const int64_t smooth_ns = b->psa2.base.io.smooth_ns(b->psa2.base.io.ctx, g->t_ns);
-        integrate_smooth(b, earlier(earlier(step_ns, smooth_ns), t_ns));
+        integrate_smooth(b, earlier_of(earlier_of(step_ns, smooth_ns), t_ns));
         if (g->t_ns == step_ns) walk_step(g);
     }
 }

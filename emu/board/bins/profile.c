@@ -3,7 +3,6 @@
 #include "base/detmath.h"
 #include "base/why.h"
 
-
 #define NAME(...) FIELD_NAME(struct bins_profile, __VA_ARGS__)
 #define ROW(...)  FIELD_ROW(struct bins_profile, __VA_ARGS__)
 #define LIST(member, n, most, words)                                                                                   \
@@ -94,8 +93,7 @@ struct inertial_errors bins_profile_errors(const struct bins_profile *p, uint64_
         for (unsigned j = 0; j < 3; j++) {
             e.theta[i][j] = p->gyro_theta[3 * i + j];
             e.gamma[i][j] = p->accel_gamma[3 * i + j];
-            e.g_drift_radps_per_mps2[i][j] =
-                p->gyro_g_degph_per_g[3 * i + j] * RADPS_PER_DEGPH / BINS_STANDARD_G_MPS2;
+            e.g_drift_radps_per_mps2[i][j] = p->gyro_g_degph_per_g[3 * i + j] * RADPS_PER_DEGPH / BINS_STANDARD_G_MPS2;
         }
     }
     inertial_draw(&e, &sd, seed, serial);

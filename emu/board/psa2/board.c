@@ -42,7 +42,7 @@ const struct board_counter psa2_temp_counters[PSA2_TEMP_COUNTERS] = {
 };
 // clang-format on
 
-/* Which converter a part is, in whatever table of parts it stands. */
+/* Which converter a part is, in whatever table of parts it is. */
 static struct ads1282 *adc_of(struct board *board, unsigned part)
 {
     return (struct ads1282 *)(void *)((char *)board + board->type->parts[part].offset);

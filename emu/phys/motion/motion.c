@@ -59,7 +59,7 @@ int64_t motion_known_ns(const struct motion *m)
     return m->plan[(m->latest + 1) % MOTION_HISTORY].start_ns;
 }
 
-/* Pieces begin between two nanoseconds: the later one is told. */
+/* Pieces begin between two nanoseconds: the later one it is. */
 int64_t motion_smooth_ns(const struct motion *m, int64_t t_ns)
 {
     const struct motion_plan *p = plan_at(m, t_ns);

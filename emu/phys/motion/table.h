@@ -52,7 +52,7 @@ struct table_ripple {
 
 /* Turns of an axis at an angle: kept while it rests. */
 struct table_turns {
-    double angle_rad; /* NaN: none are kept */
+    double angle_rad;   /* NaN: none are kept */
     double cone_rad[2]; /* about the two axes across */
     struct pose_angle cone[2], angle;
 };

@@ -26,7 +26,7 @@ void inertial_draw(struct inertial_errors *e, const struct inertial_spread *sd, 
     draw_matrix(e->gamma, sd->gamma_scale, sd->gamma_misalignment, seed, serial, "inertial.gamma");
 }
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -35,8 +35,8 @@ void inertial_rate_radps(const struct inertial_errors *e, const double w_radps[3
                          double measured_radps[3])
 {
     for (unsigned i = 0; i < 3; i++)
-        measured_radps[i] =
-            w_radps[i] + e->nu0_radps[i] + dot(e->theta[i], w_radps) + dot(e->g_drift_radps_per_mps2[i], f_mps2);
+        measured_radps[i] = w_radps[i] + e->nu0_radps[i] + dot_product(e->theta[i], w_radps) +
+                            dot_product(e->g_drift_radps_per_mps2[i], f_mps2);
 }
 
 void inertial_force_row(const struct inertial_errors *e, unsigned axis, double row[3])

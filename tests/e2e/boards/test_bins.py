@@ -1,4 +1,4 @@
-"""The inertial unit through the wire: CAN frames and the table's SCPI alone, compared with the truth port where said."""
+"""The inertial unit through the wire: CAN frames and the table's SCPI alone; the truth port where said."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench.bench import Bench
-from psabench.boards.bins.device import Bins, Increments, increments
+from psabench.boards.bins.device import Bins, Increments, increments_of
 from psabench.errors import InstrumentError
 from psabench.link.vcd import read_vcd
 
@@ -22,7 +22,9 @@ NO_ERRORS = (
     "gyro_bias_sd_degph: 0, gyro_scale_sd: 0, gyro_misalignment_sd_arcmin: 0, accel_bias_sd_mps2: 0, "
     "accel_scale_sd: 0, accel_misalignment_sd_arcmin: 0, gyro_noise_degph: 0, accel_noise_mps2: 0"
 )
-TABLE = "{along: x, wobble_arcsec: 0, readout_noise_arcsec_rms: 15, readout_delay_s: 0.05, readout_resolution_arcsec: 0}"
+TABLE = (
+    "{along: x, wobble_arcsec: 0, readout_noise_arcsec_rms: 15, readout_delay_s: 0.05, readout_resolution_arcsec: 0}"
+)
 IDEAL = f"""seed: 1
 site: {{latitude_deg: 55.7, longitude_deg: 37.5, height_m: 150}}
 table: {{axes: [{TABLE}]}}
@@ -39,7 +41,7 @@ def ideal(folder: Path, table: str = "") -> Path:
 
 def taken(bench: Bench, count: int) -> Increments:
     unit = bench.board(Bins)
-    return increments(unit.stream(count), unit.weights())
+    return increments_of(unit.stream(count), unit.weights())
 
 
 def test_at_rest_it_shows_earth_and_gravity(tmp_path: Path) -> None:
@@ -70,7 +72,9 @@ def test_increments_of_angle_are_the_table_s(tmp_path: Path) -> None:
     late_s = -(np.diff(angles_rad).mean() / 0.02 - np.radians(10.0)), np.mean(off_rad)
     assert abs(late_s[0]) < 1e-5
     # against the angle of the stamped reading, which is as late: the rate alone lies between the two
-    assert np.radians(now_deg) - angles_rad[0] == pytest.approx(np.radians(10.0) * (t_s - got.end_s[0]), abs=60 * ARCSEC)
+    assert np.radians(now_deg) - angles_rad[0] == pytest.approx(
+        np.radians(10.0) * (t_s - got.end_s[0]), abs=60 * ARCSEC
+    )
 
 
 def test_the_table_keeps_no_log_beyond_its_motions_and_a_coarse_one_none(tmp_path: Path) -> None:

@@ -1,11 +1,11 @@
 """An inertial unit over CAN: raw increments of angle and velocity (docs/reference/protocol_bins.md).
 
-    unit = bench.board(Bins)
-    unit.wait_ready()
-    got = increments(unit.stream(6000), unit.weights())
-    got.dtheta_rad          # (n, 3), of each interval
-    got.dv_mps              # (n, 3)
-    got.end_s               # (n,), when each interval ended, the unit's clock
+unit = bench.board(Bins)
+unit.wait_ready()
+got = increments_of(unit.stream(6000), unit.weights())
+got.dtheta_rad          # (n, 3), of each interval
+got.dv_mps              # (n, 3)
+got.end_s               # (n,), when each interval ended, the unit's clock
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Increments:
     whole: np.ndarray  # (n,) bool: settled, complete, of one period, within the range
 
 
-def increments(readings: Readings, weights: Weights) -> Increments:
+def increments_of(readings: Readings, weights: Weights) -> Increments:
     """Readings as the unit sends them, in SI."""
     whole = (readings["SETTLED"] == 1) & (readings["CLIP"] + readings["INCOMPLETE"] + readings["STRETCHED"] == 0)
     return Increments(

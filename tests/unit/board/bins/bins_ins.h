@@ -10,7 +10,7 @@
 struct ins {
     double C_nb[3][3]; /* n of pose.h: north, east, down */
     double v_mps[3];
-    double before_rad[3]; /* increment of the reading before */
+    double before_rad[3];       /* increment of the reading before */
     double tilt_rad, speed_mps; /* worst */
 };
 
@@ -48,7 +48,8 @@ static inline void turned(double C[3][3], const double v[3], double out[3])
 static inline void unsmeared(const double theta_rad[3], const double dv_mps[3], double out[3])
 {
     const double a = length(theta_rad), k = a > 1e-9 ? (a / 2) / sin(a / 2) : 1.0;
-    const double along = a > 1e-9 ? (theta_rad[0] * dv_mps[0] + theta_rad[1] * dv_mps[1] + theta_rad[2] * dv_mps[2]) / (a * a) : 0.0;
+    const double along =
+        a > 1e-9 ? (theta_rad[0] * dv_mps[0] + theta_rad[1] * dv_mps[1] + theta_rad[2] * dv_mps[2]) / (a * a) : 0.0;
     for (unsigned i = 0; i < 3; i++) {
         const double parallel = along * theta_rad[i];
         out[i] = parallel + k * (dv_mps[i] - parallel);
@@ -57,7 +58,8 @@ static inline void unsmeared(const double theta_rad[3], const double dv_mps[3], 
 
 static inline void earth_turn(double t_s, double out[3][3])
 {
-    const double back_rad[3] = {-EARTH_RATE_RADPS * cos(RIG_LATITUDE) * t_s, 0.0, EARTH_RATE_RADPS * sin(RIG_LATITUDE) * t_s};
+    const double back_rad[3] = {-EARTH_RATE_RADPS * cos(RIG_LATITUDE) * t_s, 0.0,
+                                EARTH_RATE_RADPS * sin(RIG_LATITUDE) * t_s};
     rotation(back_rad, out);
 }
 
@@ -68,7 +70,8 @@ static inline void check_against_table(struct rig *rig, struct ins *n, int64_t t
     for (unsigned i = 0; i < 3; i++)
         for (unsigned j = 0; j < 3; j++) T[i][j] = p->C_nb[j][i];
     multiply(n->C_nb, T, error);
-    const double tilt[3] = {(error[2][1] - error[1][2]) / 2, (error[0][2] - error[2][0]) / 2, (error[1][0] - error[0][1]) / 2};
+    const double tilt[3] = {(error[2][1] - error[1][2]) / 2, (error[0][2] - error[2][0]) / 2,
+                            (error[1][0] - error[0][1]) / 2};
     n->tilt_rad = fmax(n->tilt_rad, length(tilt));
     n->speed_mps = fmax(n->speed_mps, length(n->v_mps));
 }
@@ -129,7 +132,8 @@ static inline void three_cycles(struct rig *r, double half_s, struct ins *n)
     cycle(r, half_s);
     rig_run(r, 1.0);
     assert_int_equal(r->flags, 0);
-    print_message("%.0f s: attitude %.2e rad, velocity %.2e m/s\n", 1e-9 * (double)r->last.t_ns, n->tilt_rad, n->speed_mps);
+    print_message("%.0f s: attitude %.2e rad, velocity %.2e m/s\n", 1e-9 * (double)r->last.t_ns, n->tilt_rad,
+                  n->speed_mps);
 }
 
 #endif

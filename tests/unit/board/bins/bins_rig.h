@@ -10,11 +10,11 @@
 #include <math.h>
 #include <string.h>
 
-#define DEGPH          (RAD_PER_DEG / 3600.0)
-#define RIG_S          INT64_C(1000000000)
-#define RIG_G_MPS2     9.8
-#define RIG_LATITUDE   (55.7 * RAD_PER_DEG)
-#define RIG_PERIOD_S   0.01
+#define DEGPH        (RAD_PER_DEG / 3600.0)
+#define RIG_S        INT64_C(1000000000)
+#define RIG_G_MPS2   9.8
+#define RIG_LATITUDE (55.7 * RAD_PER_DEG)
+#define RIG_PERIOD_S 0.01
 
 struct rig {
     struct sched s;
@@ -22,9 +22,9 @@ struct rig {
     struct unit u;
     void (*on_reading)(struct rig *r, const struct bins_reading *g);
     struct bins_reading last;
-    unsigned readings, flags; /* flags: of all readings; SETTLED where one lacked it */
+    unsigned readings, flags;         /* flags: of all readings; SETTLED where one lacked it */
     int64_t gyro[3], accel[3], words; /* sums */
-    int64_t from_ns;           /* where they begin */
+    int64_t from_ns;                  /* where they begin */
     void *own;
 };
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from psabench.boards.bins.conform.stimulus import until_ready
 from psabench.boards.objects import BinsObjects as OD
-from psabench.boards.bins.conform.stimulus import started
 from psabench.conform.dictionary import as_the_dictionary_says, identity
 from psabench.conform.dut import Dut
 from psabench.conform.plan import active
 
 
-@active("BINS-CAN-04", needs={"can"}, before=started)
+@active("BINS-CAN-04", needs={"can"}, before=until_ready)
 def objects_are_as_the_dictionary_says(s: Dut) -> str:
     """Read every object of the EDS and write where nothing may be written."""
     return as_the_dictionary_says(s, "bins", varies=(OD.WEIGHTS, OD.TIMING))

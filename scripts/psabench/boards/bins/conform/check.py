@@ -20,7 +20,7 @@ US = 1e3
 WRAP_US = 1 << 32
 
 
-def columns(e: Capture) -> Mapping[str, Ints]:
+def reading_columns(e: Capture) -> Mapping[str, Ints]:
     """Raw signals of whole readings. Raises Inconclusive."""
     logs = [e.frames_of(name) for name in MESSAGES]
     n = min(len(log) for log in logs)
@@ -47,8 +47,9 @@ def messages_have_their_lengths(e: Capture) -> str:
 @check("stream", "BINS-CAN-02", needs={"can"})
 def readings_are_counted(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
-    seq = columns(e)["SEQ"].astype(np.int64)
-    bad = np.flatnonzero(np.diff(seq) % int(row.limit("modulo")) != 1).tolist()
+    seq = reading_columns(e)["SEQ"].astype(np.int64)
+    steps: Ints = np.diff(seq) % int(row.limit("modulo"))
+    bad = np.flatnonzero(steps != 1).tolist()
     none_of(bad, lambda k: f"SEQ {seq[k]}, then {seq[k + 1]}", "one more")
     return f"{len(seq)} readings without a gap"
 
@@ -73,8 +74,9 @@ def tick_is_a_pulse(e: Capture, row: Requirement) -> str:
 @check("stream", "BINS-INC-01", needs={"can"})
 def intervals_follow_one_another(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP from reading to reading, and look at WORDS and the flags of a whole one."""
-    c = columns(e)
-    steps_us = np.diff(c["TSTAMP"].astype(np.int64)) % WRAP_US
+    c = reading_columns(e)
+    stamps: Ints = c["TSTAMP"].astype(np.int64)
+    steps_us = np.diff(stamps) % WRAP_US
     off_us = np.abs(steps_us - row.limit("period_us"))
     if off_us.max() > row.limit("tolerance_us"):
         raise Failed(f"intervals of {steps_us.min()} to {steps_us.max()} us", f"{row.limit('period_us'):g} us")

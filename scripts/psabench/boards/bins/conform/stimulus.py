@@ -16,13 +16,13 @@ def power_on(s: Dut) -> Capture:
     return from_res(s, START_S)
 
 
-def started(s: Dut) -> None:
+def until_ready(s: Dut) -> None:
     """With its first readings after Res."""
     s.reset()
     s.run_for(START_S)
 
 
-@recorded("stream", boards=("bins",), before=started, streaming=True)
+@recorded("stream", boards=("bins",), before=until_ready, streaming=True)
 def stream_for_a_second(s: Dut, take: Take) -> None:
     """A second of readings on CAN and on the lines."""
     s.run_for(STREAM_S)
