@@ -147,13 +147,14 @@ static void arm_latch(struct bins *b, int64_t t_ns)
 
 /* ---- frames of the PSA-2 */
 
-/* Its number, by the time since the word before: a lost data-ready counts, a lost frame too. */
+/* Its number, by the time since the word before: a lost data-ready counts, a lost frame too. The same number again: the one
+ * before came so late that it was taken for this one. */
 static uint32_t number_of(const struct bins *b, const struct psa2_frame *f)
 {
     const struct bins_sums *s = &b->sums;
     const int64_t word_ns = bins_word_ns(b), words = (f->t_sample_ns - s->word_ns + word_ns / LATE_PART) / word_ns;
     if (s->word_ns < 0) return 0;
-    return s->word + (uint32_t)(words > 1 ? words : 1);
+    return s->word + (uint32_t)words;
 }
 
 /* When it was due: a data-ready is late where its pin was stuck, and does not move what follows. */
@@ -167,7 +168,7 @@ static int64_t due_ns(const struct bins *b, const struct psa2_frame *f, uint32_t
 static void add_word(struct bins *b, const struct psa2_frame *f, uint32_t number)
 {
     struct bins_sums *s = &b->sums;
-    const uint32_t missing = s->word_ns < 0 ? 0 : number - s->word - 1;
+    const uint32_t missing = s->word_ns < 0 ? 0 : number - s->word - 1; /* wraps: one less than was thought */
     b->counters.missed_words += missing;
     s->incomplete |= missing != 0;
     s->word_ns = due_ns(b, f, number);
@@ -185,8 +186,8 @@ static void on_frame(void *ctx, const struct psa2_frame *f, int64_t t_ns)
 {
     struct bins *b = ctx;
     const uint32_t number = number_of(b, f);
-    if (number == 0) b->sums.delay_ns = delay_ns(b);
-    else complete_until(b, number - 1, t_ns);
+    if (b->sums.word_ns < 0) b->sums.delay_ns = delay_ns(b);
+    else if (number > 0) complete_until(b, number - 1, t_ns);
     add_word(b, f, number);
     complete_until(b, number, t_ns);
     arm_latch(b, t_ns);
