@@ -9,10 +9,10 @@ import numpy as np
 from psabench.boards.bins.device import MESSAGES
 from psabench.conform.capture.intervals import interval
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.capture.messages import as_laid_out, in_turn
+from psabench.conform.capture.messages import as_laid_out, booted, in_turn
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, none_of
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
 from psabench.link.signals import Ints
 
 LEAST = 20
@@ -85,3 +85,13 @@ def intervals_follow_one_another(e: Capture, row: Requirement) -> str:
     if len(words) != 1 or not whole.all():
         raise Failed(f"{words.tolist()} words, {int((~whole).sum())} readings that are not whole", "whole readings")
     return f"{len(off_us)} intervals, {words[0]} words each"
+
+
+@check("power_on", "BINS-RES-01", needs={"can"})
+def the_first_reading_is_number_one(e: Capture, row: Requirement) -> str:
+    """Look at SEQ of the first reading after the boot-up message."""
+    boot = booted(e, "BINS_HEARTBEAT")
+    log = CanLog(frames=tuple(f for f in e.frames_of("BINS_GYRO_Z").frames if f.t_s > boot.t_s))
+    conclusive(len(log) and e.facts.get("prompt"), "the host did not start the node before the first reading")
+    first = int(log.raw("BINS_GYRO_Z")["SEQ"][0])
+    return expect(first == row.limit("first_seq"), f"SEQ {first}", f"{row.limit('first_seq'):g}")
