@@ -112,6 +112,21 @@ void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const do
     pose_into(&in_mount, out->w_radps, out->w_radps);
 }
 
+int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
+{
+    switch (mounting->on) {
+    case LAB_TABLE:
+        return table_smooth_ns(&l->table, t_ns);
+    case LAB_HEAD:
+        return head_smooth_ns(&l->head, t_ns);
+    case LAB_PLATFORM:
+        return platform_smooth_ns(&l->platform, t_ns);
+    case LAB_FIXED:
+        break;
+    }
+    return INT64_MAX;
+}
+
 /* f in the mount's axes: without lever arms the platform's own arithmetic, else by way of the poses. */
 static void mount_force_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                              double f_mps2[3])

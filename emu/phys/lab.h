@@ -77,6 +77,10 @@ void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns);
 void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                     struct kinematics *out);
 
+/* Up to which instant after t_ns rate and force of a unit there are smooth functions of time, if no command comes; INT64_MAX: for
+ * good. Who integrates them cuts there. Of a moving vehicle the platform's grid alone. */
+int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns);
+
 /* At the centre of its mount, where lever arms play no part. */
 bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3]);
 
