@@ -96,7 +96,7 @@ NAV_API int nav_sins_to_gauge(int gauge, struct nav_sins_params *p, double r_out
 typedef struct nav_sins nav_sins;
 NAV_API size_t nav_sins_bytes(void);
 /* c_nb: attitude at the start as far as it is known, row-major, a rotation to 1e-6. feedback 1: what is found goes into the
- * model each second (a first pass); 0: the model stays (covariances, a second pass). */
+ * model after each step (a first pass); 0: the model stays (covariances, a second pass). */
 NAV_API int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, const double c_nb[9],
                            int feedback, nav_sins **out);
 

@@ -5,8 +5,6 @@
 
 #include <cstring>
 
-constexpr double FEEDBACK_S = 1.0; /* from one feedback to the next */
-
 static int offset_of(const struct nav_sins *s, int block)
 {
     return s->at[block].offset;
@@ -109,7 +107,6 @@ int sins_finish_step(struct nav_sins *s)
     clear_sums(s);
     s->c = sins_normal(s->c);
     s->steps++;
-    const int64_t period = (int64_t)nav_floor(FEEDBACK_S / s->cfg.step_s + 0.5);
-    if (status == NAV_OK && s->feedback && s->steps % (period > 0 ? period : 1) == 0) sins_feed_back(s);
+    if (status == NAV_OK && s->feedback) sins_feed_back(s);
     return status;
 }

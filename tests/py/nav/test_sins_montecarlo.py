@@ -13,7 +13,7 @@ from psabench.native.sins import SinsConfig
 from tests.py.support import sins_truth as truth
 from tests.py.support.sins_truth import ARTICLE, DEG, DEGPH, Errors, Table, rotation_vector, turned
 
-SAMPLE_S, STAND_HZ = 0.025, 10.0
+SAMPLE_S, STAND_HZ = 0.05, 10.0
 
 
 @dataclass
