@@ -68,7 +68,11 @@ LIBRARIES = {
 KINDS = ("*.c", "*.h", "*.cpp", "*.hpp")
 FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
 SOURCE_MAX, HEADER_MAX = 600, 150  # lines; a file is about one topic, and the cap does not cut it
-HEADER_EXCEPTIONS = {"emu/api/psabench.h": 250, "nav/nav.h": 250, "nav/sins.h": 250}  # installed alone: manuals of whole libraries
+HEADER_EXCEPTIONS = {
+    "emu/api/psabench.h": 250,
+    "nav/nav.h": 250,
+    "nav/sins.h": 250,
+}  # installed alone: manuals of whole libraries
 ONE_WORD = 33  # functions whose name is one word, which neither grep nor a backtrace finds; the goal is 60
 REASON = re.compile(r"\blong:", re.IGNORECASE)  # in the comment above the function: "// Long: one row per opcode."
 INCLUDE = re.compile(r'\s*#\s*include\s+([<"])([^>"]+)[>"]')

@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-/* Priors, noise: the article's (sources sins 1), at Moscow's latitude. */
+/* Priors, noise: the article's (sources instruments 5.1), at Moscow's latitude. */
 void nav_sins_default(struct nav_sins_cfg *cfg)
 {
     *cfg = {};

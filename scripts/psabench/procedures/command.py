@@ -18,7 +18,7 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
-from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, THERMAL
+from psabench.procedures.run_table import COMPARE, CONDITIONS, COVARIANCE, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, THERMAL
 from psabench.progress import Bar
 from psabench.shell import command_line
 
@@ -368,6 +368,17 @@ def _run_thermal(args: argparse.Namespace) -> int:
     return 0 if thermal_grading.within_limits(report) else 1
 
 
+def _predict_sins(args: argparse.Namespace) -> int:
+    """A covariance: no bench, no data."""
+    from psabench.procedures.result import made_params
+    from psabench.sins import covariance_run
+
+    study = covariance_run.run_study(made_params(covariance_run.CovarianceParams, args.procedure, _params(args)))
+    print(covariance_run.console_lines(study))
+    print(f"report: {covariance_run.write_page(args.out, study)}")
+    return 0
+
+
 # What each takes of COMMON.
 _STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
 _PLATFORM = (
@@ -415,6 +426,11 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run thermal --schedule full --out build/run/qa-0001
   psabench run thermal --resume build/run/qa-0001
 """,
+    COVARIANCE[0]: """\
+  psabench run sins-covariance                                the article's two tables in every reading of its noise
+  psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
+  psabench run sins-covariance --plan two_rates --lever 3     lever arms of the accelerometers
+""",
 }
 
 
@@ -450,6 +466,12 @@ def _of_the_chamber() -> Parameters:
     return Parameters(fields={k: f for k, f in BenchAccuracy.__dataclass_fields__.items() if k != "chain_off_k"})
 
 
+def _of_the_covariance() -> Parameters:
+    from psabench.sins.covariance_run import CovarianceParams
+
+    return Parameters(fields=CovarianceParams.__dataclass_fields__)
+
+
 def _commands() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
@@ -465,6 +487,15 @@ def _commands() -> Iterator[Command]:
         )
     name, summary = COMPARE
     yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])
+    name, summary = COVARIANCE
+    yield Command(
+        name=name,
+        summary=summary,
+        handler=_predict_sins,
+        common=("--out",),
+        load=_of_the_covariance,
+        examples=_EXAMPLES[name],
+    )
     name, summary = THERMAL
     yield Command(
         name=name,

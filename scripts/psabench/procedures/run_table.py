@@ -23,6 +23,10 @@ THERMAL = (
     "thermal",
     "accelerometers in a chamber, at points of temperature and during a sweep: scale, zero and base, compensated",
 )
+COVARIANCE = (
+    "sins-covariance",
+    "accuracy of a strapdown unit's calibration on a rate table, predicted from the plan of rotations; no bench",
+)
 
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory

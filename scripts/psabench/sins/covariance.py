@@ -15,7 +15,7 @@ from psabench.native.sins import Gauge, Sins, SinsConfig, prior
 from psabench.sins.plan import RotationPlan, rates_of
 
 SAMPLE_S = 0.05  # of the ideal increments: two a step
-EAST_DEG = 25.0  # the axis nearer than this to east: drifts hang on the heading (sources sins 2)
+EAST_DEG = 25.0  # the axis nearer than this to east: drifts hang on the heading (sources instruments 5.2)
 LEAST_CYCLE_S = 300.0
 KNOWN = 0.5  # part of its prior that a block may keep before it is called undetermined
 
@@ -157,7 +157,7 @@ def warnings_of(plan: RotationPlan, cfg: SinsConfig, found: Prediction) -> list[
     said = []
     if plan.axis_from_east_deg < EAST_DEG and cfg.beta_sd_rad[2] > ARCMIN:
         said.append(
-            f"the table's axis is {plan.axis_from_east_deg:.0f} deg from east: gyro drifts can not be told from the "
+            f"the table's axis is {plan.axis_from_east_deg:.0f} deg from east: gyro drifts cannot be told from the "
             "heading; turn the table to north +-60 deg, or give the heading to 1'"
         )
     rates = rates_of(plan.turns)

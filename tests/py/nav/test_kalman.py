@@ -169,7 +169,11 @@ def test_what_is_no_covariance_is_rejected_and_changes_nothing(form: Form) -> No
     f, good = Filter(2, 1, form), np.array([[2.0, 0.5], [0.5, 1.0]])
     f.set(np.ones(2), good)
     bad = {
-        SINGULAR: [np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([[-1.0, 0.0], [0.0, 1.0]]), np.array([[1.0, 0.2], [0.1, 1.0]])],
+        SINGULAR: [
+            np.array([[1.0, 2.0], [2.0, 1.0]]),
+            np.array([[-1.0, 0.0], [0.0, 1.0]]),
+            np.array([[1.0, 0.2], [0.1, 1.0]]),
+        ],
         NOT_FINITE: [np.array([[math.nan, 0.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [0.0, math.inf]])],
     }
     for status, matrices in bad.items():
@@ -208,7 +212,7 @@ def test_the_smoother_is_that_of_the_textbook() -> None:
     assert relative(ps, want_p) < 1e-6
 
 
-def test_the_smoother_rejects_what_it_can_not_go_back_through() -> None:
+def test_the_smoother_rejects_what_it_cannot_go_back_through() -> None:
     phi, one, x = np.zeros((1, 2)), np.ones((1, 1)), np.zeros(2)
     p = np.eye(2)
     assert library().kf_smooth(2, 1, at(phi), at(one), at(x), at(p), at(x), at(p)) == SINGULAR
@@ -223,6 +227,12 @@ def test_nees_is_the_quadratic_form() -> None:
 def test_sizes_and_forms_beyond_the_limits_are_rejected() -> None:
     lib, memory, kf = library(), c.create_string_buffer(library().kf_bytes()), c.c_void_p()
     size = len(memory)
-    for n, moving, form, given in [(0, 0, 0, size), (65, 1, 0, size), (4, 5, 0, size), (4, 1, 2, size), (4, 1, 0, size - 1)]:
+    for n, moving, form, given in [
+        (0, 0, 0, size),
+        (65, 1, 0, size),
+        (4, 5, 0, size),
+        (4, 1, 2, size),
+        (4, 1, 0, size - 1),
+    ]:
         assert lib.kf_start(memory, given, n, moving, form, c.byref(kf)) == RANGE
     assert lib.kf_start(None, size, 4, 1, 0, c.byref(kf)) == RANGE

@@ -263,7 +263,9 @@ def test_a_gauge_turns_the_instrument_frame_and_nothing_else(gauge: Gauge, zero:
         ({"stand": True, "sample_s": 0.001, "step_s": 0.05}, "sample_s"),
     ],
 )
-def test_a_configuration_that_can_not_be_is_rejected_by_the_name_of_its_field(change: dict[str, float], field: str) -> None:
+def test_a_configuration_that_cannot_be_is_rejected_by_the_name_of_its_field(
+    change: dict[str, float], field: str
+) -> None:
     with pytest.raises(Refused) as e:
         Sins(replace(SinsConfig(), **change), truth.placed())
     assert e.value.field == field

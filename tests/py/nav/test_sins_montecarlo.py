@@ -30,7 +30,13 @@ def errors_of(state: sins.State, e: Errors, c_end: Floats, stand: bool) -> Float
     """Estimate less truth, in the order of the state; the attitude's error is true less estimate."""
     p = state.params
     gamma = np.array([(p.gamma - e.gamma)[k] for k in ARTICLE])
-    found = [-rotation_vector(state.c_nb @ c_end.T), p.nu_radps - e.nu, (p.theta - e.theta).ravel(), p.df_mps2 - e.df, gamma]
+    found = [
+        -rotation_vector(state.c_nb @ c_end.T),
+        p.nu_radps - e.nu,
+        (p.theta - e.theta).ravel(),
+        p.df_mps2 - e.df,
+        gamma,
+    ]
     if stand:
         found += [p.delta_rad - e.delta, np.array([p.tau_s - e.tau])]
     return np.concatenate(found)
@@ -76,7 +82,7 @@ def test_a_unit_is_found_within_what_is_claimed(stand: bool, seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("multiplier", "first"), [(4.0, 31.0), (1.0, 58.0)], ids=["B", "A"]
-)  # of the first pass: sources sins 3
+)  # of the first pass: sources instruments 5.3
 def test_two_passes_are_consistent_and_one_is_not(multiplier: float, first: float) -> None:
     """24 states, 40 units: the mean of NEES is 24 +- 1.1 when errors are what the covariance says."""
     done = [calibrated(seed, multiplier, False) for seed in range(40)]

@@ -118,15 +118,14 @@ class Data:
     c_end: Array
 
 
-def measured(
-    table: Table, e: Errors, sample_s: float, *, gyro: float = 0.0, accel: float = 0.0, seed: int = 0
-) -> Data:
+def measured(table: Table, e: Errors, sample_s: float, *, gyro: float = 0.0, accel: float = 0.0, seed: int = 0) -> Data:
     """Increments by Simpson's rule in each sample. gyro, accel: densities of the noise."""
     rng = np.random.default_rng(seed)
     count = round(table.edges[-1] / sample_s)
     edges = np.arange(count + 1) * sample_s
     middle = edges[:-1] + 0.5 * sample_s
     ends, mid = table.attitude(edges), table.attitude(middle)
+
     # The end of a leg is the start of the next one: the same attitude.
     def mean(v: Array) -> Array:
         at_ends, at_mid = np.einsum("kji,j->ki", ends, v), np.einsum("kji,j->ki", mid, v)
@@ -142,9 +141,7 @@ def measured(
     )
 
 
-def angles(
-    table: Table, e: Errors, interval_s: float, *, sd_rad: float = 0.0, seed: int = 0
-) -> tuple[Array, Array]:
+def angles(table: Table, e: Errors, interval_s: float, *, sd_rad: float = 0.0, seed: int = 0) -> tuple[Array, Array]:
     """Times and rotations C_st(t) = C(t + tau) exp(delta) of the table, each with noise."""
     t = np.arange(0.0, table.edges[-1], interval_s)
     t = t[(t + e.tau > 0.0) & (t + e.tau < table.edges[-1])]

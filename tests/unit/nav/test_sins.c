@@ -140,7 +140,7 @@ static void what_is_not_finite_changes_nothing(void **state)
     assert_int_equal(nav_sins_about(r->s, &model), NAV_NOT_FINITE);
 }
 
-static void a_start_that_can_not_be_is_rejected(void **state)
+static void a_start_that_cannot_be_is_rejected(void **state)
 {
     struct sins_rig *r = *state;
     const size_t size = nav_sins_bytes();
@@ -196,7 +196,7 @@ static void the_stand_takes_rotations_in_order_and_no_more_than_can_wait(void **
     assert_int_equal(nav_sins_stand(r->s, 0.9, NORTH), NAV_TIMES);
 }
 
-static void plans_and_passes_that_can_not_be_are_rejected(void **state)
+static void plans_and_passes_that_cannot_be_are_rejected(void **state)
 {
     struct sins_rig *r = *state;
     const struct nav_sins_turn bad[] = {
@@ -247,10 +247,10 @@ int main(void)
         CASE(a_unit_at_rest_keeps_its_attitude_and_learns_the_level),
         CASE(time_neither_runs_back_nor_leaves_a_gap),
         CASE(what_is_not_finite_changes_nothing),
-        CASE(a_start_that_can_not_be_is_rejected),
+        CASE(a_start_that_cannot_be_is_rejected),
         CASE(a_prior_of_zeros_is_a_known_unit),
         CASE(the_stand_takes_rotations_in_order_and_no_more_than_can_wait),
-        CASE(plans_and_passes_that_can_not_be_are_rejected),
+        CASE(plans_and_passes_that_cannot_be_are_rejected),
         CASE(a_filter_of_the_largest_size_runs_in_the_callers_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
