@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# A room is a folder of emu/ with sources, or nav or a folder of it: a layer, or a part of one ("chip/ads1282", "board/psa2"). A layer may include
-# the layers of its row; parts do not include each other: may_include(). gen is generated from proto/.
+# A room is a folder of emu/ with sources, nav, or a folder of it: a layer, or a part of one ("chip/ads1282",
+# "board/psa2"). A layer may include the layers of its row; parts do not include each other: may_include(). gen is
+# generated from proto/.
 _MODELS = {"base", "trace", "phys", "chip", "canopen", "board", "gen"}
 _COMMANDS = _MODELS | {"board/*", "unit", "command", "fault"}
 MAY_INCLUDE = {

@@ -1,7 +1,7 @@
 """Calibration of a strapdown inertial unit on a rate table: libpsabench-nav (docs/sins.md), from Python.
 
-n is east, north, up at the table, b the instrument; C_nb takes b to n. Errors are measured less true. rad, s, m. Arrays are
-NumPy's, float64 and C-contiguous ones go to the library without a copy. An estimator belongs to one thread.
+n is east, north, up at the table, b the instrument; C_nb takes b to n. Errors are measured less true. Units: rad, s, m.
+Arrays that are float64 and C-contiguous go to the library without a copy. An estimator belongs to one thread.
 """
 
 from __future__ import annotations
@@ -304,7 +304,7 @@ def _params(struct: ParamsStruct) -> Params:
 
 def _params_struct(params: Params) -> ParamsStruct:
     struct = ParamsStruct(tau_s=params.tau_s)
-    for name, kind in ParamsStruct._fields_:
+    for name, kind, *_ in ParamsStruct._fields_:
         if name != "tau_s":
             setattr(struct, name, kind(*np.ravel(getattr(params, name))))
     return struct

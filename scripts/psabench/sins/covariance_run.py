@@ -1,4 +1,4 @@
-"""`psabench run sins-covariance`: what a plan of rotations would determine, beside the article's tables, before a run."""
+"""`psabench run sins-covariance`: what a plan of rotations would determine, beside the article's tables."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ NAME = "sins-covariance"
 FORMAT = 1  # of result.json
 GAUGES: Mapping[str, Gauge] = {"article": Gauge.ARTICLE, "lower": Gauge.LOWER, "free9": Gauge.FREE9}
 NOTES = (
-    "A: noise as printed, standard deviations of 1 s means. B: accelerometer noise times four, which the printed Γii, Δf "
-    "and ν follow from. S1: 15″ at 1 Hz. S50: 15″ a sample at 50 Hz.",
+    "A: noise as printed, standard deviations of 1 s means. B: accelerometer noise times four, which the printed Γii, "
+    "Δf and ν follow from. S1: 15″ at 1 Hz. S50: 15″ a sample at 50 Hz.",
     "Cells: root mean square over the elements of the quantity, in brackets the least and the most.",
     "The article does not give the azimuth of the table's axis, the time of the turns between cycles, the prior of the "
     "attitude and the unit of the prior of δ: 0°, 9 s, 1° (heading 3°) and 1° are ours (E0).",

@@ -5,11 +5,11 @@ from __future__ import annotations
 import ctypes as c
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
+from kalman_reference import Step, dense_step, joseph, relative
 from psabench.native.nav import Floats
 from psabench.native.navlib import library
 from psabench.native.sins import Form, nees
@@ -49,17 +49,6 @@ class Filter:
         return x, p
 
 
-@dataclass
-class Step:
-    """A step of a random system."""
-
-    phi: Floats
-    q: Floats
-    h: Floats
-    z: Floats
-    r: Floats
-
-
 def random_steps(n: int, moving: int, count: int, seed: int = 1) -> Iterator[Step]:
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -68,29 +57,6 @@ def random_steps(n: int, moving: int, count: int, seed: int = 1) -> Iterator[Ste
         root = rng.normal(0, 0.1, (moving, moving))
         h = rng.normal(0, 1, (3, n)) * (rng.random((3, n)) < 0.7)
         yield Step(phi, root @ root.T, h, rng.normal(0, 1, 3), rng.uniform(0.1, 2.0, 3))
-
-
-def joseph(x: Floats, p: Floats, h: Floats, z: Floats, r: Floats) -> tuple[Floats, Floats]:
-    """All measurements at once, as a textbook has it."""
-    k = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(r))
-    left = np.eye(len(x)) - k @ h
-    return x + k @ (z - h @ x), left @ p @ left.T + k @ np.diag(r) @ k.T
-
-
-def dense_step(x: Floats, p: Floats, s: Step) -> tuple[Floats, Floats, Floats, Floats]:
-    """Predicted and updated."""
-    moving, n = s.phi.shape
-    whole = np.eye(n)
-    whole[:moving] = s.phi
-    x1, p1 = whole @ x, whole @ p @ whole.T
-    p1[:moving, :moving] += s.q
-    return x1, p1, *joseph(x1, p1, s.h, s.z, s.r)
-
-
-def relative(p: Floats, reference: Floats) -> float:
-    """Largest difference in standard deviations of the reference."""
-    sd = np.sqrt(np.diag(reference))
-    return float(np.max(np.abs(p - reference) / np.outer(sd, sd)))
 
 
 def start_covariance(n: int) -> Floats:

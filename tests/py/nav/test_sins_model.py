@@ -1,20 +1,20 @@
-"""The calibration's model beside finite rotations in plain NumPy: Jacobians, stand, gauges, whole runs without noise."""
+"""The calibration's model beside finite rotations in NumPy: Jacobians, stand, gauges, whole runs without noise."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+import sins_truth as truth
+from kalman_reference import Step, dense_step, relative
 from psabench.native import sins
 from psabench.native.nav import Floats, Refused
 from psabench.native.navlib import library
 from psabench.native.sins import Form, Gauge, Params, Sins, SinsConfig, Turn
 from psabench.native.sinslib import BLOCKS, SinsConfigStruct
-
-from tests.py.nav.test_kalman import Step, dense_step, relative
-from tests.py.support import sins_truth as truth
-from tests.py.support.sins_truth import ARCMIN, DEG, DEGPH, G_N, U_N, Errors, Table, rotation_vector, turned
+from sins_truth import ARCMIN, DEG, DEGPH, G_N, U_N, Errors, Table, rotation_vector, turned
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 SHORT = [(X, 10 * DEG, 5.0), (Z, -10 * DEG, 5.0), (Y, -10 * DEG, 4.0)]
@@ -67,7 +67,7 @@ def residuals(e: Errors, beta0: Floats, lever: Floats | None = None) -> Floats:
     table = Table(truth.placed(0.3), SHORT)
     d = truth.measured(table, e, 0.01)
     if lever is not None:
-        middle = np.arange(len(d.dv)) * 0.01 + 0.005
+        middle: Floats = np.arange(len(d.dv), dtype=np.float64) * 0.01 + 0.005
         relative_rate, earth = table.rate(middle), np.einsum("kji,j->ki", table.attitude(middle), U_N)
         rate, turning = relative_rate + earth, np.cross(earth, relative_rate)  # the Earth's rate turns in b
         for i in range(3):
@@ -161,7 +161,7 @@ def test_the_stands_rows_are_central_differences_with_delta_as_a_finite_rotation
             ("eps", residual(zero, delta, tau, d_k), residual(zero, delta, tau, -d_k)),
         ):
             # delta x delta / 12 is what a first order of the finite rotation's derivative leaves out.
-            left = 1e-6 + (delta @ delta / 6.0 if block == "delta" else 0.0)
+            left = 1e-6 + (float(delta @ delta) / 6.0 if block == "delta" else 0.0)
             assert h[:, rows[block].start + k] == pytest.approx((plus - minus) / (2 * small), abs=left), block
     late = (residual(zero, delta, tau + small, zero) - residual(zero, delta, tau - small, zero)) / (2 * small)
     assert h[:, rows["tau"].start] == pytest.approx(late, abs=1e-6)
@@ -264,7 +264,7 @@ def test_a_gauge_turns_the_instrument_frame_and_nothing_else(gauge: Gauge, zero:
     ],
 )
 def test_a_configuration_that_cannot_be_is_rejected_by_the_name_of_its_field(
-    change: dict[str, float], field: str
+    change: dict[str, Any], field: str
 ) -> None:
     with pytest.raises(Refused) as e:
         Sins(replace(SinsConfig(), **change), truth.placed())

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import sins_truth as truth
 from psabench.native import sins
 from psabench.native.nav import Floats
 from psabench.native.sins import SinsConfig
-
-from tests.py.support import sins_truth as truth
-from tests.py.support.sins_truth import ARTICLE, DEG, DEGPH, Errors, Table, rotation_vector, turned
+from sins_truth import ARTICLE, DEG, DEGPH, Errors, Table, rotation_vector, turned
 
 SAMPLE_S, STAND_HZ = 0.05, 10.0
 

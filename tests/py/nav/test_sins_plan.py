@@ -27,7 +27,7 @@ def article() -> RotationPlan:
     return read_plan("article")
 
 
-# An independent simulation of the same model (sources instruments 5.2): root mean squares, and least and most where they differ.
+# An independent simulation of the same model (sources instruments 5.2): root mean squares over the elements.
 TABLES = {
     "A": (0.0042, 1.67e-7, 0.020, 2.32e-5, 3.39e-6, 0.021),
     "B": (0.0101, 5.40e-7, 0.079, 9.24e-5, 1.36e-5, 0.082),
@@ -206,7 +206,7 @@ def test_the_command_prints_both_tables_and_stores_them(tmp_path: Path, capsys: 
     )
     said = capsys.readouterr().out
     assert "Table 1: without the table's angles" in said
-    assert "article     0.01   5.1e-07" in said
+    assert "article    0.01   5.1e-07" in said
     assert "WARNING: the table's axis is 5 deg from east" in said
     found = json.loads((tmp_path / "result.json").read_text())
     assert list(found["readings"]) == list(READINGS)

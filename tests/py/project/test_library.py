@@ -280,7 +280,8 @@ def test_a_program_in_another_language_can_include_the_header(installed: Path, t
         "int main()\n{\n    psabench *b = psabench_new(1);\n"
         '    psabench_part *p = psabench_part_new(b, "ads1255", "a", "start=at_once");\n'
         '    const int done = psabench_run_until_level(p, psabench_pin(p, "DRDY"), 0, 1000000000);\n'
-        "    const int same = psabench_abi() == PSABENCH_ABI && nav_abi() == NAV_ABI && nav_kf_bytes() < nav_sins_bytes();\n"
+        "    const int ordered = nav_kf_bytes() < nav_sins_bytes();\n"
+        "    const int same = psabench_abi() == PSABENCH_ABI && nav_abi() == NAV_ABI && ordered;\n"
         '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), same);\n'
         "    psabench_free(b);\n}\n"
     )

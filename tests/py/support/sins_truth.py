@@ -29,7 +29,7 @@ def cross(v: Array) -> Array:
     v = np.asarray(v, dtype=float)
     m = np.zeros((*v.shape[:-1], 3, 3))
     m[..., 0, 1], m[..., 0, 2], m[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return m - np.swapaxes(m, -1, -2)
+    return np.asarray(m - np.swapaxes(m, -1, -2))
 
 
 def turned(v: Array) -> Array:
