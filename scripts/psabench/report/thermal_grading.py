@@ -18,6 +18,7 @@ from psabench.budget.gum import COVERAGE
 from psabench.errors import BadInput, expected
 from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import Compared, aligned, as_ratio, estimate_dict, finite_or_none, with_ci
+from psabench.thermal.budget import estimate_at, unit_of
 from psabench.thermal.compensation import compensation_dict
 from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, whole_lines
 from psabench.thermal.reduce import SIDE_FACES, Points, points_of, quantity_names
@@ -28,9 +29,7 @@ from psabench.thermal.result import (
     case_lag_s,
     degrees_of,
     difference_of,
-    estimate_at,
     residuals_of,
-    unit_of,
 )
 from psabench.thermal.schedule import POSITIONS
 
@@ -130,7 +129,7 @@ def _graded_rows(result: ThermalResult, truth: ThermalTruth) -> list[GradedAt]:
         for k in _graded_at(m, truth.element_c, result.normal_c):
             temp_c = float(truth.element_c[k])
             for q in quantity_names():
-                e = estimate_at(m, q, temp_c, result.accuracy)
+                e = estimate_at(m.fitted(q), temp_c, result.accuracy)
                 true = float(truth.points.quantity(q)[k])
                 rows.append(GradedAt(method=m.name, temp_c=temp_c, estimate=e, truth=true, error=e.value - true))
     return rows

@@ -4,7 +4,7 @@ Along gravity and against it, half the difference of an axis's readings is its s
 another axis along gravity, half the difference over the scale is the component of the misalignment towards that axis.
 During a sweep the positions are recorded one after the other, at different temperatures: each is interpolated to one
 instant a round, by cubics through the four nearest of its recordings. How far off that may be is measured, by leaving
-out recordings: `Points.interpolation_v`.
+out recordings: `Points.left_out_square_v2`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ Array = npt.NDArray[np.float64]
 
 AXES = "xyz"
 ARCSEC = float(np.degrees(1.0)) * 3600.0
+OF_FACES = ((0, 1), (0, 2))  # axes in the plane of turning, direct and side
+LEFT_OUT_NOISE = 1.0 + 2 * (9 / 16) ** 2 + 2 * (1 / 16) ** 2  # of one reading's variance, in a reading less its guess
 LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 16 times
 LEAST_VISITS = 6  # of a position in a sweep
 TOP_K = 0.1  # noise of the chamber's reading
@@ -41,11 +43,18 @@ class Points:
     scale_v_per_g: Array  # (n, 3)
     base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
     scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
-    interpolation_v: Array  # (3,) of one position's reading, rms; 0 for a soak
-    interpolation_most_v: Array  # (3,) the largest
+    left_out_square_v2: Array  # (3, 3) of the axis, with the other one vertical: mean square of guess less reading
+    interpolation_most_v: Array  # (3,) of one position's reading with the axis vertical, the largest; 0 for a soak
+    noise_part: float  # of a reading's variance that is in a point's
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
+    samples: int  # of a recording
     turn_s: float  # when the chamber has reached the top of a sweep; the last instant of a soak
     notes: tuple[str, ...] = ()
+
+    @property
+    def interpolation_v(self) -> Array:
+        """Of one position's reading with the axis vertical, rms, (3,)."""
+        return left_out_error(np.diagonal(self.left_out_square_v2), self.scatter_v)
 
     @property
     def up(self) -> npt.NDArray[np.bool_]:
@@ -74,12 +83,13 @@ def gravity_at(position: Position, alpha_deg: float) -> Array:
     return np.array([along, 0.0, across] if position.face in SIDE_FACES else [along, across, 0.0])
 
 
-def points_of(recordings: Sequence[Recording]) -> dict[str, Points]:
+def points_of(recordings: Sequence[Recording], samples: int = 1) -> dict[str, Points]:
     """By segment, in the order of the run. Raises BadInput where there are too few recordings."""
     segments: dict[str, list[Recording]] = {}
     for r in recordings:
         segments.setdefault(r.segment, []).append(r)
-    found = {name: _soak_points(rows) if name == SOAK else _sweep_points(rows) for name, rows in segments.items()}
+    of = {name: _soak_points if name == SOAK else _sweep_points for name in segments}
+    found = {name: replace(of[name](rows), samples=samples) for name, rows in segments.items()}
     if not found:
         raise BadInput(expected("recordings", "none", "thermal run"))
     return found
@@ -160,9 +170,11 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        interpolation_v=np.zeros(3),
+        left_out_square_v2=np.zeros((3, 3)),
         interpolation_most_v=np.zeros(3),
+        noise_part=1.0,
         history=(t_s, case_c),
+        samples=1,
         turn_s=float(t_s[-1]),
         notes=tuple(notes),
     )
@@ -185,7 +197,7 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
     by = {p: interpolate_cubic(t_s[at], level[at], middle) for p, at in visits.items()}
     zero, scale, base = _solve_positions(by)
     scatter = _scatter_of(rows)
-    off = np.concatenate([left_out_error(t_s[at], level[at], scatter) for at in visits.values()])
+    off_v2, most_v = _left_out(visits, t_s, level, scatter)
     return Points(
         segment=name,
         t_s=middle,
@@ -194,9 +206,11 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=scatter,
-        interpolation_v=np.sqrt(np.mean(off**2, axis=0)),
-        interpolation_most_v=off.max(axis=0),
+        left_out_square_v2=off_v2,
+        interpolation_most_v=most_v,
+        noise_part=float(np.mean([(cubic_weights(t_s[at], middle)[1] ** 2).sum(axis=1) for at in visits.values()])),
         history=(t_s, case_c),
+        samples=1,
         turn_s=_turn_of(rows),
     )
 
@@ -206,8 +220,19 @@ def _turn_of(rows: Sequence[Recording]) -> float:
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
-def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
-    """Through the four nearest of the readings u (m, k) at t_s (m,); (n, k) at at_s (n,)."""
+def _left_out(visits: Mapping[str, list[int]], t_s: Array, u: Array, scatter_v: Array) -> tuple[Array, Array]:
+    """Mean squares by axis and vertical axis, (3, 3), and the largest error of an axis that is vertical, (3,)."""
+    squares = np.empty((3, 3))
+    most_v = np.empty(3)
+    for j in range(3):
+        each = [left_out_squares(t_s[at], u[at]) for p, at in visits.items() if POSITIONS[p].axis == j]
+        squares[:, j] = np.concatenate(each).mean(axis=0)
+        most_v[j] = max(left_out_error(e[:, j], scatter_v[j]).max() for e in each)
+    return squares, most_v
+
+
+def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """The four nearest of the instants t_s (m,), and their weights at at_s (n,): (n, 4) each."""
     begin = np.clip(np.searchsorted(t_s, at_s) - 2, 0, len(t_s) - 4)
     near = begin[:, None] + np.arange(4)
     t = t_s[near]
@@ -216,18 +241,28 @@ def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
         for m in range(4):
             if m != j:
                 weights[:, j] *= (at_s - t[:, m]) / (t[:, j] - t[:, m])
+    return near, weights
+
+
+def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
+    """Through the four nearest of the readings u (m, k) at t_s (m,); (n, k) at at_s (n,)."""
+    near, weights = cubic_weights(t_s, at_s)
     return np.asarray(np.einsum("nj,njk->nk", weights, u[near]))
 
 
-def left_out_error(t_s: Array, u: Array, scatter_v: Array) -> Array:
-    """How far off an interpolation may be, (m - 2, k): each reading from its neighbours, a gap twice as long, without
-    what the scatter does to that; divided by LEFT_OUT."""
+def left_out_squares(t_s: Array, u: Array) -> Array:
+    """Each reading less what its neighbours give for it, squared, (m - 2, k): a gap twice as long."""
     found = []
     for k in range(1, len(t_s) - 1):
         rest = np.arange(len(t_s)) != k
-        guess = interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0]
-        found.append((guess - u[k]) ** 2 - 1.64 * scatter_v**2)  # 1 + 2 (9/16)^2 + 2 (1/16)^2
-    return np.asarray(np.sqrt(np.maximum(np.array(found), 0.0)) / LEFT_OUT)
+        found.append((interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0] - u[k]) ** 2)
+    return np.array(found)
+
+
+def left_out_error(squares: Array, scatter_v: npt.ArrayLike) -> Array:
+    """How far off an interpolation may be, the same shape: without what the scatter does, divided by LEFT_OUT."""
+    beyond = squares - LEFT_OUT_NOISE * np.asarray(scatter_v) ** 2
+    return np.asarray(np.sqrt(np.maximum(beyond, 0.0)) / LEFT_OUT)
 
 
 def up_leg(p: Points) -> Points:

@@ -19,7 +19,7 @@ from psabench.report import thermal_grading, thermal_page
 from psabench.thermal.bench import CASE_CHANNEL, sample_of_frames
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
 from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
-from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
+from psabench.thermal.reduce import interpolate_cubic, left_out_error, left_out_squares, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
 from psabench.thermal.run import ThermalOptions, run_thermal
 from psabench.thermal.schedule import (
@@ -161,7 +161,7 @@ def test_interpolation_is_not_worse_than_it_says(every_s: float, phase: float) -
     taken = np.arange(phase * every_s, 1499.0, every_s).astype(int)
     inside = np.arange(taken[1], taken[-2])
     off = np.abs(interpolate_cubic(taken.astype(float), every[taken], inside.astype(float)) - every[inside])
-    said = left_out_error(taken.astype(float), every[taken], np.zeros(1))
+    said = left_out_error(left_out_squares(taken.astype(float), every[taken]), 0.0)
     assert off.max() <= said.max()
     assert said.max() <= 10 * off.max()
     assert np.sqrt(np.mean(off**2)) <= np.sqrt(np.mean(said**2))
@@ -201,9 +201,10 @@ def frames_of(**columns: np.ndarray) -> Frames:
     return Frames(t_rx_s=none_s, t_sample_s=none_s, seq=some, **given)
 
 
-def test_a_recording_is_the_means_of_its_frames() -> None:
+def test_a_recording_is_the_means_of_its_frames_and_half_a_code() -> None:
+    code_v = 10.0 / 2**23  # cut off: the voltage was half a code higher on average
     s = sample_of_frames(frames_of(), 7.0, 2.0)
-    assert s.u_v.tolist() == [0.5, 0.5, 0.5]
+    assert s.u_v.tolist() == pytest.approx([(1.0 + code_v / 2.0) / 2.0] * 3, rel=1e-12)
     assert s.temps_degc == pytest.approx([20.0] * 4, abs=0.01)
 
 

@@ -1,0 +1,154 @@
+"""Uncertainty budget of a quantity that a thermal run found, at one temperature (docs/procedures/thermal.md, Uncertainty).
+
+Each cause is counted once. What is drawn again from point to point (noise of the readings, reading of the head's scale,
+tilt at a mounting) reaches the curve through the fit; what such noise does not explain of the residual is misfit; what
+is the same in every point (chain, circle, sensor of the case, play) is of type B.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from psabench.boards.psa2.device import CODE_V
+from psabench.budget.accuracy import BenchAccuracy
+from psabench.budget.gum import expand_estimate
+from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
+from psabench.thermal.bench import BLOCKS
+from psabench.thermal.compensation import Compensation
+from psabench.thermal.reduce import ARCSEC, AXES, LEFT_OUT, LEFT_OUT_NOISE, OF_FACES, Points
+
+TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
+PLAY_K = 0.3  # limit of how far the way to a temperature moves what the element feels (E0)
+SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn again at each turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fitted:
+    """A quantity by one method, with what is known of how it was measured."""
+
+    points: Points
+    best: Compensation
+    settling_k: float  # that the element may miss the case by, at the end of a dwell
+    play: bool  # whether the way to a temperature was not that of the soak
+
+    @property
+    def kind(self) -> str:
+        return self.best.quantity.partition("_")[0]
+
+    @property
+    def axes(self) -> tuple[int, int]:
+        """The axis, and the one that is vertical where the quantity is read."""
+        letters = self.best.quantity.split("_")[1]
+        return AXES.index(letters[0]), AXES.index(letters[-1])
+
+    @property
+    def turned(self) -> bool:
+        """Whether an error of the head's angle moves it: the axis lies in the plane of turning, across the vertical."""
+        i, j = self.axes
+        return self.kind == "base" and any({i, j} == set(plane) for plane in OF_FACES)
+
+    @property
+    def per_volt(self) -> float:
+        """The quantity's unit a volt of half a sum or a difference."""
+        scale = float(self.points.scale_v_per_g[:, self.axes[0]].mean())
+        return {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}[self.kind]
+
+
+def unit_of(quantity: str) -> str:
+    """By the name of the quantity."""
+    return {"zero": "µg", "scale": "V/g", "base": "″"}[quantity.partition("_")[0]]
+
+
+def symbol_of(quantity: str) -> str:
+    """As on pages."""
+    kind, axes = quantity.split("_")[:2]
+    return {"zero": f"g_t,{axes}", "scale": f"U_k,{axes}", "base": f"δ_{axes}"}[kind]
+
+
+def estimate_at(f: Fitted, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
+    """The quantity at a temperature of the element, with its budget."""
+    name, value = f.best.quantity, float(f.best.value_at(temp_c))
+    noise = _readings_noise(f)
+    dof = (BLOCKS - 1) * len(f.points.history[0])
+    made = estimate(name, symbol_of(name), unit_of(name), value, noise * _leverage(f.best, temp_c), dof)
+    parts = [*_point_parts(f, temp_c, accuracy), *_temperature_parts(f, temp_c), *_bench_parts(f, temp_c, accuracy)]
+    return expand_estimate(made, [part for part in parts if part.u > 0.0])
+
+
+# ---- what differs from point to point
+
+
+def _readings_noise(f: Fitted) -> float:
+    """Standard deviation of one point by the scatter within its recordings, two of them."""
+    return float(f.points.scatter_v[f.axes[0]]) / 2.0**0.5 * f.per_volt
+
+
+def _head_noise(f: Fitted, a: BenchAccuracy) -> float:
+    """Of one point: each position's scale is read, both are of one mounting."""
+    return math.hypot(SCALE_U_ARCSEC / 2.0**0.5, a.mount_arcsec) if f.turned else 0.0
+
+
+def _interpolation(f: Fitted, a: BenchAccuracy) -> float:
+    """Of one point: what leaving out recordings shows beyond their noise."""
+    i, j = f.axes
+    noise_v = float(f.points.scatter_v[i])
+    if f.turned:
+        noise_v = math.hypot(noise_v, math.hypot(SCALE_U_ARCSEC, a.mount_arcsec) / f.per_volt)
+    square = float(f.points.left_out_square_v2[i, j]) - LEFT_OUT_NOISE * noise_v**2
+    return max(square, 0.0) ** 0.5 / LEFT_OUT / 2.0**0.5 * f.per_volt
+
+
+def _leverage(c: Compensation, temp_c: float) -> float:
+    """Standard deviation of the curve for noise of 1 in each point; 1 where the fit is exact."""
+    return float(c.half_width([temp_c])[0]) / t_quantile(c.dof) / c.rms if c.rms > 0.0 else 1.0
+
+
+def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
+    head, interpolation = _head_noise(f, a), _interpolation(f, a)
+    known = f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2
+    yield Component(name="head", u=head * _leverage(f.best, temp_c))
+    yield Component(name="interpolation", u=interpolation)
+    yield Component(name="misfit", u=max(f.best.rms**2 - known, 0.0) ** 0.5, dof=f.best.dof)
+
+
+# ---- what all points share
+
+
+def _slope_of(c: Compensation, temp_c: float) -> float:
+    """A kelvin, within the range."""
+    inside_c = min(max(temp_c, c.low_c + 0.5), c.high_c - 0.5)
+    return float(c.value_at(inside_c + 0.5) - c.value_at(inside_c - 0.5))
+
+
+def _temperature_parts(f: Fitted, temp_c: float) -> Iterator[Component]:
+    slope = abs(_slope_of(f.best, temp_c))
+    yield Component(name="temperature", u=slope * TEMP_U_K)
+    if f.play:
+        yield within_limit("play", slope * PLAY_K)
+    yield within_limit("settling", slope * f.settling_k)
+
+
+def _bench_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
+    """Chain and circle."""
+    board_k = abs(temp_c - 25.0)
+    if f.kind == "scale":
+        scale = float(f.best.value_at(temp_c))
+        yield Component(name="chain gain", u=scale * a.chain_gain_ppm * 1e-6)
+        yield Component(name="chain over temperature", u=scale * a.chain_gain_tc_ppm_per_k * board_k * 1e-6)
+    elif f.kind == "zero":
+        yield Component(name="chain zero", u=a.chain_zero_uv * 1e-6 * f.per_volt)
+        yield Component(name="chain over temperature", u=a.chain_zero_tc_uv_per_k * board_k * 1e-6 * f.per_volt)
+        yield within_limit("resolution", _undithered_v(f) * f.per_volt)
+    elif f.turned:
+        yield Component(name="circle", u=a.circle_arcsec / 2.0**0.5)
+
+
+def _undithered_v(f: Fitted) -> float:
+    """Limit of what cutting codes off does to a mean, beside the half code that is taken out: noise of sd s in the
+    samples leaves exp(-2 pi^2 s^2) of it, s in codes (Widrow and Kollar, Quantization Noise, 2008)."""
+    s = float(f.points.scatter_v[f.axes[0]]) * f.points.samples**0.5 / CODE_V
+    return CODE_V / 2.0 * float(np.exp(-2.0 * (np.pi * s) ** 2))
