@@ -6,7 +6,6 @@ compensation is compared with it at the temperature of the element. No part of t
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import Compared, aligned, as_ratio, estimate_dict, finite_or_none, with_ci
 from psabench.thermal.budget import estimate_at, unit_of
 from psabench.thermal.compensation import compensation_dict
-from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, whole_lines
+from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, number_in, read_rows
 from psabench.thermal.reduce import SIDE_FACES, Points, points_of, quantity_names
 from psabench.thermal.result import (
     Difference,
@@ -87,13 +86,7 @@ def read_truth(folder: RunFolder, recordings: Sequence[Recording]) -> ThermalTru
 
 def _truth_rows(path: Path) -> list[dict[str, float]]:
     """By column. Raises BadInput for a file of another form."""
-    rows = list(csv.reader(whole_lines(path)))
-    if rows and tuple(rows[0]) != TRUTH_COLUMNS:
-        raise BadInput(expected(f"the columns {','.join(TRUTH_COLUMNS)}", ",".join(rows[0]), f"{path}:1"))
-    try:
-        return [dict(zip(TRUTH_COLUMNS, map(float, row), strict=True)) for row in rows[1:]]
-    except ValueError as e:
-        raise BadInput(expected("numbers in each column", e, path)) from e
+    return [{n: number_in(n, text, where) for n, text in row.items()} for where, row in read_rows(path, TRUTH_COLUMNS)]
 
 
 def _true_recording(r: Recording, at: Mapping[str, float]) -> Recording:

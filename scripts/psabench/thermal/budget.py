@@ -109,10 +109,24 @@ def _leverage(c: Compensation, temp_c: float) -> float:
 
 def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
     head, interpolation = _head_noise(f, a), _interpolation(f, a)
-    known = f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2
-    yield Component(name="head", u=head * _leverage(f.best, temp_c))
-    yield Component(name="interpolation", u=interpolation)
-    yield Component(name="misfit", u=max(f.best.rms**2 - known, 0.0) ** 0.5, dof=f.best.dof)
+    leverage = _leverage(f.best, temp_c)
+    yield Component(name="head", u=head * leverage)
+    yield Component(name="interpolation", u=interpolation * leverage)
+    yield _misfit(f, f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2)
+
+
+def _misfit(f: Fitted, known: float) -> Component:
+    """What the polynomial leaves, rms over the points, where their errors have the variance `known`.
+
+    The squares of the residuals sum to dof * known + n m^2 on average; m^2 has the variance of that sum, which gives
+    its degrees of freedom (GUM G.3, eq. E.7).
+    """
+    dof, n = f.best.dof, len(f.points.t_s)
+    square = (f.best.rms**2 - known) * dof / n
+    if square <= 0.0:
+        return Component(name="misfit", u=0.0)
+    variance = (2.0 * dof * known**2 + 4.0 * n * known * square) / n**2
+    return Component(name="misfit", u=square**0.5, dof=2.0 * square**2 / variance if variance > 0.0 else math.inf)
 
 
 # ---- what all points share
