@@ -242,7 +242,7 @@ def interpolation_lines(report: ThermalReport) -> list[str]:
     lines = []
     for m in report.result.sweeps:
         scale = float(m.points.scale_v_per_g.mean())
-        rms, most = (float(x.max()) / 2.0**0.5 / scale * 1e6 for x in _interpolation_of(m))
+        rms, most = (float(x.max()) / scale * 1e6 for x in _interpolation_of(m))
         lines.append(
             f"{m.title}: positions are interpolated to one instant a round; that is off by {rms:.2g} µg rms, "
             f"{most:.2g} µg at most, found by leaving out recordings"

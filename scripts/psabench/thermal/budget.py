@@ -19,7 +19,7 @@ from psabench.budget.gum import expand_estimate
 from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
 from psabench.thermal.bench import BLOCKS
 from psabench.thermal.compensation import Compensation
-from psabench.thermal.reduce import ARCSEC, AXES, LEFT_OUT, LEFT_OUT_NOISE, OF_FACES, Points
+from psabench.thermal.reduce import ARCSEC, AXES, OF_FACES, Points, left_out_error
 
 TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
 PLAY_K = 0.3  # limit of how far the way to a temperature moves what the element feels (E0)
@@ -95,11 +95,10 @@ def _head_noise(f: Fitted, a: BenchAccuracy) -> float:
 def _interpolation(f: Fitted, a: BenchAccuracy) -> float:
     """Of one point: what leaving out recordings shows beyond their noise."""
     i, j = f.axes
-    noise_v = float(f.points.scatter_v[i])
-    if f.turned:
-        noise_v = math.hypot(noise_v, math.hypot(SCALE_U_ARCSEC, a.mount_arcsec) / f.per_volt)
-    square = float(f.points.left_out_square_v2[i, j]) - LEFT_OUT_NOISE * noise_v**2
-    return max(square, 0.0) ** 0.5 / LEFT_OUT / 2.0**0.5 * f.per_volt
+    left_out = f.points.left_out
+    square_v2 = float(left_out.half_sum_v2[i] if f.kind == "zero" else left_out.half_diff_v2[i, j])
+    noise = math.hypot(_readings_noise(f), _head_noise(f, a))
+    return float(left_out_error(square_v2 * f.per_volt**2, noise))
 
 
 def _leverage(c: Compensation, temp_c: float) -> float:

@@ -4,7 +4,7 @@ Along gravity and against it, half the difference of an axis's readings is its s
 another axis along gravity, half the difference over the scale is the component of the misalignment towards that axis.
 During a sweep the positions are recorded one after the other, at different temperatures: each is interpolated to one
 instant a round, by cubics through the four nearest of its recordings. How far off that may be is measured, by leaving
-out recordings: `Points.left_out_square_v2`.
+out recordings: `Points.left_out`.
 """
 
 from __future__ import annotations
@@ -33,6 +33,19 @@ SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LeftOut:
+    """Guesses of a sweep's readings by their neighbours, less the readings: mean squares, V^2; 0 for a soak.
+
+    The two positions of a pair are recorded one after the other, so their errors are nearly the same: they add up in
+    half the sum and cancel in half the difference.
+    """
+
+    half_sum_v2: Array  # (3,) of an axis that is vertical
+    half_diff_v2: Array  # (3, 3) of the axis, with the other one vertical
+    most_v2: Array  # (3,) the largest of half_sum_v2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Points:
     """What one segment gives: n instants."""
 
@@ -43,8 +56,7 @@ class Points:
     scale_v_per_g: Array  # (n, 3)
     base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
     scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
-    left_out_square_v2: Array  # (3, 3) of the axis, with the other one vertical: mean square of guess less reading
-    interpolation_most_v: Array  # (3,) of one position's reading with the axis vertical, the largest; 0 for a soak
+    left_out: LeftOut
     noise_part: float  # of a reading's variance that is in a point's
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
     samples: int  # of a recording
@@ -53,8 +65,13 @@ class Points:
 
     @property
     def interpolation_v(self) -> Array:
-        """Of one position's reading with the axis vertical, rms, (3,)."""
-        return left_out_error(np.diagonal(self.left_out_square_v2), self.scatter_v)
+        """Of the half sum of an axis's two readings, rms, (3,)."""
+        return left_out_error(self.left_out.half_sum_v2, self.scatter_v / 2.0**0.5)
+
+    @property
+    def interpolation_most_v(self) -> Array:
+        """The same, the largest, (3,)."""
+        return left_out_error(self.left_out.most_v2, self.scatter_v / 2.0**0.5)
 
     @property
     def up(self) -> npt.NDArray[np.bool_]:
@@ -170,8 +187,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        left_out_square_v2=np.zeros((3, 3)),
-        interpolation_most_v=np.zeros(3),
+        left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3)),
         noise_part=1.0,
         history=(t_s, case_c),
         samples=1,
@@ -196,8 +212,6 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
     middle = middle[(middle >= first) & (middle <= last)]
     by = {p: interpolate_cubic(t_s[at], level[at], middle) for p, at in visits.items()}
     zero, scale, base = _solve_positions(by)
-    scatter = _scatter_of(rows)
-    off_v2, most_v = _left_out(visits, t_s, level, scatter)
     return Points(
         segment=name,
         t_s=middle,
@@ -205,9 +219,8 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         zero_ug=zero,
         scale_v_per_g=scale,
         base_arcsec=base,
-        scatter_v=scatter,
-        left_out_square_v2=off_v2,
-        interpolation_most_v=most_v,
+        scatter_v=_scatter_of(rows),
+        left_out=_left_out({p: left_out_off(t_s[at], level[at]) for p, at in visits.items()}),
         noise_part=float(np.mean([(cubic_weights(t_s[at], middle)[1] ** 2).sum(axis=1) for at in visits.values()])),
         history=(t_s, case_c),
         samples=1,
@@ -220,15 +233,16 @@ def _turn_of(rows: Sequence[Recording]) -> float:
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
-def _left_out(visits: Mapping[str, list[int]], t_s: Array, u: Array, scatter_v: Array) -> tuple[Array, Array]:
-    """Mean squares by axis and vertical axis, (3, 3), and the largest error of an axis that is vertical, (3,)."""
-    squares = np.empty((3, 3))
-    most_v = np.empty(3)
-    for j in range(3):
-        each = [left_out_squares(t_s[at], u[at]) for p, at in visits.items() if POSITIONS[p].axis == j]
-        squares[:, j] = np.concatenate(each).mean(axis=0)
-        most_v[j] = max(left_out_error(e[:, j], scatter_v[j]).max() for e in each)
-    return squares, most_v
+def _left_out(off: Mapping[str, Array]) -> LeftOut:
+    """By the errors of each position, (m, 3) each; a round has both positions of a pair."""
+    half_sum, half_diff, most = np.empty(3), np.empty((3, 3)), np.empty(3)
+    for j, axis in enumerate(AXES):
+        rounds = min(len(off[f"{axis}_down"]), len(off[f"{axis}_up"]))
+        down, up = off[f"{axis}_down"][:rounds], off[f"{axis}_up"][:rounds]
+        squares = ((down[:, j] + up[:, j]) / 2.0) ** 2
+        half_sum[j], most[j] = squares.mean(), squares.max()
+        half_diff[:, j] = (((down - up) / 2.0) ** 2).mean(axis=0)
+    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most)
 
 
 def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array]:
@@ -250,18 +264,18 @@ def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
     return np.asarray(np.einsum("nj,njk->nk", weights, u[near]))
 
 
-def left_out_squares(t_s: Array, u: Array) -> Array:
-    """Each reading less what its neighbours give for it, squared, (m - 2, k): a gap twice as long."""
+def left_out_off(t_s: Array, u: Array) -> Array:
+    """What its neighbours give for each reading, less the reading, (m - 2, k): a gap twice as long."""
     found = []
     for k in range(1, len(t_s) - 1):
         rest = np.arange(len(t_s)) != k
-        found.append((interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0] - u[k]) ** 2)
+        found.append(interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0] - u[k])
     return np.array(found)
 
 
-def left_out_error(squares: Array, scatter_v: npt.ArrayLike) -> Array:
-    """How far off an interpolation may be, the same shape: without what the scatter does, divided by LEFT_OUT."""
-    beyond = squares - LEFT_OUT_NOISE * np.asarray(scatter_v) ** 2
+def left_out_error(squares: npt.ArrayLike, noise: npt.ArrayLike) -> Array:
+    """How far off an interpolation may be, the same shape: without what noise of a reading does, over LEFT_OUT."""
+    beyond = np.asarray(squares) - LEFT_OUT_NOISE * np.asarray(noise) ** 2
     return np.asarray(np.sqrt(np.maximum(beyond, 0.0)) / LEFT_OUT)
 
 
