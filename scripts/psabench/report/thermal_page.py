@@ -14,8 +14,8 @@ from psabench.report import plots
 from psabench.report import thermal_grading as grading
 from psabench.report.page import bullets, figure, folded, section, table, verdict_line, whole_page, write_report
 from psabench.report.thermal_grading import ThermalReport
-from psabench.thermal.budget import estimate_at, symbol_of
-from psabench.thermal.result import Method, element_of, predicted_sweep
+from psabench.thermal.budget import element_of, estimate_at, symbol_of
+from psabench.thermal.result import Method, predicted_sweep
 
 TITLE = "Accelerometers against temperature"
 CAPTIONS = {

@@ -18,12 +18,44 @@ from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.gum import expand_estimate
 from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
 from psabench.thermal.bench import BLOCKS
-from psabench.thermal.compensation import Compensation
-from psabench.thermal.reduce import ARCSEC, AXES, OF_FACES, Points, left_out_error
+from psabench.thermal.compensation import Array, Compensation, SweepCase, residual_squares
+from psabench.thermal.reduce import ARCSEC, AXES, Points, left_out_error, turning_axes
 
 TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
 PLAY_K = 0.3  # limit of how far the way to a temperature moves what the element feels (E0)
+NEXT_ORDERS = 3  # beyond the degree: what a polynomial leaves of a smooth curve is in them
 SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn again at each turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leftover:
+    """Squares of what a curve leaves of its points: in the next orders, where the misfit to a smooth curve is, and
+    beyond them, where only noise is. Sums, with their degrees of freedom."""
+
+    smooth: float
+    smooth_dof: int
+    rough: float
+    rough_dof: int
+
+
+def element_of(p: Points, c: Compensation) -> Array:
+    """Temperature of the element by the lag of a fit, (n,); that of the case where it has none."""
+    if c.lag is None:
+        return p.case_c
+    sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
+    return sweep.element_c(np.array([c.lag.tau_s]))[:, 0]
+
+
+def leftover_of(p: Points, c: Compensation) -> Leftover:
+    """By a fit of more orders to the same points."""
+    all_squares = c.rms**2 * c.dof
+    orders = min(NEXT_ORDERS, c.dof)
+    rough_dof, rough = c.dof - orders, 0.0
+    if rough_dof:
+        used = p.up if c.lag is None and len(p.t_s) > c.dof + c.degree + 1 else np.ones(len(p.t_s), np.bool_)
+        case, element, y = (x[used] for x in (p.case_c, element_of(p, c), p.quantity(c.quantity)))
+        rough = min(residual_squares(case, element, y, c.degree + orders), all_squares)
+    return Leftover(smooth=all_squares - rough, smooth_dof=orders, rough=rough, rough_dof=rough_dof)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +64,7 @@ class Fitted:
 
     points: Points
     best: Compensation
+    leftover: Leftover
     settling_k: float  # that the element may miss the case by, at the end of a dwell
     play: bool  # whether the way to a temperature was not that of the soak
 
@@ -47,9 +80,9 @@ class Fitted:
 
     @property
     def turned(self) -> bool:
-        """Whether an error of the head's angle moves it: the axis lies in the plane of turning, across the vertical."""
+        """Whether an error of the head's angle moves it: the axis is not the head's own, with the other one vertical."""
         i, j = self.axes
-        return self.kind == "base" and any({i, j} == set(plane) for plane in OF_FACES)
+        return self.kind == "base" and i in turning_axes(j)
 
     @property
     def per_volt(self) -> float:
@@ -98,7 +131,7 @@ def _interpolation(f: Fitted, a: BenchAccuracy) -> float:
     left_out = f.points.left_out
     square_v2 = float(left_out.half_sum_v2[i] if f.kind == "zero" else left_out.half_diff_v2[i, j])
     noise = math.hypot(_readings_noise(f), _head_noise(f, a))
-    return float(left_out_error(square_v2 * f.per_volt**2, noise))
+    return float(left_out_error(square_v2 * f.per_volt**2, noise, f.points.left_out.noise_part))
 
 
 def _leverage(c: Compensation, temp_c: float) -> float:
@@ -109,22 +142,25 @@ def _leverage(c: Compensation, temp_c: float) -> float:
 def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
     head, interpolation = _head_noise(f, a), _interpolation(f, a)
     leverage = _leverage(f.best, temp_c)
+    known = f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2
+    left = f.leftover
+    unknown = max(left.rough / left.rough_dof - known, 0.0) if left.rough_dof else 0.0
     yield Component(name="head", u=head * leverage)
     yield Component(name="interpolation", u=interpolation * leverage)
-    yield _misfit(f, f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2)
+    yield Component(name="between recordings", u=unknown**0.5 * leverage, dof=max(left.rough_dof, 1))
+    yield _misfit(left, known + unknown, f.best.dof + f.best.degree + 1)
 
 
-def _misfit(f: Fitted, known: float) -> Component:
-    """What the polynomial leaves, rms over the points, where their errors have the variance `known`.
+def _misfit(left: Leftover, known: float, n: int) -> Component:
+    """What the polynomial leaves, rms over n points, where the variance of their errors is known.
 
-    The squares of the residuals sum to dof * known + n m^2 on average; m^2 has the variance of that sum, which gives
-    its degrees of freedom (GUM G.3, eq. E.7).
+    The squares in the next orders sum to smooth_dof * known + n m^2 on average; the variance of that sum gives m^2 its
+    degrees of freedom (GUM G.3, eq. E.7).
     """
-    dof, n = f.best.dof, len(f.points.t_s)
-    square = (f.best.rms**2 - known) * dof / n
+    square = (left.smooth - left.smooth_dof * known) / n
     if square <= 0.0:
         return Component(name="misfit", u=0.0)
-    variance = (2.0 * dof * known**2 + 4.0 * n * known * square) / n**2
+    variance = (2.0 * left.smooth_dof * known**2 + 4.0 * n * known * square) / n**2
     return Component(name="misfit", u=square**0.5, dof=2.0 * square**2 / variance if variance > 0.0 else math.inf)
 
 

@@ -24,9 +24,7 @@ Array = npt.NDArray[np.float64]
 
 AXES = "xyz"
 ARCSEC = float(np.degrees(1.0)) * 3600.0
-OF_FACES = ((0, 1), (0, 2))  # axes in the plane of turning, direct and side
-LEFT_OUT_NOISE = 1.0 + 2 * (9 / 16) ** 2 + 2 * (1 / 16) ** 2  # of one reading's variance, in a reading less its guess
-LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 16 times
+LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 7 times
 LEAST_VISITS = 6  # of a position in a sweep
 TOP_K = 0.1  # noise of the chamber's reading
 SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
@@ -43,6 +41,7 @@ class LeftOut:
     half_sum_v2: Array  # (3,) of an axis that is vertical
     half_diff_v2: Array  # (3, 3) of the axis, with the other one vertical
     most_v2: Array  # (3,) the largest of half_sum_v2
+    noise_part: float  # of a reading's variance that is in a guess less the reading
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,12 +65,12 @@ class Points:
     @property
     def interpolation_v(self) -> Array:
         """Of the half sum of an axis's two readings, rms, (3,)."""
-        return left_out_error(self.left_out.half_sum_v2, self.scatter_v / 2.0**0.5)
+        return left_out_error(self.left_out.half_sum_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
 
     @property
     def interpolation_most_v(self) -> Array:
         """The same, the largest, (3,)."""
-        return left_out_error(self.left_out.most_v2, self.scatter_v / 2.0**0.5)
+        return left_out_error(self.left_out.most_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
 
     @property
     def up(self) -> npt.NDArray[np.bool_]:
@@ -98,6 +97,12 @@ def gravity_at(position: Position, alpha_deg: float) -> Array:
     th = np.radians(alpha_deg)
     along, across = -np.sin(th), -np.cos(th)
     return np.array([along, 0.0, across] if position.face in SIDE_FACES else [along, across, 0.0])
+
+
+def turning_axes(vertical: int) -> tuple[int, ...]:
+    """Axes in the plane in which the head turns the unit where this one is vertical; the other is along the head's."""
+    (face,) = {p.face for p in POSITIONS.values() if p.axis == vertical}
+    return (0, 2) if face in SIDE_FACES else (0, 1)
 
 
 def points_of(recordings: Sequence[Recording], samples: int = 1) -> dict[str, Points]:
@@ -187,7 +192,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3)),
+        left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3), noise_part=1.0),
         noise_part=1.0,
         history=(t_s, case_c),
         samples=1,
@@ -220,7 +225,7 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        left_out=_left_out({p: left_out_off(t_s[at], level[at]) for p, at in visits.items()}),
+        left_out=_left_out({p: (left_out_weights(t_s[at]), level[at]) for p, at in visits.items()}),
         noise_part=float(np.mean([(cubic_weights(t_s[at], middle)[1] ** 2).sum(axis=1) for at in visits.values()])),
         history=(t_s, case_c),
         samples=1,
@@ -233,8 +238,9 @@ def _turn_of(rows: Sequence[Recording]) -> float:
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
-def _left_out(off: Mapping[str, Array]) -> LeftOut:
-    """By the errors of each position, (m, 3) each; a round has both positions of a pair."""
+def _left_out(visits: Mapping[str, tuple[Array, Array]]) -> LeftOut:
+    """By each position's weights, (m - 2, m), and readings, (m, 3); a round has both positions of a pair."""
+    off = {p: weights @ u for p, (weights, u) in visits.items()}
     half_sum, half_diff, most = np.empty(3), np.empty((3, 3)), np.empty(3)
     for j, axis in enumerate(AXES):
         rounds = min(len(off[f"{axis}_down"]), len(off[f"{axis}_up"]))
@@ -242,7 +248,8 @@ def _left_out(off: Mapping[str, Array]) -> LeftOut:
         squares = ((down[:, j] + up[:, j]) / 2.0) ** 2
         half_sum[j], most[j] = squares.mean(), squares.max()
         half_diff[:, j] = (((down - up) / 2.0) ** 2).mean(axis=0)
-    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most)
+    noise_part = float(np.mean([(weights**2).sum(axis=1).mean() for weights, _ in visits.values()]))
+    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most, noise_part=noise_part)
 
 
 def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array]:
@@ -264,18 +271,20 @@ def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
     return np.asarray(np.einsum("nj,njk->nk", weights, u[near]))
 
 
-def left_out_off(t_s: Array, u: Array) -> Array:
-    """What its neighbours give for each reading, less the reading, (m - 2, k): a gap twice as long."""
-    found = []
-    for k in range(1, len(t_s) - 1):
-        rest = np.arange(len(t_s)) != k
-        found.append(interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0] - u[k])
-    return np.array(found)
+def left_out_weights(t_s: Array) -> Array:
+    """Of the readings at t_s (m,), in what its neighbours give for each one less the reading, (m - 2, m): a gap twice
+    as long."""
+    found = -np.eye(len(t_s))[1:-1]
+    for row, k in zip(found, range(1, len(t_s) - 1), strict=True):
+        rest = np.flatnonzero(np.arange(len(t_s)) != k)
+        near, weights = cubic_weights(t_s[rest], t_s[k : k + 1])
+        row[rest[near[0]]] = weights[0]
+    return found
 
 
-def left_out_error(squares: npt.ArrayLike, noise: npt.ArrayLike) -> Array:
+def left_out_error(squares: npt.ArrayLike, noise: npt.ArrayLike, noise_part: float) -> Array:
     """How far off an interpolation may be, the same shape: without what noise of a reading does, over LEFT_OUT."""
-    beyond = np.asarray(squares) - LEFT_OUT_NOISE * np.asarray(noise) ** 2
+    beyond = np.asarray(squares) - noise_part * np.asarray(noise) ** 2
     return np.asarray(np.sqrt(np.maximum(beyond, 0.0)) / LEFT_OUT)
 
 

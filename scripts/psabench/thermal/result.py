@@ -11,10 +11,9 @@ import numpy.typing as npt
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.errors import BadInput
 from psabench.estimate.uncertainty import Estimate
-from psabench.thermal.budget import Fitted, estimate_at
+from psabench.thermal.budget import Fitted, Leftover, element_of, estimate_at, leftover_of
 from psabench.thermal.compensation import (
     Compensation,
-    SweepCase,
     element_temperature,
     fit_soak,
     fit_sweep,
@@ -41,6 +40,7 @@ class Fits:
 
     quantity: str
     best: Compensation  # what a passport gets: with the lag where both legs are there
+    leftover: Leftover  # what that leaves of the points
     one_leg: Compensation | None = None  # of a sweep's way up, against the case
     both_legs: Compensation | None = None  # the same of both legs, without a lag
     largest: float = 0.0  # of the quantity: residuals are percents of it
@@ -63,8 +63,10 @@ class Method:
 
     def fitted(self, quantity: str) -> Fitted:
         """What the budget of a quantity is made from."""
-        best = self.fits[quantity].best
-        return Fitted(points=self.points, best=best, settling_k=self.settling_k, play=self.play)
+        f = self.fits[quantity]
+        return Fitted(
+            points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play
+        )
 
     @property
     def title(self) -> str:
@@ -156,17 +158,17 @@ def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | 
     y = p.quantity(quantity)
     largest = float(np.abs(y).max() if quantity.startswith("zero") else np.ptp(y))
     if not sweep:
-        return Fits(quantity=quantity, best=fit_soak(quantity, p.case_c, y, degree), largest=largest)
-    up = up_leg(p)
-    one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
-    if turns_of(p.case_c) == 0:
-        return Fits(quantity=quantity, best=one_leg, one_leg=one_leg, largest=largest)
+        best, one_leg, both_legs = fit_soak(quantity, p.case_c, y, degree), None, None
+    else:
+        up = up_leg(p)
+        best = one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
+        both_legs = None
+    if sweep and turns_of(p.case_c):
+        best = fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s)
+        both_legs = fit_soak(quantity, p.case_c, y, degree)
+    leftover = leftover_of(p, best)
     return Fits(
-        quantity=quantity,
-        best=fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s),
-        one_leg=one_leg,
-        both_legs=fit_soak(quantity, p.case_c, y, degree),
-        largest=largest,
+        quantity=quantity, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest
     )
 
 
@@ -211,14 +213,6 @@ def predicted_sweep(soak: Method, sweep: Method, quantity: str) -> Array:
     element = element_of(p, found)
     per_k = found.lag.per_k if found.lag else 0.0
     return np.asarray(curve.value_at(element) + per_k * (p.case_c - element))
-
-
-def element_of(p: Points, c: Compensation) -> Array:
-    """Temperature of the element by the lag of a fit, (n,); that of the case where it has none."""
-    if c.lag is None:
-        return p.case_c
-    sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
-    return sweep.element_c(np.array([c.lag.tau_s]))[:, 0]
 
 
 def _loop_of(case_c: Array, y: Array, up: npt.NDArray[np.bool_]) -> float:

@@ -19,7 +19,7 @@ from psabench.report import thermal_grading, thermal_page
 from psabench.thermal.bench import CASE_CHANNEL, sample_of_frames
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
 from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
-from psabench.thermal.reduce import interpolate_cubic, left_out_error, left_out_off, points_of
+from psabench.thermal.reduce import interpolate_cubic, left_out_error, left_out_weights, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
 from psabench.thermal.run import ThermalOptions, run_thermal
 from psabench.thermal.schedule import (
@@ -161,7 +161,7 @@ def test_interpolation_is_not_worse_than_it_says(every_s: float, phase: float) -
     taken = np.arange(phase * every_s, 1499.0, every_s).astype(int)
     inside = np.arange(taken[1], taken[-2])
     off = np.abs(interpolate_cubic(taken.astype(float), every[taken], inside.astype(float)) - every[inside])
-    said = left_out_error(left_out_off(taken.astype(float), every[taken]) ** 2, 0.0)
+    said = left_out_error((left_out_weights(taken.astype(float)) @ every[taken]) ** 2, 0.0, 1.0)
     assert off.max() <= said.max()
     assert said.max() <= 10 * off.max()
     assert np.sqrt(np.mean(off**2)) <= np.sqrt(np.mean(said**2))
