@@ -142,7 +142,7 @@ def _leverage(c: Compensation, temp_c: float) -> float:
 def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
     head, interpolation = _head_noise(f, a), _interpolation(f, a)
     leverage = _leverage(f.best, temp_c)
-    known = f.points.noise_part * (_readings_noise(f) ** 2 + head**2) + interpolation**2
+    known = float(f.points.noise_part[f.axes[1]]) * (_readings_noise(f) ** 2 + head**2) + interpolation**2
     left = f.leftover
     unknown = max(left.rough / left.rough_dof - known, 0.0) if left.rough_dof else 0.0
     yield Component(name="head", u=head * leverage)

@@ -56,7 +56,7 @@ class Points:
     base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
     scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
     left_out: LeftOut
-    noise_part: float  # of a reading's variance that is in a point's
+    noise_part: Array  # (3,) of a reading's variance that is in a point's, by the axis that is vertical
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
     samples: int  # of a recording
     turn_s: float  # when the chamber has reached the top of a sweep; the last instant of a soak
@@ -193,7 +193,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
         left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3), noise_part=1.0),
-        noise_part=1.0,
+        noise_part=np.ones(3),
         history=(t_s, case_c),
         samples=1,
         turn_s=float(t_s[-1]),
@@ -226,7 +226,7 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
         left_out=_left_out({p: (left_out_weights(t_s[at]), level[at]) for p, at in visits.items()}),
-        noise_part=float(np.mean([(cubic_weights(t_s[at], middle)[1] ** 2).sum(axis=1) for at in visits.values()])),
+        noise_part=_noise_part({p: cubic_weights(t_s[at], middle)[1] for p, at in visits.items()}),
         history=(t_s, case_c),
         samples=1,
         turn_s=_turn_of(rows),
@@ -236,6 +236,12 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
 def _turn_of(rows: Sequence[Recording]) -> float:
     shown = np.array([r.chamber_degc for r in rows])
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
+
+
+def _noise_part(weights: Mapping[str, Array]) -> Array:
+    """By each position's weights of interpolation, (n, 4)."""
+    squares = {p: float((w**2).sum(axis=1).mean()) for p, w in weights.items()}
+    return np.array([(squares[f"{axis}_down"] + squares[f"{axis}_up"]) / 2.0 for axis in AXES])
 
 
 def _left_out(visits: Mapping[str, tuple[Array, Array]]) -> LeftOut:
