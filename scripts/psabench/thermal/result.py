@@ -46,8 +46,8 @@ class Fits:
     largest: float = 0.0  # of the quantity: residuals are percents of it
 
     def percent_of(self, residual: Array) -> float:
-        """The largest one, of the largest value (zero) or change (scale, base)."""
-        return 100.0 * float(np.abs(residual).max()) / self.largest
+        """The largest one, of the largest value (zero) or change (scale, base); 0 where there is none."""
+        return 100.0 * float(np.abs(residual).max()) / self.largest if self.largest else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,7 +187,7 @@ class Difference:
     loop_predicted: float | None
 
     def percent(self, value: float) -> float:
-        return 100.0 * value / self.largest
+        return 100.0 * value / self.largest if self.largest else 0.0
 
 
 def difference_of(soak: Method, sweep: Method, quantity: str) -> Difference:
