@@ -113,10 +113,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="thermal", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     p.add_argument("--bench", choices=BENCHES, default=BENCHES[0], help="(%(default)s)")
-    p.add_argument("--units", type=int, default=60, metavar="N", help="seeds 1 to N (%(default)s)")
+    p.add_argument("--units", type=int, default=60, metavar="N", help="so many seeds (%(default)s)")
+    p.add_argument("--first", type=int, default=1001, metavar="N", help="of the seeds (%(default)s)")
     p.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (%(default)s)")
     args = p.parse_args(argv)
-    print(markdown_table(runs_of(args.bench, range(1, args.units + 1), args.jobs)))
+    print(markdown_table(runs_of(args.bench, range(args.first, args.first + args.units), args.jobs)))
     return 0
 
 
