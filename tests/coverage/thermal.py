@@ -1,4 +1,4 @@
-"""Coverage of the uncertainties of `psabench run thermal`: fresh units, every tolerance of unit and bench drawn again."""
+"""Coverage of the uncertainties of `psabench run thermal`: fresh units, the tolerances of unit and bench drawn again."""
 
 from __future__ import annotations
 

@@ -73,22 +73,23 @@ class Fitted:
         return self.best.quantity.partition("_")[0]
 
     @property
-    def axes(self) -> tuple[int, int]:
+    def axis_pair(self) -> tuple[int, int]:
         """The axis, and the one that is vertical where the quantity is read."""
         letters = self.best.quantity.split("_")[1]
         return AXES.index(letters[0]), AXES.index(letters[-1])
 
     @property
-    def turned(self) -> bool:
+    def moves_with_head(self) -> bool:
         """Whether an error of the head's angle moves it: the axis is not the head's own, with the other one vertical."""
-        i, j = self.axes
+        i, j = self.axis_pair
         return self.kind == "base" and i in turning_axes(j)
 
     @property
     def per_volt(self) -> float:
         """The quantity's unit a volt of half a sum or a difference."""
-        scale = float(self.points.scale_v_per_g[:, self.axes[0]].mean())
-        return {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}[self.kind]
+        scale = float(self.points.scale_v_per_g[:, self.axis_pair[0]].mean())
+        by_kind: dict[str, float] = {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}
+        return by_kind[self.kind]
 
 
 def unit_of(quantity: str) -> str:
@@ -117,17 +118,17 @@ def estimate_at(f: Fitted, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
 
 def _readings_noise(f: Fitted) -> float:
     """Standard deviation of one point by the scatter within its recordings, two of them."""
-    return float(f.points.scatter_v[f.axes[0]]) / 2.0**0.5 * f.per_volt
+    return float(f.points.scatter_v[f.axis_pair[0]]) / 2.0**0.5 * f.per_volt
 
 
 def _head_noise(f: Fitted, a: BenchAccuracy) -> float:
     """Of one point: each position's scale is read, both are of one mounting."""
-    return math.hypot(SCALE_U_ARCSEC / 2.0**0.5, a.mount_arcsec) if f.turned else 0.0
+    return math.hypot(SCALE_U_ARCSEC / 2.0**0.5, a.mount_arcsec) if f.moves_with_head else 0.0
 
 
 def _interpolation(f: Fitted, a: BenchAccuracy) -> float:
     """Of one point: what leaving out recordings shows beyond their noise."""
-    i, j = f.axes
+    i, j = f.axis_pair
     left_out = f.points.left_out
     square_v2 = float(left_out.half_sum_v2[i] if f.kind == "zero" else left_out.half_diff_v2[i, j])
     noise = math.hypot(_readings_noise(f), _head_noise(f, a))
@@ -142,7 +143,7 @@ def _leverage(c: Compensation, temp_c: float) -> float:
 def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
     head, interpolation = _head_noise(f, a), _interpolation(f, a)
     leverage = _leverage(f.best, temp_c)
-    known = float(f.points.noise_part[f.axes[1]]) * (_readings_noise(f) ** 2 + head**2) + interpolation**2
+    known = float(f.points.noise_part[f.axis_pair[1]]) * (_readings_noise(f) ** 2 + head**2) + interpolation**2
     left = f.leftover
     unknown = max(left.rough / left.rough_dof - known, 0.0) if left.rough_dof else 0.0
     yield Component(name="head", u=head * leverage)
@@ -192,12 +193,12 @@ def _bench_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Compone
         yield Component(name="chain zero", u=a.chain_zero_uv * 1e-6 * f.per_volt)
         yield Component(name="chain over temperature", u=a.chain_zero_tc_uv_per_k * board_k * 1e-6 * f.per_volt)
         yield within_limit("resolution", _undithered_v(f) * f.per_volt)
-    elif f.turned:
+    elif f.moves_with_head:
         yield Component(name="circle", u=a.circle_arcsec / 2.0**0.5)
 
 
 def _undithered_v(f: Fitted) -> float:
     """Limit of what cutting codes off does to a mean, beside the half code that is taken out: noise of sd s in the
     samples leaves exp(-2 pi^2 s^2) of it, s in codes (Widrow and Kollar, Quantization Noise, 2008)."""
-    s = float(f.points.scatter_v[f.axes[0]]) * f.points.samples**0.5 / CODE_V
+    s = float(f.points.scatter_v[f.axis_pair[0]]) * f.points.samples**0.5 / CODE_V
     return CODE_V / 2.0 * float(np.exp(-2.0 * (np.pi * s) ** 2))

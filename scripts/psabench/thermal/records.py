@@ -106,7 +106,9 @@ def number_in(name: str, text: str, where: str) -> float:
 
 
 def _recording_of(row: Mapping[str, str], where: str) -> Recording:
-    values: dict[str, Any] = {name: text if name in TEXTS else number_in(name, text, where) for name, text in row.items()}
+    values: dict[str, Any] = {
+        name: text if name in TEXTS else number_in(name, text, where) for name, text in row.items()
+    }
     if values["position"] not in POSITIONS:
         raise BadInput(expected(f"a position of {', '.join(POSITIONS)}", shown_value(values["position"]), where))
     for name in WHOLE:
@@ -185,11 +187,11 @@ class RunFolder:
         return self.path / f"{NAME}-truth.csv"
 
     @property
-    def setup(self) -> Path:
+    def setup_path(self) -> Path:
         return self.path / SETUP
 
     @contextmanager
-    def owned(self) -> Iterator[None]:
+    def own_folder(self) -> Iterator[None]:
         """This process alone works in the folder, which is made; the lock ends with the process.
 
         Raises BadInput where another one does.
@@ -209,17 +211,17 @@ class RunFolder:
         self.path.mkdir(parents=True, exist_ok=True)
         for old in (*self._snapshots().values(), self.data, self.truth, self.path / "result.json"):
             old.unlink(missing_ok=True)
-        replace_file(self.setup, json.dumps({"format": FORMAT, **setup}, indent=1) + "\n")
+        replace_file(self.setup_path, json.dumps({"format": FORMAT, **setup}, indent=1) + "\n")
 
     def read_setup(self) -> dict[str, Any]:
         """Raises BadInput where no run was begun."""
         try:
-            found = json.loads(self.setup.read_text(encoding="utf-8"))
+            found = json.loads(self.setup_path.read_text(encoding="utf-8"))
         except FileNotFoundError as e:
             raise BadInput(expected(f"a folder of psabench run thermal, with {SETUP}", "none", self.path)) from e
         except (OSError, ValueError, RecursionError) as e:
-            raise BadInput(expected("the set-up of a run", e, self.setup)) from e
-        return checked_setup(found, self.setup)
+            raise BadInput(expected("the set-up of a run", e, self.setup_path)) from e
+        return checked_setup(found, self.setup_path)
 
     def _snapshots(self) -> dict[int, Path]:
         """By the number of rows that they hold."""

@@ -64,9 +64,7 @@ class Method:
     def fitted(self, quantity: str) -> Fitted:
         """What the budget of a quantity is made from."""
         f = self.fits[quantity]
-        return Fitted(
-            points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play
-        )
+        return Fitted(points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play)
 
     @property
     def title(self) -> str:
@@ -103,9 +101,7 @@ def estimate_run(
     methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings, samples).items())
     settling_k = _settling_k(methods, recordings, schedule)
     play = schedule.soak is not None and _goes_both_ways(schedule.soak.temperatures_c)
-    methods = tuple(
-        replace(m, settling_k=settling_k, play=play) if m.rate_k_per_min is None else m for m in methods
-    )
+    methods = tuple(replace(m, settling_k=settling_k, play=play) if m.rate_k_per_min is None else m for m in methods)
     low = max(float(m.points.case_c.min()) for m in methods)
     high = min(float(m.points.case_c.max()) for m in methods)
     normal_c = min(max(NORMAL_C, low), high)
@@ -167,9 +163,7 @@ def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | 
         best = fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s)
         both_legs = fit_soak(quantity, p.case_c, y, degree)
     leftover = leftover_of(p, best)
-    return Fits(
-        quantity=quantity, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest
-    )
+    return Fits(quantity=quantity, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest)
 
 
 # ---- the two methods beside each other

@@ -79,7 +79,7 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> Iterator[Thermal
     """
     folder = RunFolder(options.resume or options.out)
     new = None if options.resume else _new_setup(options)
-    with folder.owned():
+    with folder.own_folder():
         if new is not None:
             _refuse_unfinished(folder)
         setup = _resumed_setup(options, folder) if new is None else new
@@ -88,7 +88,7 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> Iterator[Thermal
 
 
 def _run_of(options: ThermalOptions, setup: dict[str, Any], folder: RunFolder, progress: Progress) -> ThermalRun:
-    schedule = schedule_of_dict(setup["schedule"], str(folder.setup), str(setup["name"]))
+    schedule = schedule_of_dict(setup["schedule"], str(folder.setup_path), str(setup["name"]))
     recordings = _whole_recordings(setup, folder, schedule) if options.resume else None
     if recordings is not None:
         provenance.note_recorded(setup)
@@ -118,7 +118,7 @@ def _is_complete(folder: RunFolder) -> bool:
     """Whether every recording of its schedule is there; a result.json may be of another procedure."""
     try:
         setup = folder.read_setup()
-        schedule = schedule_of_dict(setup["schedule"], str(folder.setup), str(setup["name"]))
+        schedule = schedule_of_dict(setup["schedule"], str(folder.setup_path), str(setup["name"]))
         return _whole_recordings(setup, folder, schedule) is not None
     except BadInput:
         return False

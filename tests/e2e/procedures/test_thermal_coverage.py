@@ -1,4 +1,4 @@
-"""How often U of a thermal run contains the truth: fresh units through the wire (docs/procedures/thermal.md, Coverage)."""
+"""How often U of a thermal run contains the truth: fresh units through the wire (docs/procedures/thermal.md)."""
 
 from __future__ import annotations
 

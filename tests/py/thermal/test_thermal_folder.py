@@ -83,7 +83,7 @@ def test_a_set_up_that_is_nested_too_deep_is_one_line(tmp_path: Path, capsys: py
         ("case_degc", "nan", 'expected a number for case_degc, got "nan"'),
         ("part", "0.5", "expected a whole number for part, got 0.5"),
         ("part", "first", 'expected a number for part, got "first"'),
-        ("position", "x_over", "expected a position of x_down, .* got \"x_over\""),
+        ("position", "x_over", 'expected a position of x_down, .* got "x_over"'),
         ("z_v", "1" * 200_000, "expected comma-separated values, got field larger than field limit"),
     ],
 )
@@ -107,7 +107,7 @@ HOLDER = """
 import os, sys
 from pathlib import Path
 from psabench.thermal.records import RunFolder
-with RunFolder(Path(sys.argv[1])).owned():
+with RunFolder(Path(sys.argv[1])).own_folder():
     print(os.getpid(), flush=True)
     sys.stdin.read()
 """
@@ -126,16 +126,21 @@ def test_a_second_process_is_refused_until_the_first_is_dead(
         status, line = error_of(capsys, option, str(tmp_path))
         first.send_signal(signal.SIGKILL)
     assert status == 2
-    assert line == f"psabench: {tmp_path}/thermal.lock: expected a file that no other process writes, got one of pid {pid}"
-    with RunFolder(tmp_path).owned():  # the lock died with its process
+    assert (
+        line == f"psabench: {tmp_path}/thermal.lock: expected a file that no other process writes, got one of pid {pid}"
+    )
+    with RunFolder(tmp_path).own_folder():  # the lock died with its process
         pass
 
 
 def test_a_run_holds_its_folder_while_its_report_is_written(tmp_path: Path) -> None:
     complete_run(tmp_path)
-    with run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path), Silent()), (tmp_path / "thermal.lock").open() as f:
-        with pytest.raises(BlockingIOError):
-            fcntl.flock(f, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    with (
+        run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path), Silent()),
+        (tmp_path / "thermal.lock").open() as lock,
+        pytest.raises(BlockingIOError),
+    ):
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 # ---- the checkpoint that is left
@@ -159,7 +164,9 @@ def complete_run(path: Path) -> None:
         ):
             angle = {"x_down": 270.0, "x_up": 90.0}.get(name, 180.0 if name.endswith("down") else 0.0)
             t_s = 4000.0 * part + 6.0 * k
-            rows.append([t_s, "soak", part, name, angle, *[temp_c] * 5, *(1.2 * a + 1e-4 for a in (x, y, z)), *[1e-7] * 3])
+            rows.append(
+                [t_s, "soak", part, name, angle, *[temp_c] * 5, *(1.2 * a + 1e-4 for a in (x, y, z)), *[1e-7] * 3]
+            )
     with folder.open_series() as series:
         series.store_rows(rows)
     (path / "checkpoint-18.snapshot").write_text("")
