@@ -1,4 +1,4 @@
-"""Coverage of the uncertainties of `psabench run thermal`: fresh units, the tolerances of unit and bench drawn again."""
+"""Coverage of the uncertainties of `psabench run thermal`: fresh units, their tolerances and the bench's drawn."""
 
 from __future__ import annotations
 

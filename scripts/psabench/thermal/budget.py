@@ -1,4 +1,4 @@
-"""Uncertainty budget of a quantity that a thermal run found, at one temperature (docs/procedures/thermal.md, Uncertainty).
+"""Uncertainty budget of a quantity that a thermal run found, at one temperature (docs/procedures/thermal.md).
 
 Each cause is counted once. What is drawn again from point to point (noise of the readings, reading of the head's scale,
 tilt at a mounting) reaches the curve through the fit; what such noise does not explain of the residual is misfit; what
@@ -80,7 +80,7 @@ class Fitted:
 
     @property
     def moves_with_head(self) -> bool:
-        """Whether an error of the head's angle moves it: the axis is not the head's own, with the other one vertical."""
+        """Whether an error of the head's angle moves it: the axis is not along the head's, the other one vertical."""
         i, j = self.axis_pair
         return self.kind == "base" and i in turning_axes(j)
 
@@ -118,7 +118,8 @@ def estimate_at(f: Fitted, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
 
 def _readings_noise(f: Fitted) -> float:
     """Standard deviation of one point by the scatter within its recordings, two of them."""
-    return float(f.points.scatter_v[f.axis_pair[0]]) / 2.0**0.5 * f.per_volt
+    of_mean_v = float(f.points.scatter_v[f.axis_pair[0]])
+    return of_mean_v / math.sqrt(2.0) * f.per_volt
 
 
 def _head_noise(f: Fitted, a: BenchAccuracy) -> float:
