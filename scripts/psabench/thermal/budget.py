@@ -184,7 +184,8 @@ def _temperature_parts(f: Fitted, temp_c: float) -> Iterator[Component]:
 
 
 def _bench_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
-    """Chain and circle."""
+    """Chain, codes and circle."""
+    yield within_limit("resolution", _undithered_v(f) * f.per_volt)
     board_k = abs(temp_c - 25.0)
     if f.kind == "scale":
         scale = float(f.best.value_at(temp_c))
@@ -193,7 +194,6 @@ def _bench_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Compone
     elif f.kind == "zero":
         yield Component(name="chain zero", u=a.chain_zero_uv * 1e-6 * f.per_volt)
         yield Component(name="chain over temperature", u=a.chain_zero_tc_uv_per_k * board_k * 1e-6 * f.per_volt)
-        yield within_limit("resolution", _undithered_v(f) * f.per_volt)
     elif f.moves_with_head:
         yield Component(name="circle", u=a.circle_arcsec / 2.0**0.5)
 
