@@ -110,5 +110,5 @@ def test_a_chamber_that_cannot_reach_a_temperature_ends_the_run(
 ) -> None:
     assert cli.main(started(tmp_path / "run", UNIT.replace("chamber: {", "chamber: {max_degc: 30, "))) == 3
     (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("psabench: ")]
-    assert re.search("chamber: TEMP 35: Data out of range;temp_degc: expected -60 to 30 degC, got 35", line)
+    assert re.search("chamber: TEMP 35.0: Data out of range;temp_degc: expected -60 to 30 degC, got 35", line)
     assert rows_in(tmp_path / "run") == 12  # of the two temperatures that it reached
