@@ -357,10 +357,11 @@ def _run_thermal(args: argparse.Namespace) -> int:
     from psabench.report import thermal_grading, thermal_page
     from psabench.thermal import run as thermal_run
 
-    done = thermal_run.run_thermal(of_fields(thermal_run.ThermalOptions, args, params=_params(args)), Bar())
-    truth = thermal_grading.read_truth(done.folder, done.result.recordings)
-    report = thermal_grading.graded_report(done.result, truth, done.facts)
-    page = thermal_page.write_page(done.folder.path, report)
+    options = of_fields(thermal_run.ThermalOptions, args, params=_params(args))
+    with thermal_run.run_thermal(options, Bar()) as done:
+        truth = thermal_grading.read_truth(done.folder, done.result.recordings)
+        report = thermal_grading.graded_report(done.result, truth, done.facts)
+        page = thermal_page.write_page(done.folder.path, report)
     if args.verbose:
         print(thermal_grading.console_lines(report))
     print(thermal_grading.state_verdict(report))
