@@ -18,7 +18,16 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
-from psabench.procedures.run_table import COMPARE, CONDITIONS, COVARIANCE, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, THERMAL
+from psabench.procedures.run_table import (
+    COMPARE,
+    CONDITIONS,
+    COVARIANCE,
+    G_MPS2,
+    ON_THE_HEAD,
+    ON_THE_PLATFORM,
+    SINS,
+    THERMAL,
+)
 from psabench.progress import Bar
 from psabench.shell import command_line
 
@@ -111,6 +120,13 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
         "help": "publish progress and results with LCM: udpm://GROUP:PORT, or file://PATH an event log",
     },
     "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
+}
+# Of the calibration on a rate table alone.
+ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
+    "--table": {"metavar": "VISA-ADDRESS", "help": f"rate table, real or emulated: {EXAMPLES}"},
+    "--data": {"type": Path, "metavar": "FILE", "help": "increments of a recording in place of a bench"},
+    "--layout": {"type": Path, "metavar": "FILE", "help": "what the recording's columns are (docs/sins_data.md)"},
+    "--angles": {"type": Path, "metavar": "FILE", "help": "angles of the table, as table_angles.csv of a run"},
 }
 # Of the thermal run alone.
 IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
@@ -208,7 +224,7 @@ def _parser_of(command: Command) -> Parser:
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        how = COMMON.get(option) or IN_THE_CHAMBER[option]
+        how = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE}[option]
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **how)
     return p
 
@@ -369,6 +385,21 @@ def _run_thermal(args: argparse.Namespace) -> int:
     return 0 if thermal_grading.within_limits(report) else 1
 
 
+def _calibrate_sins(args: argparse.Namespace) -> int:
+    """Minutes on a table through the wire, or a recording of them."""
+    from psabench.report.grading import aligned
+    from psabench.sins import calibration_run as sins_run
+
+    done = sins_run.run_calibration(of_fields(sins_run.SinsOptions, args, params=_params(args)), Bar())
+    page = sins_run.write_page(args.out, done)
+    if args.verbose:
+        print("\n".join(aligned(sins_run.table_rows(done))))
+    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
+    print(sins_run.verdict(done))
+    print(f"report: {page}")
+    return 0 if done.within else 1
+
+
 def _predict_sins(args: argparse.Namespace) -> int:
     """A covariance: no bench, no data."""
     from psabench.procedures.result import made_params
@@ -427,6 +458,12 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run thermal --schedule full --out build/run/qa-0001
   psabench run thermal --resume build/run/qa-0001
 """,
+    SINS[0]: """\
+  psabench run sins-calibration                     the article's plan on an emulated precise table, 45 minutes
+  psabench run sins-calibration --stand no          on a coarse table, which shows no angles
+  psabench run sins-calibration --data build/run/increments.bin --layout build/run/increments.yaml --stand no
+  psabench nav apply run.csv --calibration build/run/result.json --out corrected.csv
+""",
     COVARIANCE[0]: """\
   psabench run sins-covariance                                the article's two tables in every reading of its noise
   psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
@@ -467,6 +504,12 @@ def _of_the_chamber() -> Parameters:
     return Parameters(fields={k: f for k, f in BenchAccuracy.__dataclass_fields__.items() if k != "chain_off_k"})
 
 
+def _of_the_sins() -> Parameters:
+    from psabench.sins.calibration_run import CalibrationParams
+
+    return Parameters(fields=CalibrationParams.__dataclass_fields__)
+
+
 def _of_the_covariance() -> Parameters:
     from psabench.sins.covariance_run import CovarianceParams
 
@@ -488,6 +531,15 @@ def _commands() -> Iterator[Command]:
         )
     name, summary = COMPARE
     yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])
+    name, summary = SINS
+    yield Command(
+        name=name,
+        summary=summary,
+        handler=_calibrate_sins,
+        common=("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose"),
+        load=_of_the_sins,
+        examples=_EXAMPLES[name],
+    )
     name, summary = COVARIANCE
     yield Command(
         name=name,

@@ -23,6 +23,10 @@ THERMAL = (
     "thermal",
     "accelerometers in a chamber, at points of temperature and during a sweep: scale, zero and base, compensated",
 )
+SINS = (
+    "sins-calibration",
+    "a strapdown inertial unit on a rate table, with or without the table's angles: all errors of both triads at once",
+)
 COVARIANCE = (
     "sins-covariance",
     "accuracy of a strapdown unit's calibration on a rate table, predicted from the plan of rotations; no bench",

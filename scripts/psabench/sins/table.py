@@ -1,4 +1,4 @@
-"""A table of one to three axes under a plan of rotations: which axis makes which turn, and the attitude from its angles.
+"""A table of one to three axes under a plan of rotations: which axis makes which turn, the attitude from its angles.
 
 Axis 1 is the outermost and horizontal, its azimuth known; then axis 2, then axis 3. At angles of zero the unit's x lies
 along axis 1, y along axis 2, z along axis 3, which points down (docs/instruments.md).
@@ -72,6 +72,8 @@ def _move_of(turn: Turn, at_rad: Floats, axes: int, number: int) -> Move:
     best = int(np.argmax(np.abs(along)))
     if abs(along[best]) < PARALLEL:
         names = ", ".join(str(a + 1) for a in range(axes))
-        raise BadInput(expected(f"an axis that lies along axis {names} of the table", turn.axis_b, f"plan: turn {number}"))
+        raise BadInput(
+            expected(f"an axis that lies along axis {names} of the table", turn.axis_b, f"plan: turn {number}")
+        )
     rate_dps = math.degrees(turn.rate_radps) * math.copysign(1.0, along[best])
     return Move(axis=best + 1, rate_dps=rate_dps, duration_s=turn.duration_s)

@@ -1,4 +1,4 @@
-"""A plan of rotations on the bench: moves of the table over SCPI, increments of the unit over CAN, angles of the table's log."""
+"""A plan of rotations on the bench: the table's moves and angles over SCPI, the unit's increments over CAN."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ REST_S = 1.0  # before the first turn and after the last: the interval before, a
 STEP_DEG = 180.0  # a turn of at most this is a position: it ends where it should
 LOG_LATE_S = 0.2  # the readout's delay and more: a log ends this long ago
 STAND_S = 0.1
-
-Watch = Callable[[str, float, float], None]  # what, done, of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,8 +41,9 @@ class TableData:
 class TableRun:
     """One run of a plan. Raises BenchError with what was lost."""
 
-    def __init__(self, bench: Bench, moves: Sequence[Move], watch: Watch) -> None:
-        self._bench, self._moves, self._watch = bench, moves, watch
+    def __init__(self, bench: Bench, moves: Sequence[Move], advance: Callable[[], None]) -> None:
+        """advance: after each move."""
+        self._bench, self._moves, self._advance = bench, moves, advance
         self._unit = bench.board(Bins)
         self._weights: Weights | None = None
         self._taken: list[tuple[Floats, Floats, Floats]] = []
@@ -63,18 +62,17 @@ class TableRun:
         self._unit.start()
         self._bench.run_for(REST_S)
         self._logged_s = self._bench.time_s
-        ends, whole_s = [], sum(m.duration_s for m in self._moves)
+        ends = []
         for number, move in enumerate(self._moves, start=1):
-            self._watch(f"turn {number} of {len(self._moves)}", sum(m.duration_s for m in self._moves[: number - 1]), whole_s)
             self._make(move, self._following(number))
             ends.append(self._bench.time_s)
             self._take()
             if stand:
                 self._read_log()
+            self._advance()
         self._bench.run_for(REST_S)
         self._take()
         self._unit.stop()
-        self._watch("done", whole_s, whole_s)
         return self._gathered(np.array(ends))
 
     def _following(self, number: int) -> Move | None:
@@ -86,7 +84,7 @@ class TableRun:
         if move.rate_dps == 0.0:
             self._pass(move.duration_s)
         elif abs(angle) <= STEP_DEG:
-            table.position(table_angle(self._bench, move.axis) + angle, abs(move.rate_dps), axis=move.axis)
+            table.position(table.angle_deg(axis=move.axis) + angle, abs(move.rate_dps), axis=move.axis)
         else:
             table.rate(move.rate_dps, axis=move.axis)
             self._pass(move.duration_s)
@@ -107,7 +105,9 @@ class TableRun:
         bad = np.flatnonzero(~got.whole)
         if len(bad):
             at_s = got.end_s[bad[0]]
-            raise DeviceError("increments", 0, expected("whole readings", f"{len(bad)} that are not, first at {at_s:.2f} s"))
+            raise DeviceError(
+                "increments", 0, expected("whole readings", f"{len(bad)} that are not, first at {at_s:.2f} s")
+            )
         self._taken.append((got.end_s, got.dtheta_rad, got.dv_mps))
 
     def _read_log(self) -> None:
@@ -117,7 +117,7 @@ class TableRun:
         count = int(np.floor(last_s / STAND_S)) - first + 1
         if count <= 0:
             return
-        at_s = STAND_S * np.arange(first, first + count)
+        at_s: Floats = STAND_S * np.arange(first, first + count, dtype=np.float64)
         angles = np.zeros((count, AXES))
         for axis in range(self._axes):
             angles[:, axis] = self._bench.table.log(at_s[0], STAND_S, count, axis=axis + 1)
@@ -149,7 +149,3 @@ def table_axes(bench: Bench) -> int:
         except InstrumentError:
             return axis - 1
     return AXES
-
-
-def table_angle(bench: Bench, axis: int) -> float:
-    return bench.table.angle_deg(axis=axis)
