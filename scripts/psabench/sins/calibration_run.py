@@ -44,6 +44,7 @@ class CalibrationParams:
     gravity: float | None = option(None, "m/s2", "local gravity (of the ellipsoid there)")
     stand: bool = option(True, "", "use the table's angles; no: as on a coarse table")
     stand_arcsec: float = option(15.0, "arcsec", "noise of a reading of the table's angle")
+    wobble_arcsec: float = option(1.0, "arcsec", "what the table's axes do that its angles do not show")
     heading_sd_deg: float = option(3.0, "deg", "error of the heading at the start")
     gauge: str = option("article", "", f"elements of Γ that are estimated: {', '.join(GAUGES)}")
     lever: int = option(0, "", "lever arms of the accelerometers: 0 none, 3 along the own axis, 9 all")
@@ -62,8 +63,12 @@ class CalibrationParams:
     def g_mps2(self) -> float:
         return gravity_mps2(self.latitude_deg * DEG, self.height_m) if self.gravity is None else self.gravity
 
-    def config(self, sample_s: float, stand: bool) -> SinsConfig:
-        """Of the estimator."""
+    def config(self, sample_s: float, stand: bool, cycle_s: float) -> SinsConfig:
+        """Of the estimator. cycle_s: the longest time about one axis of the table.
+
+        What its angles do not show is the same in all of it, and counts as white noise with that mean over a cycle.
+        """
+        per_sample_arcsec = math.hypot(self.stand_arcsec, self.wobble_arcsec * math.sqrt(cycle_s / STAND_S))
         return SinsConfig(
             latitude_rad=self.latitude_deg * DEG,
             gravity_mps2=self.g_mps2,
@@ -75,7 +80,7 @@ class CalibrationParams:
             beta_sd_rad=(DEG, DEG, self.heading_sd_deg * DEG),
             gyro_noise_radps_rts=self.gyro_noise_degph * DEG / 3600.0,
             accel_noise_mps2_rts=self.accel_noise_mps2,
-            stand_sd_rad=self.stand_arcsec * DEG / 3600.0,
+            stand_sd_rad=per_sample_arcsec * DEG / 3600.0,
             stand_noise_rate_hz=1.0 / STAND_S,
             stand_interval_s=STAND_S,
         )
@@ -137,7 +142,7 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
         facts = {"bench": str(options.can or options.control or options.scenario or _scenario(p)), "plan": plan.name}
     start = attitudes(p.azimuth_deg * DEG, np.radians(data.start_deg)[None])[0]
     stand = data.stand(p.azimuth_deg * DEG) if p.stand else None
-    cfg = p.config(round(data.increments.dt_s, 6), stand is not None)
+    cfg = p.config(round(data.increments.dt_s, 6), stand is not None, longest_cycle_s(plan))
     with progress.step("estimate, two passes", 1) as advance:
         result = calibrate_unit(cfg, start, data.increments, stand)
         advance()
@@ -146,6 +151,16 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
     return SinsRun(
         params=p, result=result, plan=plan.name, facts=facts, graded=None if truth is None else grade(result, truth)
     )
+
+
+def longest_cycle_s(plan: RotationPlan) -> float:
+    """Of turns in a row about the same axis."""
+    longest = now_s = 0.0
+    before: tuple[float, ...] | None = None
+    for turn in plan.turns:
+        now_s = turn.duration_s + (now_s if turn.axis_b == before else 0.0)
+        longest, before = max(longest, now_s), turn.axis_b
+    return longest
 
 
 def _scenario(p: CalibrationParams) -> str:
@@ -287,7 +302,8 @@ NOTES = (
     "Three turns of the instrument's axes are not observable: the gauge makes three elements of Γ zero, and the truth "
     "is turned into the same axes before it is compared.",
     "The interval is 1.96 standard deviations of the filter's covariance: it holds the noise and the priors, and no "
-    "error of the local gravity, which every Γii shares (1 µm/s² is 0.1 ppm).",
+    "error of the local gravity, which every Γii shares (1 µm/s² is 0.1 ppm). With the table's angles it holds their "
+    "noise and the wobble of its axes, as white noise with the same mean over a cycle.",
 )
 
 
