@@ -39,6 +39,12 @@ struct lab_row {
     double a_mps2[LAB_ROW][3];
 };
 
+/* A case that is askew, as it was last: the same angles give the same pose. */
+struct lab_tilt {
+    double misalignment_rad[3];
+    struct pose pose;
+};
+
 struct lab {
     struct site site;
     struct head head;
@@ -48,6 +54,7 @@ struct lab {
     struct pose bench;
     struct platform platform; /* if cfg.present */
     struct lab_row row;
+    struct lab_tilt tilt;
 };
 
 /* A unit's place. All zero: in the centre of the head, square. */
