@@ -184,7 +184,7 @@ def _measured(
         moves = list(moves_of(plan.turns, table_axes(bench)))
         with progress.step(f"plan {plan.name}", len(moves)) as advance:
             data = TableRun(bench, moves, advance).measure(p.stand)
-        return data, _truth(bench) if bench.emulator else None
+        return data, truth_of(bench) if bench.emulator else None
 
 
 def _opened(options: SinsOptions, p: CalibrationParams) -> Bench:
@@ -195,7 +195,7 @@ def _opened(options: SinsOptions, p: CalibrationParams) -> Bench:
     return Bench.start(options.scenario or _scenario(p), pace=pace, seed=options.seed)
 
 
-def _truth(bench: Bench) -> Params:
+def truth_of(bench: Bench) -> Params:
     """Of the only inertial unit, from the truth port."""
     s = next(u for u in bench.truth()["units"].values() if u["board"] == "bins")["specimen"]
     theta, gamma = (np.array([[s[f"{k}_{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)]) for k in ("theta", "gamma"))
