@@ -1,4 +1,4 @@
-"""Coverage of the intervals of `psabench run sins-calibration`: drawn units through the wire, with and without angles."""
+"""Coverage of the intervals of `psabench run sins-calibration`: units through the wire, with and without angles."""
 
 from __future__ import annotations
 
