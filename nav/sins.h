@@ -89,8 +89,8 @@ struct nav_sins_params { /* what the model holds; in this order in memory: 39 do
     double tau_s;
     double eps_rad[3];
 };
-/* The same instrument in the frame in which the gauge's elements are zero: I + Gamma -> (I + Gamma) R', Theta likewise, C -> C R',
- * exp(delta) -> R exp(delta); lever arms are left. r_out: R, or NULL. Compare estimates with a truth only so. */
+/* The same instrument in the frame in which the gauge's elements are zero: I + Gamma -> (I + Gamma) R',
+ * I + Theta -> (I + Theta) R', C -> C R', exp(delta) -> R exp(delta); lever arms are left. r_out: R, or NULL. Compare estimates with a truth only so. */
 NAV_API int nav_sins_to_gauge(int gauge, struct nav_sins_params *p, double r_out[9]);
 
 typedef struct nav_sins nav_sins;

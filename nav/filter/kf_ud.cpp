@@ -79,7 +79,7 @@ void kf_ud_update(struct nav_kf *kf, const double *, double r, struct kf_gain *g
 }
 
 /* Gram-Schmidt of the rows of W, weights given: U and D of W diag(weight) W'. */
-static void triangularise(int nd, int n, double (*w)[2 * KF_MAX], const double *weight, double *ut, double *d)
+static void triangularise_rows(int nd, int n, double (*w)[2 * KF_MAX], const double *weight, double *ut, double *d)
 {
     for (int i = nd - 1; i >= 0; i--) {
         double sum = 0.0;
@@ -119,7 +119,7 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
         weight[j] = kf->d[j];
         for (int i = 0; i < nd; i++) w[i][nd + j] = uq[j * nd + i];
     }
-    triangularise(nd, n, w, weight, kf->p, kf->d);
+    triangularise_rows(nd, n, w, weight, kf->p, kf->d);
     return true;
 }
 

@@ -117,7 +117,7 @@ TITLES = {False: "Table 1: without the table's angles", True: "Table 2: with the
 
 def console_lines(study: Study) -> str:
     """Both tables and the warnings."""
-    lines = [line for stand in (False, True) for line in (TITLES[stand], *aligned(table_rows(study, stand, _mean)))]
+    lines = [line for angles in (False, True) for line in (TITLES[angles], *aligned(table_rows(study, angles, _mean)))]
     return "\n".join([*lines, *(f"WARNING: {w}" for w in study.warnings)])
 
 
@@ -156,7 +156,7 @@ def write_page(out: Path, study: Study) -> Path:
     own = [[name, *_own(found)] for name, found in study.found.items() if "delta" in found.sd]
     sections = [
         section("Before the run", bullets(study.warnings) or "<p>No warnings.</p>"),
-        *(section(TITLES[stand], table(table_rows(study, stand, _range))) for stand in (False, True)),
+        *(section(title, table(table_rows(study, angles, _range))) for angles, title in TITLES.items()),
         section("The table's own errors", table([["", "δ, ′", "τ, µs"], *own])),
         section("How to read the tables", bullets(NOTES)),
     ]

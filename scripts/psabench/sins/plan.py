@@ -51,7 +51,7 @@ class RotationPlan:
         return abs(90.0 - self.axis_azimuth_deg % 180.0)
 
     def with_azimuth(self, azimuth_deg: float) -> RotationPlan:
-        """The same turns on a table that stands otherwise."""
+        """The same turns on a table of another azimuth."""
         return RotationPlan(name=self.name, axis_azimuth_deg=azimuth_deg, turns=self.turns)
 
 

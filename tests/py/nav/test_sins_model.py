@@ -269,3 +269,38 @@ def test_a_configuration_that_cannot_be_is_rejected_by_the_name_of_its_field(
     with pytest.raises(Refused) as e:
         Sins(replace(SinsConfig(), **change), truth.placed())
     assert e.value.field == field
+
+
+def test_the_mean_of_the_accelerometers_is_exact_to_the_third_order_of_a_samples_turn() -> None:
+    """5 deg a sample: the second order left out would be 6e-3 m/s^2, the fourth is 1e-6."""
+    table = Table(truth.placed(), [(X, 10 * DEG, 40.0)])
+    d = truth.measured(table, Errors(), 0.5)
+    s = Sins(SinsConfig(sample_s=0.5, step_s=1.0), truth.placed())
+    s.samples(0.0, d.dtheta, d.dv)
+    x, _ = s.covariance()
+    h = s.jacobians()[2][:3]
+    assert h @ x == pytest.approx(np.zeros(3), abs=2e-6)
+    assert np.max(np.abs(s.state().innovations[:3])) < 2e-3
+
+
+def test_the_second_pass_takes_the_prior_once() -> None:
+    """A tilt of half its prior, at rest: data that are worth as much as the prior must not be counted twice."""
+    table = Table(truth.placed(), [(X, 0.0, 5.0)])
+    d = truth.measured(table, Errors(df=np.array([0.02, -0.01, 0.03]), gamma=np.diag([0.0, 0.0, 2e-3])), 0.01)
+    cfg = SinsConfig(clone=True)
+    found = sins.calibrate(cfg, turned(np.array([1e-3, 2e-3, 0.0])) @ truth.placed(), d.dtheta, d.dv)
+    once, twice = found.first.params, found.state.params
+    assert abs(once.df_mps2[2]) > 1e-2
+    assert twice.df_mps2 == pytest.approx(once.df_mps2, rel=2e-2)
+    assert np.diag(twice.gamma) == pytest.approx(np.diag(once.gamma), rel=2e-2, abs=1e-7)
+    assert found.state.c_nb == pytest.approx(found.first.c_nb, abs=1e-5)
+
+
+@pytest.mark.parametrize(("gauge", "kept"), [(Gauge.ARTICLE, (0, 3, 4, 5, 6, 8)), (Gauge.LOWER, (0, 3, 4, 6, 7, 8))])
+def test_a_gauge_keeps_its_elements(gauge: Gauge, kept: tuple[int, ...]) -> None:
+    rows = []
+    for g in (gauge, Gauge.FREE9):
+        s = Sins(SinsConfig(gauge=g, sample_s=0.05), truth.placed(0.4))
+        s.plan(turns(SHORT))
+        rows.append(s.jacobians()[2][:3, s.rows["gamma"]])
+    assert np.array_equal(rows[0], rows[1][:, list(kept)])

@@ -70,12 +70,13 @@ def calibrated(seed: int, accel_noise_multiplier: float, stand: bool) -> Outcome
     )
 
 
-@pytest.mark.parametrize(("stand", "seed"), [(False, 0), (True, 1)])
+@pytest.mark.parametrize(("stand", "seed"), [(False, 0), (True, 0)])
 def test_a_unit_is_found_within_what_is_claimed(stand: bool, seed: int) -> None:
     """chi^2 of 24 and 28 degrees: 99.9 % lie below 51 and 57."""
     done = calibrated(seed, 4.0, stand)
     assert done.second < (57.0 if stand else 51.0)
     assert np.max(np.abs(done.normal)) < 4.0
+    assert done.first < 57.0 or not stand  # 71 when the first pass takes no products of unknown angles into account
     assert done.nis == pytest.approx(1.0, abs=0.02)  # 81,000 innovations
 
 

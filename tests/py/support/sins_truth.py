@@ -26,18 +26,17 @@ Leg = tuple[tuple[float, float, float], float, float]
 
 def cross(v: Array) -> Array:
     """[v x], of one vector or of rows."""
-    v = np.asarray(v, dtype=float)
     m = np.zeros((*v.shape[:-1], 3, 3))
     m[..., 0, 1], m[..., 0, 2], m[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return np.asarray(m - np.swapaxes(m, -1, -2))
+    return np.asarray(m - np.swapaxes(m, -1, -2), dtype=np.float64)
 
 
 def turned(v: Array) -> Array:
     """exp[v x], of one vector or of rows."""
-    v = np.asarray(v, dtype=float)
     a = np.linalg.norm(v, axis=-1)[..., None, None]
     k = cross(v)
-    return np.eye(3) + np.sinc(a / np.pi) * k + 0.5 * np.sinc(a / (2 * np.pi)) ** 2 * (k @ k)
+    c = np.eye(3) + np.sinc(a / np.pi) * k + 0.5 * np.sinc(a / (2 * np.pi)) ** 2 * (k @ k)
+    return np.asarray(c, dtype=np.float64)
 
 
 def rotation_vector(c: Array) -> Array:
