@@ -1,4 +1,4 @@
-/* libpsabench-nav: a Kalman filter for problems of many constant and few moving states (docs/sins.md).
+/* libpsabench-nav: a Kalman filter for problems of many constant and few moving states (docs/procedures/sins.md).
  *
  * The first `dynamic` states move, x_d' = Phi [x_d; x_c] + noise of covariance Q; the others are constant, so that a step costs
  * dynamic n instead of n^2. A random walk or a decaying drift is a moving state. Measurements are scalars z = h x + v with

@@ -1,4 +1,4 @@
-/* libpsabench-nav: calibration of a strapdown inertial unit on a rate table (docs/sins.md; the Moscow State University method).
+/* libpsabench-nav: calibration of a strapdown inertial unit on a rate table (docs/procedures/sins.md; the Moscow State University method).
  *
  * Frames: n east, north, up at the table; b of the instrument; C (C_nb) takes coordinates in b to n. Convention: error = measured
  * less true. w absolute rate, f specific force, both in b; g_n = (0, 0, g), u the Earth's rate in n.

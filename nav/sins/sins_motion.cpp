@@ -16,7 +16,7 @@ static mat3 lever_rows(const vec3 &w, const vec3 &dw)
     return w * w.transpose() - w.squaredNorm() * mat3::Identity() + sins_cross(dw);
 }
 
-/* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (docs/sins.md (2)). */
+/* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (docs/procedures/sins.md (2)). */
 static void add_drift(struct nav_sins *s, const mat3 &middle, const vec3 &dtheta)
 {
     const mat3 m = middle * s->gyro_back;

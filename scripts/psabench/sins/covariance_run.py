@@ -20,7 +20,7 @@ from psabench.sins.covariance import (
     Prediction,
     Quantity,
     Reading,
-    predict,
+    predict_accuracy,
     read_as,
     warnings_of,
 )
@@ -76,7 +76,7 @@ def run_study(p: CovarianceParams) -> Study:
     )
     cfgs = {r.name: replace(read_as(r, cfg), base=p.base and r.stand) for r in READINGS.values()}
     try:
-        found = {name: predict(plan, c) for name, c in cfgs.items()}
+        found = {name: predict_accuracy(plan, c) for name, c in cfgs.items()}
     except Refused as e:
         raise BadInput(f"{NAME}: {e}") from e
     said = [w for name, c in cfgs.items() for w in warnings_of(plan, c, found[name])]
@@ -86,29 +86,29 @@ def run_study(p: CovarianceParams) -> Study:
 # ---- what is shown
 
 
-def _mean(q: Quantity, found: Prediction) -> str:
+def _mean_cell(q: Quantity, found: Prediction) -> str:
     return f"{found.columns[q.key].rms:.3g}"
 
 
-def _range(q: Quantity, found: Prediction) -> str:
+def _range_cell(q: Quantity, found: Prediction) -> str:
     c = found.columns[q.key]
     return f"{c.rms:.3g} ({c.low:.3g}-{c.high:.3g})"
 
 
-def _heading(q: Quantity) -> str:
+def _heading_of(q: Quantity) -> str:
     return f"{q.label}, {q.unit}" if q.unit else q.label
 
 
 def table_rows(study: Study, stand: bool, cell: Callable[[Quantity, Prediction], str]) -> list[list[str]]:
     """Table 1 or 2 of the article: as printed, then each reading."""
-    rows = [["", *map(_heading, QUANTITIES)]]
+    rows = [["", *map(_heading_of, QUANTITIES)]]
     rows.append(["article", *(f"{PRINTED[stand][q.key]:.3g}" for q in QUANTITIES)])
-    for r in _readings(stand):
+    for r in _readings_of(stand):
         rows.append([r.name, *(cell(q, study.found[r.name]) for q in QUANTITIES)])
     return rows
 
 
-def _readings(stand: bool) -> Sequence[Reading]:
+def _readings_of(stand: bool) -> Sequence[Reading]:
     return [r for r in READINGS.values() if r.stand == stand]
 
 
@@ -117,7 +117,9 @@ TITLES = {False: "Table 1: without the table's angles", True: "Table 2: with the
 
 def console_lines(study: Study) -> str:
     """Both tables and the warnings."""
-    lines = [line for angles in (False, True) for line in (TITLES[angles], *aligned(table_rows(study, angles, _mean)))]
+    lines = [
+        line for angles in (False, True) for line in (TITLES[angles], *aligned(table_rows(study, angles, _mean_cell)))
+    ]
     return "\n".join([*lines, *(f"WARNING: {w}" for w in study.warnings)])
 
 
@@ -153,10 +155,10 @@ def write_page(out: Path, study: Study) -> Path:
         "duration": f"{study.plan.duration_s:.0f} s",
         "gauge": study.params.gauge,
     }
-    own = [[name, *_own(found)] for name, found in study.found.items() if "delta" in found.sd]
+    own = [[name, *_own_errors(found)] for name, found in study.found.items() if "delta" in found.sd]
     sections = [
         section("Before the run", bullets(study.warnings) or "<p>No warnings.</p>"),
-        *(section(title, table(table_rows(study, angles, _range))) for angles, title in TITLES.items()),
+        *(section(title, table(table_rows(study, angles, _range_cell))) for angles, title in TITLES.items()),
         section("The table's own errors", table([["", "δ, ′", "τ, µs"], *own])),
         section("How to read the tables", bullets(NOTES)),
     ]
@@ -164,5 +166,5 @@ def write_page(out: Path, study: Study) -> Path:
     return write_report(out, result_dict(study), page)
 
 
-def _own(found: Prediction) -> list[str]:
+def _own_errors(found: Prediction) -> list[str]:
     return [f"{found.sd['delta'].max() / ARCMIN:.3f}", f"{found.sd['tau'][0] * 1e6:.1f}"]

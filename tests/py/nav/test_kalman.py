@@ -12,7 +12,7 @@ import pytest
 from kalman_reference import Step, dense_step, joseph, relative
 from psabench.native.nav import Floats
 from psabench.native.navlib import library
-from psabench.native.sins import Form, nees
+from psabench.native.sins import Form, error_nees
 from psabench.native.sinslib import InnovationStruct
 
 NOT_FINITE, RANGE, SINGULAR = -4, -5, -7
@@ -186,8 +186,8 @@ def test_the_smoother_rejects_what_it_cannot_go_back_through() -> None:
 
 def test_nees_is_the_quadratic_form() -> None:
     p, e = start_covariance(10), np.arange(10.0)
-    assert nees(e, p) == pytest.approx(e @ np.linalg.inv(p) @ e, rel=1e-6)
-    assert math.isnan(nees(np.ones(2), np.array([[1.0, 0.0], [0.0, 0.0]])))
+    assert error_nees(e, p) == pytest.approx(e @ np.linalg.inv(p) @ e, rel=1e-6)
+    assert math.isnan(error_nees(np.ones(2), np.array([[1.0, 0.0], [0.0, 0.0]])))
 
 
 def test_sizes_and_forms_beyond_the_limits_are_rejected() -> None:

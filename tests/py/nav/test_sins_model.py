@@ -35,11 +35,11 @@ def test_the_defaults_of_python_are_those_of_the_library() -> None:
 def test_blocks_have_their_names_and_places() -> None:
     assert [library().sins_block_name(k).decode() for k in range(-1, len(BLOCKS) + 1)] == ["", *BLOCKS, ""]
     full = SinsConfig(gauge=Gauge.FREE9, lever=9, stand=True, base=True, walk=True, clone=True)
-    sizes = {name: rows.stop - rows.start for name, rows in sins.layout(full).items()}
+    sizes = {name: rows.stop - rows.start for name, rows in sins.state_layout(full).items()}
     assert sizes == dict(zip(BLOCKS, (3, 3, 3, 9, 3, 9, 9, 3, 1, 3, 3), strict=True))
-    p = sins.prior(full)
+    p = sins.prior_covariance(full)
     sd = np.sqrt(np.diag(p))
-    rows = sins.layout(full)
+    rows = sins.state_layout(full)
     assert sd[rows["theta"]].reshape(3, 3) == pytest.approx(np.where(np.eye(3) > 0, 1e-3, 3 * ARCMIN))
     assert sd[rows["nu"]] == pytest.approx(0.5 * DEGPH)
     assert np.array_equal(p[rows["beta"], rows["beta0"]], p[rows["beta"], rows["beta"]])
@@ -117,7 +117,7 @@ def error_of(block: str, k: int, size: float) -> tuple[Errors, Floats, Floats | 
 )
 def test_the_jacobians_are_central_differences_of_finite_rotations(block: str, size: float) -> None:
     cfg = SinsConfig(gauge=Gauge.FREE9, lever=9)
-    got, rows = sensitivities(cfg), sins.layout(cfg)[block]
+    got, rows = sensitivities(cfg), sins.state_layout(cfg)[block]
     # Where rates change, their difference of two samples is an acceleration that the reference does not have.
     steady = np.ones(len(got), bool)
     if block == "lever":
@@ -176,12 +176,12 @@ def test_angles_near_a_change_of_rate_are_left_out_and_others_fit() -> None:
     table = Table(truth.placed(), [(X, 10 * DEG, 20.0), (X, -10 * DEG, 20.0)])
     d = truth.measured(table, e, 0.01)
     cfg = SinsConfig(stand=True, clone=True, beta_sd_rad=(1e-9,) * 3, tau_sd_s=0.1, stand_interval_s=0.02)
-    done = sins.calibrate(cfg, truth.placed(), d.dtheta, d.dv, stand=truth.angles(table, e, 0.02))
+    done = sins.calibrate_unit(cfg, truth.placed(), d.dtheta, d.dv, stand=truth.angles(table, e, 0.02))
     # 0.3 s at either side of the reversal; at the start of the run there is no motion to compare with.
     assert 25 <= done.state.stand_left_out <= 50
     assert done.state.params.tau_s == pytest.approx(0.12, abs=1e-5)
     assert done.state.params.delta_rad == pytest.approx(e.delta, abs=1e-5)
-    open_guard = sins.calibrate(
+    open_guard = sins.calibrate_unit(
         replace(cfg, stand_guard_s=0.0), truth.placed(), d.dtheta, d.dv, stand=truth.angles(table, e, 0.02)
     )
     assert open_guard.first.nis_stand > 2.0 * done.first.nis_stand
@@ -194,7 +194,7 @@ def test_angles_near_a_change_of_rate_are_left_out_and_others_fit() -> None:
 def test_a_run_is_what_dense_joseph_updates_make_of_the_same_rows(form: Form) -> None:
     cfg = SinsConfig(form=form, accel_noise_multiplier=4.0)
     s = Sins(cfg, truth.placed())
-    p, x, r = sins.prior(cfg), np.zeros(24), np.full(3, 0.004**2 / 0.1)
+    p, x, r = sins.prior_covariance(cfg), np.zeros(24), np.full(3, 0.004**2 / 0.1)
     for t in turns(truth.article_plan(half_s=18.0)):
         for _ in range(round(t.duration_s / 0.1)):
             s.plan([replace(t, duration_s=0.1)])
@@ -220,7 +220,7 @@ def test_a_unit_without_noise_is_found_in_two_passes() -> None:
     table = Table(truth.placed(), truth.article_plan(half_s=90.0))
     d = truth.measured(table, e, 0.01)
     start = turned(np.array([0.01, -0.012, 0.04])) @ truth.placed()
-    done = sins.calibrate(SinsConfig(clone=True), start, d.dtheta, d.dv)
+    done = sins.calibrate_unit(SinsConfig(clone=True), start, d.dtheta, d.dv)
     p, sd = done.state.params, np.sqrt(np.diag(done.covariance))
     left = np.concatenate([p.nu_radps - e.nu, (p.theta - e.theta).ravel(), p.df_mps2 - e.df])
     assert np.all(np.abs(left) < 0.2 * sd[3:18])
@@ -288,7 +288,7 @@ def test_the_second_pass_takes_the_prior_once() -> None:
     table = Table(truth.placed(), [(X, 0.0, 5.0)])
     d = truth.measured(table, Errors(df=np.array([0.02, -0.01, 0.03]), gamma=np.diag([0.0, 0.0, 2e-3])), 0.01)
     cfg = SinsConfig(clone=True)
-    found = sins.calibrate(cfg, turned(np.array([1e-3, 2e-3, 0.0])) @ truth.placed(), d.dtheta, d.dv)
+    found = sins.calibrate_unit(cfg, turned(np.array([1e-3, 2e-3, 0.0])) @ truth.placed(), d.dtheta, d.dv)
     once, twice = found.first.params, found.state.params
     assert abs(once.df_mps2[2]) > 1e-2
     assert twice.df_mps2 == pytest.approx(once.df_mps2, rel=2e-2)

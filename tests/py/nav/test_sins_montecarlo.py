@@ -58,13 +58,13 @@ def calibrated(seed: int, accel_noise_multiplier: float, stand: bool) -> Outcome
     sd = cfg.stand_sd_rad * np.sqrt(STAND_HZ / 50.0)
     angles = truth.angles(table, e, 1.0 / STAND_HZ, sd_rad=sd, seed=seed + 5000) if stand else None
     start = turned(rng.normal(0, 1, 3) * np.array([1.0, 1.0, 3.0]) * DEG) @ truth.placed()
-    done = sins.calibrate(cfg, start, d.dtheta, d.dv, stand=angles)
+    done = sins.calibrate_unit(cfg, start, d.dtheta, d.dv, stand=angles)
     n = 28 if stand else 24
     p = np.ascontiguousarray(done.covariance[:n, :n])
     last = errors_of(done.state, e, d.c_end, stand)
     return Outcome(
-        first=sins.nees(errors_of(done.first, e, d.c_end, stand), p),
-        second=sins.nees(last, p),
+        first=sins.error_nees(errors_of(done.first, e, d.c_end, stand), p),
+        second=sins.error_nees(last, p),
         normal=last / np.sqrt(np.diag(p)),
         nis=done.state.nis_accel,
     )

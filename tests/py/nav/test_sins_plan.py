@@ -12,14 +12,14 @@ import pytest
 from psabench.cli import main
 from psabench.errors import BadInput
 from psabench.native.nav import ARCMIN, DEGPH
-from psabench.native.sins import DEG, Gauge, Sins, SinsConfig, prior
-from psabench.sins.covariance import PRINTED, QUANTITIES, READINGS, Prediction, predict, read_as, warnings_of
+from psabench.native.sins import DEG, Gauge, Sins, SinsConfig, prior_covariance
+from psabench.sins.covariance import PRINTED, QUANTITIES, READINGS, Prediction, predict_accuracy, read_as, warnings_of
 from psabench.sins.plan import RotationPlan, plan_of_dict, read_plan
 
 CFG = SinsConfig()
 B = read_as(READINGS["B"], CFG)
 KEYS = [q.key for q in QUANTITIES]
-predicted = cache(predict)
+predicted = cache(predict_accuracy)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_the_floors_are_those_of_white_noise(article: RotationPlan) -> None:
 def test_nine_elements_of_gamma_leave_three_null_directions(article: RotationPlan) -> None:
     cfg = replace(CFG, gauge=Gauge.FREE9)
     found = predicted(article, cfg)
-    sd = np.sqrt(np.diag(prior(cfg)))
+    sd = np.sqrt(np.diag(prior_covariance(cfg)))
     values = np.sort(np.linalg.eigvalsh(found.covariance / np.outer(sd, sd)))
     assert values[-3:] == pytest.approx(np.ones(3), abs=2e-3)
     assert values[-4] < 2e-4
