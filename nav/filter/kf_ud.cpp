@@ -105,6 +105,8 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
     double uq[KF_MAX * KF_MAX];
     double weight[2 * KF_MAX];
     double w[KF_MAX][2 * KF_MAX];
+    memset(w, 0, sizeof *w * (size_t)nd);
+    memset(weight, 0, sizeof weight);
     if (!kf_factor(nd, q, uq, weight + nd)) return false;
     for (int j = 0; j < n; j++) {
         double *col = kf->p + j * n;

@@ -101,7 +101,8 @@ int sins_finish_step(struct nav_sins *s)
     set_q(s, s->carry.time_s);
     int status = nav_kf_predict(&s->kf, s->phi, s->q);
     if (status == NAV_OK) status = take_accel(s);
-    s->found.t_s = s->start_s + (double)(s->steps * s->per_step + s->per_step / 2) * s->cfg.sample_s;
+    const int64_t middle = s->steps * s->per_step + s->per_step / 2;
+    s->found.t_s = s->start_s + (double)middle * s->cfg.sample_s;
     if (status == NAV_OK && s->cfg.stand) status = sins_take_angles(s, s->found.t_s);
     s->carry = s->now;
     clear_sums(s);
