@@ -207,7 +207,7 @@ GRADED = ("nu", "theta", "df", "gamma")
 
 
 def grade(r: SinsResult, truth: Params) -> Graded:
-    """In the frame of the gauge: a turn of the instrument's axes is no error (docs/sins.md)."""
+    """In the frame of the gauge: a turn of the instrument's axes is no error (docs/procedures/sins.md)."""
     from scipy import stats
 
     true, _ = sins.to_gauge(r.cfg.gauge, truth)
