@@ -1,7 +1,7 @@
 """Calibration of a strapdown unit from what a table run recorded: two passes, the filter's own checks, estimates.
 
-Pure: no bench, no truth. The method is the article's on rate tables (docs/procedures/sins.md); angles of the table are used where
-they were recorded.
+Pure: no bench, no truth. The method is the article's on rate tables (docs/procedures/sins.md); angles of the table are
+used where they were recorded.
 """
 
 from __future__ import annotations

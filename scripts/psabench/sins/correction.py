@@ -1,8 +1,8 @@
 """What a calibration of an inertial unit is used for: corrected rates and specific forces, in Python, as C, as a file.
 
-Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w; f' = f + df + Gamma f + q f^2 + L(w) r, and the
-accelerometers are later than the gyros by `delay_s`. Applied backwards, in this order: delay, bias and quadratic term,
-matrix, lever arms.
+Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w; f' = f + df + Gamma f + q f^2 + L(w) r,
+and the accelerometers are later than the gyros by `delay_s`. Applied backwards, in this order: delay, bias and
+quadratic term, matrix, lever arms.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _array(given: object, shape: tuple[int, ...], name: str) -> Floats | float:
 # ---- C
 
 _HEADER = """\
-/* Errors of an inertial unit, to be taken out of what it measures. Made by psabench {version} (docs/procedures/sins.md).
+/* Errors of an inertial unit, to be taken out of what it measures. Made by psabench {version}.
  * Frame: right-handed axes of the unit; C_nb of the navigation takes them to the local level. SI units, rad.
  *   gyros:          w = K_G (w' - B_G)
  *   accelerometers: f = K_A (f' - B_A - Q f^2), then less the lever arms: [w x (w x r_i) + dw/dt x r_i]_i

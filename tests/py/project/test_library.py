@@ -276,7 +276,8 @@ def test_the_page_explains_every_counter(part: str) -> None:
 def test_a_program_in_another_language_can_include_the_header(installed: Path, tmp_path: Path, cxx: str) -> None:
     source, program = tmp_path / "outside.cpp", tmp_path / "outside"
     source.write_text(
-        "#include <nav/nav_mc.h>\n#include <nav/sins.h>\n#include <nav/strapdown.h>\n#include <psabench.h>\n#include <cstdio>\n"
+        "#include <nav/nav_mc.h>\n#include <nav/sins.h>\n#include <nav/strapdown.h>\n"
+        "#include <psabench.h>\n#include <cstdio>\n"
         "int main()\n{\n    psabench *b = psabench_new(1);\n"
         '    psabench_part *p = psabench_part_new(b, "ads1255", "a", "start=at_once");\n'
         '    const int done = psabench_run_until_level(p, psabench_pin(p, "DRDY"), 0, 1000000000);\n'
