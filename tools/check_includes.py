@@ -27,6 +27,7 @@ MAY_INCLUDE = {
     "nav/north": {"nav", "nav/common"},
     "nav/filter": {"nav", "nav/common"},
     "nav/sins": {"nav", "nav/common", "nav/filter"},
+    "nav/strapdown": {"nav", "nav/common"},
     "gen": {"base", "canopen"},
     "link": {"base"},
     "board": _MODELS,  # the contract of boards, and what boards share
@@ -59,6 +60,7 @@ _JSON = {"command", "fault", "control", "scenario", "bench", "app"}
 LIBRARIES = {
     "Eigen/Core": {"nav"},
     "Eigen/Dense": {"nav"},
+    "Eigen/Geometry": {"nav"},
     "cjson/cJSON.h": _JSON,
     "cJSON.h": _JSON,
     "immintrin.h": {"chip"},  # the compiler's, for the vectors of x86-64

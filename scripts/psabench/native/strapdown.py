@@ -1,4 +1,4 @@
-"""Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/strapdown.md), from Python.
+"""Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/procedures/strapdown.md), from Python.
 
 Frame n is east, north, up; b the unit's axes; `C_nb` takes coordinates in b to coordinates in n. SI units, rad.
 Increments are integrals over one interval of the rate in inertial space and of the specific force, in b.

@@ -163,13 +163,13 @@ def value_of(params: Params, name: str) -> float:
 
 
 def _result_of(cfg: SinsConfig, s: Sins, innovations: Floats) -> SinsResult:
-    from psabench.native.sins import prior
+    from psabench.native.sins import prior_covariance
 
     state, named = s.state(), elements(s.rows, cfg)
     scale = np.array([SCALES[key].per_si for _, key, _ in named])
     at = [k for *_, k in named]
     covariance = s.covariance()[1][np.ix_(at, at)] * np.outer(scale, scale)
-    before = np.sqrt(np.diag(prior(cfg))[at]) * scale
+    before = np.sqrt(np.diag(prior_covariance(cfg))[at]) * scale
     parameters = tuple(
         Parameter(
             name=name,

@@ -1,8 +1,8 @@
 """What a calibration of an inertial unit is used for: corrected rates and specific forces, in Python, as C, as a file.
 
-Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w; f' = f + df + Gamma f + q f^2 + L(w) r,
-and the accelerometers are later than the gyros by `delay_s`. Applied backwards, in this order: delay, bias and
-quadratic term, matrix, lever arms.
+Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w;
+f' = f + df + Gamma f + q f^2 + L(w) r, and the accelerometers are later than the gyros by `delay_s`. Applied backwards,
+in this order: delay, bias and quadratic term, matrix, lever arms.
 """
 
 from __future__ import annotations

@@ -23,10 +23,9 @@ DT_S, N = 0.01, 50
 RNG = np.random.default_rng(3)
 RATE, FORCE = RNG.normal(0, 10, (N, 3)), RNG.normal(0, 1, (N, 3))  # deg/s, g
 TIME_S = 100.0 + DT_S * np.arange(N)
-NAMES = {"gyro": ("wx", "wy", "wz"), "accel": ("ax", "ay", "az"), "time": "t"}
-UNITS = {"gyro_unit": "deg/s", "accel_unit": "g"}
-BY_NAME = Layout(**NAMES, **UNITS)
-BY_PLACE = Layout(format="float64", gyro=(2, 3, 4), accel=(5, 6, 7), time=1, **UNITS)
+UNITS = Layout(gyro_unit="deg/s", accel_unit="g")
+BY_NAME = replace(UNITS, gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="t")
+BY_PLACE = replace(UNITS, format="float64", gyro=(2, 3, 4), accel=(5, 6, 7), time=1)
 COLUMNS = ["t", "wx", "wy", "wz", "ax", "ay", "az"]
 
 
@@ -48,7 +47,7 @@ def write_mcap(path: Path, rows: np.ndarray) -> Path:
         for i, (t, *w) in enumerate(rows.tolist()):
             message = {"t": t, "w": dict(zip("xyz", w[:3], strict=True)), "a": dict(zip("xyz", w[3:], strict=True))}
             writer.add_message(channel, log_time=i, publish_time=i, data=json.dumps(message).encode())
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 
@@ -80,8 +79,8 @@ def write_raw(path: Path, rows: np.ndarray, kind: str = "<f8") -> Path:
 
 FORMS = {
     "csv": (write_csv, BY_NAME),
-    "mcap": (write_mcap, Layout(gyro=("w.x", "w.y", "w.z"), accel=("a.x", "a.y", "a.z"), time="t", **UNITS)),
-    "mf4": (write_mf4, Layout(gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="time", **UNITS)),
+    "mcap": (write_mcap, replace(UNITS, gyro=("w.x", "w.y", "w.z"), accel=("a.x", "a.y", "a.z"), time="t")),
+    "mf4": (write_mf4, replace(UNITS, gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="time")),
     "bin": (write_raw, BY_PLACE),
 }
 
@@ -112,7 +111,7 @@ def test_float32_of_a_toolbox_with_a_rounded_clock(tmp_path: Path) -> None:
 
 def test_axes_are_turned_into_right_forward_up(tmp_path: Path) -> None:
     """From forward, right, down."""
-    layout = Layout(**NAMES, **UNITS, axes="+y +x -z")
+    layout = replace(BY_NAME, axes="+y +x -z")
     found = read_increments(write_csv(tmp_path / "frd.csv", table()), layout)
     assert found.dv_mps == pytest.approx(FORCE[:, [1, 0, 2]] * [1, 1, -1] * 9.80665 * DT_S, rel=1e-9)
     assert np.array_equal(turn("+y +x -z"), [[0, 1, 0], [1, 0, 0], [0, 0, -1]])
