@@ -98,7 +98,7 @@ def calibrate_unit(
     """Both passes. Raises BadInput for data that no estimate should be made from: what is wrong is named."""
     refused = [f.what for f in findings(data) if f.refuse]
     if refused:
-        raise BadInput(f"sins-calibration: {'; '.join(refused)}")
+        raise BadInput(expected("a recording without findings", "; ".join(refused), "sins-calibration"))
     if len(data) * data.dt_s < LEAST_S:
         raise BadInput(expected(f"{LEAST_S:g} s or more", f"{len(data) * data.dt_s:.2f} s", "sins-calibration"))
     try:

@@ -121,10 +121,10 @@ def _read_mcap(path: Path, layout: Layout) -> Floats:
 def _member(message: object, name: str) -> float:
     for key in name.split("."):
         if not isinstance(message, Mapping) or key not in message:
-            raise KeyError(f"no {name}")
+            raise ValueError(expected(f"a member {name}", "none"))
         message = message[key]
     if isinstance(message, bool) or not isinstance(message, int | float):
-        raise ValueError(f"{message!r} for {name}")
+        raise ValueError(expected(f"a number for {name}", repr(message)))
     return float(message)
 
 

@@ -159,7 +159,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     mcap = write_mcap(tmp_path / "x.mcap", table())
     with pytest.raises(BadInput, match="expected messages of topic /other in JSON, got none"):
         read_increments(mcap, replace(FORMS["mcap"][1], topic="/other"))
-    with pytest.raises(BadInput, match=r"message 1: expected numbers .*, got .*no wx"):
+    with pytest.raises(BadInput, match=r"message 1: expected a member wx, got none"):
         read_increments(tmp_path / "x.mcap", BY_NAME)
     (tmp_path / "x.mf4").write_bytes(b"no MDF")
     with pytest.raises(BadInput, match="expected an MF4 file"):
