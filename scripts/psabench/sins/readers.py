@@ -109,10 +109,8 @@ def _read_mcap(path: Path, layout: Layout) -> Floats:
     for number, message in enumerate(json_messages(path, layout.topic), start=1):
         try:
             found.append([_member(message, str(name)) for name in layout.names()])
-        except (KeyError, TypeError, ValueError) as e:
-            raise BadInput(
-                expected(f"numbers {', '.join(map(str, layout.names()))}", e, f"{path}: message {number}")
-            ) from e
+        except ValueError as e:
+            raise BadInput(f"{path}: message {number}: {e}") from e
     if not found:
         raise BadInput(expected(f"messages of topic {layout.topic} in JSON", "none", path))
     return np.array(found, np.float64)
