@@ -96,7 +96,7 @@ class Layout:
 
 
 def _check_among(value: str, known: Mapping[str, Any], name: str) -> None:
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise ValueError(expected(", ".join(known), value, name))
 
 

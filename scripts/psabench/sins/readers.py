@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,8 @@ def read_increments(path: Path, layout: Layout | None = None) -> Increments:
     """Raises BadInput with the file, and the row or the column."""
     given = layout or Layout()
     if not path.is_file():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+        got = "a folder" if path.is_dir() else "a device or a pipe"
+        raise BadInput(expected("a file", got, path) if path.exists() else f"{path}: no such file")
     read = _read_raw if given.format else READERS.get(path.suffix.lower())
     if read is None:
         raise BadInput(
@@ -83,12 +84,21 @@ def _places(names: Sequence[str | int], there: Sequence[str], path: Path) -> lis
     return [there.index(str(n)) for n in names]
 
 
+def _csv_rows(file: Iterable[str], path: Path) -> Iterator[list[str]]:
+    """Raises BadInput for what is no CSV, such as a field longer than 128 KiB."""
+    reader = csv.reader(file)
+    try:
+        yield from reader
+    except csv.Error as e:
+        raise BadInput(expected("CSV", e, f"{path}: line {reader.line_num}")) from e
+
+
 def _read_csv(path: Path, layout: Layout) -> Floats:
     """A head of names, then numbers; what begins with # is passed over."""
     found: list[list[float]] = []
     places: list[int] | None = None
-    with path.open(encoding="utf-8", errors="replace", newline="") as file:
-        for number, row in enumerate(csv.reader(file), start=1):
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        for number, row in enumerate(_csv_rows(file, path), start=1):
             if not row or row[0].startswith("#"):
                 continue
             if places is None:

@@ -182,6 +182,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
         ({"format": "float16"}, "format: expected float32 or float64"),
         ({"format": "float32"}, "expected places of columns, 1 to 7, got dtheta_x_rad"),
         ({"columns": "7"}, "columns: expected a number"),
+        ({"gyro_unit": ["rad"]}, r"gyro_unit: expected rad, deg.* got \['rad'\]"),
     ],
 )
 def test_a_layout_that_is_none_is_refused(tmp_path: Path, found: object, said: str) -> None:
@@ -191,6 +192,22 @@ def test_a_layout_that_is_none_is_refused(tmp_path: Path, found: object, said: s
     path.write_text(json.dumps(found))
     with pytest.raises(BadInput, match=f"^{path}: .*{said}"):
         read_layout(path)
+
+
+def test_a_csv_of_a_spreadsheet_is_read_and_one_field_without_end_is_refused(tmp_path: Path) -> None:
+    """The first begins with a byte order mark."""
+    path = write_csv(tmp_path / "bom.csv", table())
+    text = path.read_text().removeprefix("# a unit\n")
+    path.write_text(text, encoding="utf-8-sig")
+    assert len(read_increments(path, BY_NAME)) == N
+    path.write_text(text + "9" * 200_000)
+    with pytest.raises(BadInput, match=f"^{path}: line {N + 2}: expected CSV, got field larger"):
+        read_increments(path, BY_NAME)
+
+
+def test_a_device_is_no_folder() -> None:
+    with pytest.raises(BadInput, match=r"^/dev/null: expected a file, got a device or a pipe"):
+        read_increments(Path("/dev/null"), BY_NAME)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
