@@ -143,6 +143,8 @@ def _array(given: object, shape: tuple[int, ...], name: str) -> Floats | float:
         raise ValueError(expected(f"finite numbers of shape {shape}", given, name))
     if name in ("theta", "gamma") and np.abs(x).max() > MOST:
         raise ValueError(expected(f"elements within {MOST:g}", f"{np.abs(x).max():g}", name))
+    if name in ("theta", "gamma") and np.linalg.matrix_rank(np.eye(3) + x) < 3:
+        raise ValueError(expected("a matrix that, added to the unit matrix, has an inverse", given, name))
     return x if shape else float(x)
 
 

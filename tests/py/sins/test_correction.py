@@ -106,6 +106,10 @@ def test_a_file_gives_back_the_same_correction(tmp_path: Path) -> None:
         ({"nu_radps": [1, 2, "x"]}, "nu_radps: expected numbers of shape"),
         ({"nu_radps": [1, 2, None]}, "nu_radps: expected finite numbers of shape"),
         ({"theta": [[1, 0, 0], [0, 0, 0], [0, 0, 0]]}, "theta: expected elements within 0.5, got 1"),
+        (
+            {"gamma": [[-0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0, 0, 0]]},
+            "gamma: expected a matrix that, added to the unit",
+        ),
         ({"thetas": 1}, "correction: expected nu_radps.* got thetas"),
     ],
 )
