@@ -541,6 +541,7 @@ def _commands() -> Iterator[Command]:
         summary=summary,
         handler=_calibrate_sins,
         common=("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose"),
+        kept="what was measured is in OUT",
         load=_of_the_sins,
         examples=_EXAMPLES[name],
     )
