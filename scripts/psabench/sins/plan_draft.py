@@ -113,14 +113,14 @@ def _along(axis: int, quarters_at: Sequence[int]) -> tuple[str, int]:
 # ---- where a search starts
 
 ARTICLE_RATE_DEGPS = 10.0
-TO_Z2, TO_Z3 = Leg(axis=3, rate=-1.0), Leg(axis=2, rate=-1.0)
+TO_Z2, TO_Z3 = Leg(axis=3, rate=-1.0), Leg(axis=2, rate=1.0)
 
 
 def article_draft(limits: Limits) -> Draft:
     """The article's three cycles in this time, at its rate or what the table can."""
     rate = min(1.0, ARTICLE_RATE_DEGPS / limits.max_rate_degps)
     cycle = (Leg(axis=1, rate=rate), Leg(axis=1, rate=-rate))
-    between = (replace(TO_Z2, rate=-rate), replace(TO_Z3, rate=-rate))
+    between = (replace(TO_Z2, rate=-rate), replace(TO_Z3, rate=rate))
     return Draft(azimuth_deg=limits.azimuths_deg[0], legs=(*cycle, between[0], *cycle, between[1], *cycle))
 
 

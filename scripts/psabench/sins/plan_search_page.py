@@ -69,7 +69,7 @@ def reading_of(name: str) -> Reading:
 
 def gather(search: Search, reading: str, ended_early: bool, took_s: float) -> Found:
     """Both plans in every reading."""
-    drafts = (article_draft(search.limits), search.best.draft)
+    drafts = (article_draft(search.limits), search.best)
     dicts = [plan_dict(d, search.limits) for d in drafts]
     article, best = (plan_of_dict(d, NAME, "") for d in dicts)
     cfgs = {r.name: read_as(r, search.cfg) for r in READINGS.values()}
