@@ -33,7 +33,7 @@ class Limits:
     max_rate_degps: float = 10.0
     azimuths_deg: tuple[float, ...] = (0.0,)
     budget_s: float = 2718.0
-    remount_s: float = 300.0  # of a person, for each quarter turn that the table cannot make
+    remount_s: float = 300.0  # of a person, for each turn that the table cannot make
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +55,7 @@ class Draft:
 
 
 def plan_dict(draft: Draft, limits: Limits) -> PlanDict | None:
-    """As a file has it. None: the time does not suffice."""
+    """As a file has it. None: the time does not suffice, or two axes of the table coincide."""
     spent_s = sum(_inner_s(leg, limits) for leg in draft.legs if leg.axis > 1)
     shares = [leg.share for leg in draft.legs if leg.axis == 1]
     left_s = limits.budget_s - spent_s
@@ -63,6 +63,8 @@ def plan_dict(draft: Draft, limits: Limits) -> PlanDict | None:
         return None
     turns, at = [], [0] * AXES
     for leg in draft.legs:
+        if leg.axis == AXES and at[1] % 2:  # it lies along axis 1, and sins.table gives the turn to that one
+            return None
         turns.append(_turn_of(leg, at, left_s * leg.share / sum(shares), limits))
         if leg.axis > 1:
             at[leg.axis - 1] += leg.quarters * int(math.copysign(1, leg.rate))
@@ -70,7 +72,7 @@ def plan_dict(draft: Draft, limits: Limits) -> PlanDict | None:
 
 
 def plan_of(draft: Draft, limits: Limits) -> RotationPlan | None:
-    """None: the time does not suffice."""
+    """None as for plan_dict."""
     found = plan_dict(draft, limits)
     return None if found is None else plan_of_dict(found, "search", "best")
 
@@ -96,8 +98,8 @@ def _turn_of(leg: Leg, quarters_at: Sequence[int], for_s: float, limits: Limits)
     if leg.axis == 1:
         rate, for_s = leg.rate * limits.max_rate_degps, round(math.floor(for_s / GRID_S + 1e-9) * GRID_S, 1)
         return {"axis": axis, "rate_degps": sense * round(rate, 3), "for_s": for_s}
-    remount = leg.axis > limits.axes
-    for_s = _grid_up(QUARTER_DEG / limits.max_rate_degps) if remount else _inner_s(leg, limits)
+    remount = leg.axis > limits.axes  # in no time of the filter: rate and time give the angle alone
+    for_s = _grid_up(QUARTER_DEG * leg.quarters / limits.max_rate_degps) if remount else _inner_s(leg, limits)
     rate = math.copysign(QUARTER_DEG * leg.quarters / for_s, leg.rate)
     return {"axis": axis, "rate_degps": sense * rate, "for_s": for_s} | ({"remount": True} if remount else {})
 

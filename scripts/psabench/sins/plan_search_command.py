@@ -75,7 +75,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     text = "azimuths of axis 1 that are allowed, deg from north (%(default)s)"
     p.add_argument("--azimuths", default=usual.azimuths, metavar="A,B...", help=text)
     p.add_argument("--minutes", type=positive, default=usual.minutes, help="time of the calibration (%(default)g)")
-    text = "time of a person for a quarter turn that the table cannot make, s (%(default)g)"
+    text = "time of a person for a turn that the table cannot make, s (%(default)g)"
     p.add_argument("--remount-s", type=positive, default=usual.remount_s, metavar="TIME", help=text)
     text = "of the noise: A, B, A,S1, B,S1 or B,S50 (%(default)s); S: with the table's angles"
     p.add_argument("--reading", default=usual.reading, help=text)
