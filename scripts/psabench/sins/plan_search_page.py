@@ -128,8 +128,9 @@ def turn_rows(found: Found) -> list[list[str]]:
 
 
 def warnings(found: Found) -> list[str]:
-    """Of the best plan."""
-    return warnings_of(found.rotations, found.search.cfg, found.main.best)
+    """Of the best plan. Its turns may be about other axes of the table than the first: that one's azimuth says nothing."""
+    said = warnings_of(found.rotations, found.search.cfg, found.main.best)
+    return [w for w in said if not w.startswith("the table's axis is ")]
 
 
 def rate_words(found: Found) -> str:

@@ -108,9 +108,12 @@ def test_the_search_finds_a_better_plan_and_never_a_worse_one(found: Search) -> 
     assert np.array_equal(found.reference, sigmas(start, CFG))
 
 
-def test_where_nothing_is_better_the_articles_plan_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("in_long_steps", [1.0, 1e-12])
+def test_where_nothing_is_better_the_articles_plan_stays(monkeypatch: pytest.MonkeyPatch, in_long_steps: float) -> None:
+    """Not even if it seems so in the long steps of the screening."""
+
     def worse(task: Any) -> tuple[int, Any]:
-        return task.number, np.full(21, 1.0)
+        return task.number, np.full(21, in_long_steps if task.cfg.step_s > CFG.step_s else 1.0)
 
     monkeypatch.setattr("psabench.sins.plan_search.compute", worse)
     search = searched(ThisProcess())
