@@ -196,7 +196,9 @@ def _split(draft: Draft, rng: np.random.Generator, _: Limits) -> Draft:
         return draft
     part = float(rng.uniform(0.2, 0.8))
     second = leg.rate * _sense(rng)
-    return _with(draft, at, replace(leg, share=leg.share * part), replace(leg, rate=second, share=leg.share * (1 - part)))
+    return _with(
+        draft, at, replace(leg, share=leg.share * part), replace(leg, rate=second, share=leg.share * (1 - part))
+    )
 
 
 def _insert(draft: Draft, rng: np.random.Generator, _: Limits) -> Draft:

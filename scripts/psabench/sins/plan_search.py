@@ -26,7 +26,9 @@ PATIENCE = 15  # generations without a better plan, then a line starts again
 FROM_BEST = 0.5  # probability that a line starts again at the best plan so far
 TRIES = 200  # of a draft that fits the time
 BETTER = 1e-4  # of the score
-LONG_STEP_S = 0.5  # plans are screened in these: a third of the time, scores shift by 0.0003 without the stand, 0.08 with
+LONG_STEP_S = (
+    0.5  # plans are screened in these: a third of the time, scores shift by 0.0003 without the stand, 0.08 with
+)
 NEAR = 0.03  # of the best plan's score in long steps: computed again in the filter's own
 BLOCKS = ("nu", "theta", "df", "gamma")  # 21 parameters
 

@@ -171,9 +171,7 @@ def _check_options(o: Options) -> tuple[Limits, SinsConfig]:
     )
     if plan_dict(article_draft(limits), limits) is None:
         raise BadInput(expected("time for the article's three cycles", f"{o.minutes:g} minutes", "--minutes"))
-    cfg = SinsConfig(
-        latitude_rad=o.latitude_deg * DEG, beta_sd_rad=(DEG, DEG, o.heading_sd_deg * DEG), lever=o.lever
-    )
+    cfg = SinsConfig(latitude_rad=o.latitude_deg * DEG, beta_sd_rad=(DEG, DEG, o.heading_sd_deg * DEG), lever=o.lever)
     return limits, read_as(reading_of(o.reading), cfg)
 
 

@@ -200,7 +200,10 @@ def test_ctrl_c_keeps_the_best_plan_so_far(tmp_path: Path) -> None:
         (["--max-rate-degps", "2000"], "--max-rate-degps: expected 0.5 to 1000, got 2000"),
         (["--azimuths", "north"], "--azimuths: expected -360 to 360, separated by commas, got 'north'"),
         (["--azimuths", "nan"], "--azimuths: expected -360 to 360, separated by commas, got 'nan'"),
-        (["--minutes", "1", "--max-rate-degps", "1"], "--minutes: expected time for the article's three cycles, got 1 m"),
+        (
+            ["--minutes", "1", "--max-rate-degps", "1"],
+            "--minutes: expected time for the article's three cycles, got 1 m",
+        ),
         (["--reading", "C"], "--reading: expected A or B or A,S1 or B,S1 or B,S50, got C"),
         (["--lever", "4"], "sins-plan: "),
         (["--latitude-deg", "89"], "sins-plan: "),
