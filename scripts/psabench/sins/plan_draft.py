@@ -1,8 +1,8 @@
-"""A plan of rotations as the search changes it: legs of a table within its limits, each draft a plan that the table can make.
+"""A plan of rotations as the search changes it: each draft is one that a table can make within its limits.
 
-Axis 1 of the table is horizontal; axes 2 and 3 turn by whole quarters, so that an axis of the instrument always lies along
-axis 1 (docs/instruments.md has the order of the axes). What the table lacks of axes 2 and 3 a person replaces by mounting the
-unit again.
+Axis 1 of the table is horizontal; axes 2 and 3 turn by whole quarters, so that an axis of the instrument always lies
+along axis 1 (docs/instruments.md has the order of the axes). What the table lacks of axes 2 and 3 a person replaces by
+mounting the unit again.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _reverse(draft: Draft, rng: np.random.Generator, _: Limits) -> Draft:
 
 
 def _split(draft: Draft, rng: np.random.Generator, _: Limits) -> Draft:
-    """Of a leg of axis 1: its second part the other way round, or in the same sense after something that comes between."""
+    """A leg of axis 1 in two, the second in either sense."""
     at = _pick(draft, rng)
     leg = draft.legs[at]
     if leg.axis > 1:

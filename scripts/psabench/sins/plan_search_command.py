@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from psabench.sins.plan_search_page import Found
 
 ABOUT = """\
-Search the plan of rotations that calibrates a strapdown unit best on your table and in your time. Plans are compared by
-the covariance of the filter: no bench takes part. The report has what the article's plan leaves on the table.
+Search the plan of rotations that calibrates a strapdown unit best on your table and in your time. Plans are compared
+by the covariance of the filter: no bench takes part. The report has what the article's plan leaves on the table.
 """
 EPILOG = """\
-A plan is scored by the mean of ln(sigma / sigma of the article's plan in the same time) over 21 parameters. The best plan
-is OUT/plan.yaml, for --plan of `psabench run sins-covariance` and `sins-calibration`.
+A plan is scored by the mean of ln(sigma / sigma of the article's plan in the same time) over 21 parameters. The best
+plan is OUT/plan.yaml, for --plan of `psabench run sins-covariance` and `sins-calibration`.
 
 examples:
   psabench campaign sins-plan                                    the article's table and time; build/sins-plan/report.html
   psabench campaign sins-plan --max-rate-degps 60 --minutes 20   a faster table, less time
-  psabench campaign sins-plan --axes 1 --remount-s 600           one axis: a person turns the unit over, 10 minutes each time
+  psabench campaign sins-plan --axes 1 --remount-s 600           one axis: a person turns the unit over
   psabench campaign sins-plan --azimuths 90,60 --heading-sd-deg 0.1
   psabench campaign sins-plan --plans 20000 --workers 8          the same plan as on one core
   psabench campaign sins-plan --dask tcp://192.0.2.7:8786        on the cluster of this scheduler

@@ -128,7 +128,7 @@ def turn_rows(found: Found) -> list[list[str]]:
 
 
 def warnings(found: Found) -> list[str]:
-    """Of the best plan. Its turns may be about other axes of the table than the first: that one's azimuth says nothing."""
+    """Of the best plan; its turns may be about other axes of the table than that whose azimuth is given."""
     said = warnings_of(found.rotations, found.search.cfg, found.main.best)
     return [w for w in said if not w.startswith("the table's axis is ")]
 
@@ -214,5 +214,5 @@ def _comments(found: Found) -> list[str]:
     s = found.search
     return [
         f"psabench campaign sins-plan: seed {s.seed}, {s.computed} plans, reading {found.reading}.",
-        f"Table of {s.limits.axes} axes, {s.limits.max_rate_degps:g} deg/s, {s.limits.budget_s:g} s. Acceleration is left out.",
+        f"Table of {s.limits.axes} axes, {s.limits.max_rate_degps:g} deg/s, {s.limits.budget_s:g} s, any acceleration.",
     ]

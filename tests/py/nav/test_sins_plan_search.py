@@ -68,7 +68,7 @@ def test_the_articles_plan_is_a_draft() -> None:
 
 @pytest.mark.parametrize("axes", [1, 2, 3])
 def test_every_draft_is_within_the_limits(axes: int) -> None:
-    """Of hundreds of drafts and changes: rate, time, azimuth; axes of the table that can make each turn (sins.table)."""
+    """Of hundreds of drafts: rate, time, azimuth; axes of the table that can make each turn (sins.table)."""
     limits = Limits(axes=axes, max_rate_degps=25.0, azimuths_deg=(10.0, 70.0), budget_s=2000.0, remount_s=60.0)
     rng, seen, draft = np.random.default_rng(axes), 0, article_draft(limits)
     for k in range(600):
