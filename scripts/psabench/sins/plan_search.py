@@ -1,7 +1,7 @@
 """Search for the plan of rotations that determines a unit best, within a table's limits and a time.
 
 Several lines of descent at once: each generation changes a line's best plan at random and keeps the best of parent
-and children; a line that no longer improves starts again elsewhere. No gradients: the number and order of turns change as well.
+and children; a line that no longer improves starts again elsewhere. No gradients: the number of turns changes, too.
 The same seed gives the same plan whoever computes, and however many at once.
 """
 

@@ -30,7 +30,7 @@ A plan is scored by the mean of ln(sigma / sigma of the article's plan in the sa
 plan is OUT/plan.yaml, for --plan of `psabench run sins-covariance` and `sins-calibration`.
 
 examples:
-  psabench campaign sins-plan                                    the article's table and time; build/sins-plan/report.html
+  psabench campaign sins-plan                                    the article's table and time
   psabench campaign sins-plan --max-rate-degps 60 --minutes 20   a faster table, less time
   psabench campaign sins-plan --axes 1 --remount-s 600           one axis: a person turns the unit over
   psabench campaign sins-plan --azimuths 90,60 --heading-sd-deg 0.1

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +103,7 @@ def test_the_search_finds_a_better_plan_and_never_a_worse_one(found: Search) -> 
     assert found.score < -0.1  # a rate of 40 in place of 10 deg/s is worth that and more
     scores = [score for _, score in found.history]
     assert scores[0] == 0.0
-    assert all(b < a for a, b in zip(scores, scores[1:], strict=False))
+    assert all(b < a for a, b in pairwise(scores))
     start = plan_of(article_draft(SHORT), SHORT)
     assert start is not None
     assert np.array_equal(found.reference, sigmas(start, CFG))
