@@ -1,6 +1,6 @@
 """A level flight with a heading that swings, as data, and what an ideal unit measures on it.
 
-n is east, north, up, b right, forward, up. The aircraft banks so that a turn has no side force. Place comes from the velocity by
+n is east, north, up, b the unit's axes as `axes` mounts them. The aircraft banks so that a turn has no side force. Place comes from the velocity by
 Simpson's rule over half steps; rates and forces are those of the equations of motion at each instant, so that increments differ from
 the exact ones by the rule's error alone.
 """
@@ -16,11 +16,19 @@ import numpy as np
 
 from psabench.errors import BadInput, expected
 from psabench.native.nav_errors import Way
-from psabench.native.strapdown import Floats, gravity_mps2, radii_m
+from psabench.native.strapdown import Floats, dcm, gravity_mps2, radii_m
 from psabench.places import proto_file
 
 NAMED = ("snake", "straight")  # of proto/flights
 EARTH_RADPS = 7.292115e-5
+ALONG: Mapping[str, tuple[float, float, float]] = {  # where an axis of the unit points in the aircraft: right, forward, up
+    "right": (1.0, 0.0, 0.0),
+    "left": (-1.0, 0.0, 0.0),
+    "forward": (0.0, 1.0, 0.0),
+    "back": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
+}
 LIMITS: Mapping[str, tuple[float, float]] = {
     "speed_mps": (1.0, 1000.0),
     "height_m": (-500.0, 30000.0),
@@ -45,6 +53,12 @@ class Flight:
     amplitude_deg: float = 30.0
     period_s: float = 600.0
     duration_s: float = 3600.0
+    axes: tuple[str, str, str] = ("forward", "left", "up")  # z1, z2, z3 of the unit
+
+    @property
+    def mounting(self) -> Floats:
+        """(3, 3): from coordinates in the unit to right, forward, up."""
+        return np.array([ALONG[a] for a in self.axes]).T
 
     def heading_rad(self, t_s: Floats, derivative: int = 0) -> Floats:
         """And its derivatives by time."""
@@ -70,9 +84,22 @@ def read_flight(name: str) -> Flight:
         raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--flight")) from e
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
         raise BadInput(expected("a flight in YAML", " ".join(str(e).split()), path)) from e
-    if not isinstance(found, dict) or set(found) - set(LIMITS):
-        raise BadInput(expected(" ".join(LIMITS), " ".join(map(str, found or ())), path))
-    return Flight(**{key: _number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()})
+    if not isinstance(found, dict) or set(found) - set(LIMITS) - {"axes"}:
+        raise BadInput(expected(" ".join([*LIMITS, "axes"]), " ".join(map(str, found or ())), path))
+    axes = _axes(found.pop("axes", "forward left up"), f"{path}: axes")
+    numbers = {key: _number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
+    return Flight(axes=axes, **numbers)
+
+
+def _axes(value: object, where: str) -> tuple[str, str, str]:
+    words = str(value).split()
+    want = f"three of {', '.join(ALONG)}, right-handed"
+    if len(words) != 3 or set(words) - set(ALONG):
+        raise BadInput(expected(want, value, where))
+    axes = (words[0], words[1], words[2])
+    if np.linalg.det(np.array([ALONG[a] for a in axes])) < 0.5:
+        raise BadInput(expected(want, value, where))
+    return axes
 
 
 def _number(value: object, low: float, high: float, where: str) -> float:
@@ -105,16 +132,15 @@ def fly(flight: Flight, dt_s: float) -> Flown:
     n = round(flight.duration_s / dt_s)
     t_s = 0.5 * dt_s * np.arange(2 * n + 1)
     place = _places(flight, t_s)
-    w_b, f_b, c_nb, v_n = _felt(flight, t_s, place[:, 0])
+    w_a, f_a, c_na, v_n = _felt(flight, t_s, place[:, 0])
+    w_b, f_b, c_nb = w_a @ flight.mounting, f_a @ flight.mounting, c_na @ flight.mounting
     rows = np.hstack([place, v_n, c_nb.reshape(-1, 9)])
     return Flown(dt_s=dt_s, states=rows[::2], dtheta_rad=_simpson(w_b, dt_s), dv_mps=_simpson(f_b, dt_s))
 
 
 def rest(flight: Flight) -> Floats:
     """State on the ground at the start, level, with the heading of the start: where the unit is aligned."""
-    from psabench.native.strapdown import dcm
-
-    c_nb = dcm(float(flight.heading_rad(np.zeros(1))[0]), 0.0, 0.0)
+    c_nb = dcm(float(flight.heading_rad(np.zeros(1))[0]), 0.0, 0.0) @ flight.mounting
     place = [math.radians(flight.latitude_deg), math.radians(flight.longitude_deg), 0.0]
     return np.concatenate([place, np.zeros(3), c_nb.ravel()])
 
@@ -146,7 +172,7 @@ def _places(flight: Flight, t_s: Floats) -> Floats:
 
 
 def _felt(flight: Flight, t_s: Floats, lat: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """w_b, f_b, C_nb and v_n at each instant."""
+    """Rate, force and C_n of right, forward, up, and v_n at each instant."""
     radii = np.array([radii_m(x, flight.height_m) for x in lat])
     g = np.array([gravity_mps2(x, flight.height_m) for x in lat])
     psi, psi1, psi2 = (flight.heading_rad(t_s, k) for k in range(3))
