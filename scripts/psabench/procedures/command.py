@@ -18,7 +18,7 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
-from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, THERMAL
+from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, SINS, THERMAL
 from psabench.progress import Bar
 from psabench.shell import command_line
 
@@ -47,6 +47,10 @@ NOTES_CHAMBER = """
 Without --head, --chamber or --control an emulator is started, with the scenario quartz_run_in, whose chain and head
 are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit status 1: a compensation is off the true
 outputs by more than its limits.
+"""
+
+NOTES_SINS = """
+Exit status 1: a figure is out of its limits. docs/procedures/sins_secondary.md derives the method.
 """
 
 ALL = "all"
@@ -117,6 +121,17 @@ IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
     "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
+}
+
+
+# Of the calibration of a unit that navigates.
+OF_UNITS: Mapping[str, Mapping[str, Any]] = {
+    "--first": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "recording of the experiment that calibrates: what the unit gave out, CSV (docs/procedures/sins_secondary.md)",
+    },
+    "--second": {"type": Path, "metavar": "FILE", "help": "recording of the experiment that is compensated; none: calibrate alone"},
 }
 
 
@@ -208,7 +223,7 @@ def _parser_of(command: Command) -> Parser:
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        how = COMMON.get(option) or IN_THE_CHAMBER[option]
+        how = COMMON.get(option) or IN_THE_CHAMBER.get(option) or OF_UNITS[option]
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **how)
     return p
 
@@ -368,6 +383,29 @@ def _run_thermal(args: argparse.Namespace) -> int:
     return 0 if thermal_grading.within_limits(report) else 1
 
 
+def _snake(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import snake, snake_page
+
+    found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, _params(args)))
+    print("\n".join(snake_page.console_lines(found)))
+    print(snake_page.verdict_words(found))
+    print(f"report: {snake_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0
+
+
+def _secondary(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import secondary_page, secondary_run
+
+    params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
+    found = secondary_run.run_secondary(params, args.first, args.second, args.truth)
+    print("\n".join(secondary_page.console_lines(found)))
+    print(secondary_page.verdict_words(found))
+    print(f"report: {secondary_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0
+
+
 # What each takes of COMMON.
 _STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
 _PLATFORM = (
@@ -381,6 +419,14 @@ _CHAMBER = (
 )
 
 _EXAMPLES: Mapping[str, str] = {
+    "sins-calibration-secondary": """\
+  psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
+  psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+""",
+    "sins-snake": """\
+  psabench run sins-snake
+  psabench run sins-snake --flight my_flight.yaml --plan two_rates
+""",
     "turns": """\
   psabench run turns
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
@@ -450,6 +496,13 @@ def _of_the_chamber() -> Parameters:
     return Parameters(fields={k: f for k, f in BenchAccuracy.__dataclass_fields__.items() if k != "chain_off_k"})
 
 
+def _of_sins(name: str) -> Parameters:
+    from psabench.sins import secondary_run, snake
+
+    kind = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
+    return Parameters(fields=kind.__dataclass_fields__)
+
+
 def _commands() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
@@ -485,6 +538,17 @@ def _commands() -> Iterator[Command]:
             load=partial(_of_the_platform, name),
             examples=_EXAMPLES[name],
             notes=NOTES_PLATFORM,
+        )
+    handlers = {"sins-snake": (_snake, ("--out",)), "sins-calibration-secondary": (_secondary, (*OF_UNITS, "--out"))}
+    for name, summary in SINS.items():
+        yield Command(
+            name=name,
+            summary=summary,
+            handler=handlers[name][0],
+            common=handlers[name][1],
+            load=partial(_of_sins, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_SINS,
         )
 
 

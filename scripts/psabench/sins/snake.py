@@ -8,7 +8,7 @@ The sensors' covariance is that of the table's filter with all its correlations;
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from psabench.errors import BadInput, expected
 from psabench.native import nav_errors
 from psabench.native.kalman import Kalman
 from psabench.native.nav import Floats
-from psabench.native.nav_errors import ErrorsConfig
+from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import SinsConfig
 from psabench.native.strapdown import gravity_mps2, radii_m
 from psabench.procedures.result import option
@@ -84,24 +84,28 @@ def run_snake(params: SnakeParams, cfg: SinsConfig | None = None) -> Snake:
     flight, plan, cfg = read_flight(params.flight), read_plan(params.plan), cfg or SinsConfig()
     if flight.duration_s < SHOWN_S:
         raise BadInput(expected(f"{SHOWN_S:g} s or more", flight.duration_s, f"{params.flight}: duration_s"))
-    outcomes = {name: _outcome(r, flight, plan, cfg, params.alignment_s) for name, r in READINGS.items()}
+    both = [(f, fly(f, STEP_S).way()) for f in (flight, replace(flight, amplitude_deg=0.0))]
+    outcomes = {name: _outcome(r, both, plan, cfg, params.alignment_s) for name, r in READINGS.items()}
     return Snake(flight=flight, plan=plan, outcomes=outcomes)
 
 
-def _outcome(reading: Reading, flight: Flight, plan: RotationPlan, cfg: SinsConfig, alignment_s: float) -> Outcome:
+def _outcome(
+    reading: Reading, both: Sequence[tuple[Flight, Way]], plan: RotationPlan, cfg: SinsConfig, alignment_s: float
+) -> Outcome:
+    """both: the flight, and the same without turns."""
     model = error_model(cfg)
     sensors = sensors_left(plan, read_as(reading, cfg))
-    start = aligned(model, flight, sensors, alignment_s)
-    curve = list(rho_along(model, flight, start))
+    start, straight = (aligned(model, f, sensors, alignment_s) for f, _ in both)
+    way, straight_way = (w for _, w in both)
+    curve = list(rho_along(model, way, start))
     apart = start.copy()
     apart[4:7, 7:] = apart[7:, 4:7] = 0.0
-    straight = replace(flight, amplitude_deg=0.0)
     return Outcome(
         reading=reading,
         rho_m=curve[-1],
         curve_m=np.array(curve),
-        uncorrelated_m=list(rho_along(model, flight, apart))[-1],
-        straight_m=list(rho_along(model, straight, aligned(model, straight, sensors, alignment_s)))[-1],
+        uncorrelated_m=rho_at_end(model, way, apart),
+        straight_m=rho_at_end(model, straight_way, straight),
         alignment_rad=np.sqrt(np.diag(start)[4:7]),
     )
 
@@ -140,11 +144,17 @@ def alignment_noise(model: ErrorsConfig, at: Floats, alignment_s: float) -> Floa
     return np.asarray(into @ np.diag([level**2, level**2, heading**2]) @ into.T)
 
 
-def rho_along(model: ErrorsConfig, flight: Flight, start: Floats) -> Iterator[float]:
-    """rho each SHOWN_S, from the start to the end."""
-    way = fly(flight, STEP_S).way()
+def rho_at_end(model: ErrorsConfig, way: Way, start: Floats) -> float:
+    """rho after the whole way."""
     kf = Kalman(np.zeros(len(start)), start, 7)
-    each = round(SHOWN_S / STEP_S)
+    nav_errors.predict(model, kf, way)
+    return _rho(kf.p, way.states[-1])
+
+
+def rho_along(model: ErrorsConfig, way: Way, start: Floats) -> Iterator[float]:
+    """rho each SHOWN_S, from the start to the end."""
+    kf = Kalman(np.zeros(len(start)), start, 7)
+    each = round(SHOWN_S / way.dt_s)
     yield _rho(kf.p, way.states[0])
     for first in range(0, len(way), each):
         part = way.part(first, first + each)
