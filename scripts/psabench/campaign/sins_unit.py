@@ -118,11 +118,10 @@ class UnitErrors:
 
 
 def draw_pair(e: Experiment, pair: int) -> tuple[UnitErrors, UnitErrors]:
-    """One unit at both experiments: what stays, and a change of `repeatability` of the standard deviation each time."""
-    stays = draw_source(e.seed, f"unit {pair}").normal(size=(4, 3, 3))
-    changes = draw_source(e.seed, f"changes {pair}").normal(size=(2, 4, 3, 3))
-    first, second = (_scaled(e, stays + e.repeatability * c) for c in changes)
-    return first, second
+    """One unit at both experiments: from the first to the second each error changes by `repeatability` of its deviation."""
+    first = draw_source(e.seed, f"unit {pair}").normal(size=(4, 3, 3))
+    change = draw_source(e.seed, f"change {pair}").normal(size=(4, 3, 3))
+    return _scaled(e, first), _scaled(e, first + e.repeatability * change)
 
 
 def _scaled(e: Experiment, z: Floats) -> UnitErrors:

@@ -399,7 +399,7 @@ def _secondary(args: argparse.Namespace) -> int:
     from psabench.sins import secondary_page, secondary_run
 
     params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
-    found = secondary_run.run_secondary(params, args.first, args.second, args.truth)
+    found = secondary_run.run_secondary(params, args.first, args.second)
     print("\n".join(secondary_page.console_lines(found)))
     print(secondary_page.verdict_words(found))
     print(f"report: {secondary_page.write_page(args.out, found)}")

@@ -18,9 +18,9 @@ from psabench.errors import BadInput, expected
 from psabench.native.nav_errors import Way
 from psabench.native.strapdown import Floats, dcm, gravity_mps2, radii_m
 from psabench.places import proto_file
+from psabench.sins.alignment import EARTH_RADPS
 
 NAMED = ("snake", "straight")  # of proto/flights
-EARTH_RADPS = 7.292115e-5
 ALONG: Mapping[str, tuple[float, float, float]] = {  # where an axis of the unit points in the aircraft: right, forward, up
     "right": (1.0, 0.0, 0.0),
     "left": (-1.0, 0.0, 0.0),

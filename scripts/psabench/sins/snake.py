@@ -19,10 +19,11 @@ from psabench.native.kalman import Kalman
 from psabench.native.nav import Floats
 from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import SinsConfig
-from psabench.native.strapdown import gravity_mps2, radii_m
+from psabench.native.strapdown import radii_m
 from psabench.procedures.result import option
+from psabench.sins.alignment import aligned
 from psabench.sins.covariance import READINGS, Reading, predict, read_as
-from psabench.sins.flight import EARTH_RADPS, Flight, fly, read_flight, rest
+from psabench.sins.flight import Flight, fly, read_flight, rest
 from psabench.sins.plan import RotationPlan, read_plan
 
 NAME = "sins-snake"
@@ -95,7 +96,7 @@ def _outcome(
     """both: the flight, and the same without turns."""
     model = error_model(cfg)
     sensors = sensors_left(plan, read_as(reading, cfg))
-    start, straight = (aligned(model, f, sensors, alignment_s) for f, _ in both)
+    start, straight = (start_of(model, f, sensors, alignment_s) for f, _ in both)
     way, straight_way = (w for _, w in both)
     curve = list(rho_along(model, way, start))
     apart = start.copy()
@@ -123,25 +124,9 @@ def sensors_left(plan: RotationPlan, cfg: SinsConfig) -> Floats:
     return np.asarray(found[3:24, 3:24])
 
 
-def aligned(model: ErrorsConfig, flight: Flight, sensors: Floats, alignment_s: float) -> Floats:
-    """Covariance at the start: place and velocity known, attitude from an alignment at rest by the same sensors."""
-    at = rest(flight)
-    n = nav_errors.layout(model)["gamma"].stop
-    p = np.zeros((n, n))
-    by = nav_errors.alignment(model, at)[:, 7:]
-    p[7:, 7:] = sensors
-    p[4:7, 7:] = by @ sensors
-    p[7:, 4:7] = p[4:7, 7:].T
-    p[4:7, 4:7] = by @ sensors @ by.T + alignment_noise(model, at, alignment_s)
-    return p
-
-
-def alignment_noise(model: ErrorsConfig, at: Floats, alignment_s: float) -> Floats:
-    """Covariance of beta by white noise alone: mean force over g tilts, mean east rate over u cos lat turns, and the tilt too."""
-    level = model.accel_noise_mps2_rts / gravity_mps2(at[0], at[2]) / math.sqrt(alignment_s)
-    heading = model.gyro_noise_radps_rts / math.sqrt(alignment_s) / (EARTH_RADPS * math.cos(at[0]))
-    into = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, math.tan(at[0]), 1.0]])
-    return np.asarray(into @ np.diag([level**2, level**2, heading**2]) @ into.T)
+def start_of(model: ErrorsConfig, flight: Flight, sensors: Floats, alignment_s: float) -> Floats:
+    """Covariance at the start of a flight, after an alignment by the same sensors."""
+    return aligned(model, rest(flight), np.zeros(len(sensors)), sensors, alignment_s)[1]
 
 
 def rho_at_end(model: ErrorsConfig, way: Way, start: Floats) -> float:
