@@ -75,9 +75,10 @@ def params_of(e: Experiment) -> SecondaryParams:
 def run_pairs(e: Experiment, count: int, progress: Progress) -> list[Pair]:
     """Pairs 0 to count - 1: each the same whichever others are run."""
     found = []
-    for k in range(count):
-        found.append(estimate_pair(e, k))
-        progress("pairs", k + 1, count)
+    with progress.step("pairs of experiments", count) as done:
+        for k in range(count):
+            found.append(estimate_pair(e, k))
+            done()
     return found
 
 

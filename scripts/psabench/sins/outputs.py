@@ -26,6 +26,7 @@ COLUMNS = (*PLAIN, *QUATERNION, *RATES)
 FORMATS = ("%.3f", "%.10f", "%.10f", "%.5f", "%.5f", *["%.9f"] * 4, *["%.8f"] * 3)
 MOST_TURN_RAD = 0.2  # between rows: beyond it coefficients are too coarse
 NORM = 1e-3  # that a quaternion may be off unity
+DISAGREE_RADPS = math.radians(0.1)  # of attitude and rates, median: the Earth's rate is 0.004 deg/s, drifts are far less
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +101,17 @@ def _check_turns(rates: Floats, dt_s: float, path: Path) -> None:
         raise BadInput(expected(f"rows that are {math.degrees(MOST_TURN_RAD):.0f} deg of a turn apart at most", got, path))
     if most < math.radians(0.1) * dt_s:
         raise BadInput(expected("a unit that turns by more than 0.1 deg/s", f"{math.degrees(most / dt_s):.3f} deg/s", path))
+
+
+def check_axes(outputs: Outputs, where: object) -> None:
+    """Raises BadInput where the rates do not turn the attitude: axes or signs in another order, attitude from n to b."""
+    c = outputs.c_nb
+    turn = np.swapaxes(c[:-1], 1, 2) @ c[1:]
+    skew = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], -1)
+    off = float(np.median(np.linalg.norm(skew / outputs.dt_s - outputs.w_b_radps[1:], axis=1)))
+    if off > DISAGREE_RADPS:
+        got = f"a difference of {math.degrees(off):.2f} deg/s: axes in another order, or an attitude from n to b"
+        raise BadInput(expected("body rates that turn the attitude", got, where))
 
 
 def _of_quaternions(q: Floats, path: Path) -> Floats:

@@ -22,7 +22,7 @@ from psabench.native.sins import Gauge
 from psabench.native.strapdown import gravity_mps2, radii_m
 from psabench.sins.alignment import aligned
 from psabench.sins.covariance import GAMMA_AT
-from psabench.sins.outputs import Outputs, Point
+from psabench.sins.outputs import Outputs, Point, check_axes
 
 UPDATE_S = 1.0  # between measurements
 # At this size the equations of the first order miss the errors by 2 % (docs/procedures/sins_secondary.md).
@@ -161,15 +161,16 @@ def check_linear(errors: Errors, where: object) -> None:
 
 
 def check_fit(nis: float, where: object) -> None:
-    """Raises BadInput for outputs that do not follow the equations: jumps, other axes, errors beyond the first order."""
+    """Raises BadInput for outputs that do not follow the equations: jumps, errors beyond the first order."""
     if not nis <= NIS_MOST:
-        got = f"{nis:.1f}: a jump, another order of axes, or errors too large for a linear model"
+        got = f"{nis:.1f}: a jump, or errors too large for a linear model"
         raise BadInput(expected(f"innovations of a mean square of {NIS_MOST:g} variances at most", got, where))
 
 
 def calibrate(outputs: Outputs, point: Point, cfg: SecondaryConfig | None = None, *, where: object = "outputs") -> Secondary:
     """The sensors' errors from one run. Raises BadInput for errors that are not linear."""
     cfg = cfg or SecondaryConfig()
+    check_axes(outputs, where)
     errors = errors_of(outputs, point)
     check_linear(errors, where)
     model, way, sd = cfg.model(), way_of(outputs, point), cfg.prior_sd()
@@ -212,6 +213,7 @@ def compensate(found: Secondary, outputs: Outputs, *, where: object = "outputs")
     """Errors that the constants predict are taken off another run's. Raises BadInput for errors that are not linear.
 
     The run starts at the table's point after an alignment at rest, whose error follows from the same constants."""
+    check_axes(outputs, where)
     before = errors_of(outputs, found.point)
     check_linear(before, where)
     model, way = found.config.model(), way_of(outputs, found.point)
