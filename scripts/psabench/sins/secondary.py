@@ -25,6 +25,7 @@ from psabench.sins.covariance import GAMMA_AT
 from psabench.sins.outputs import Outputs, Point, check_axes
 
 UPDATE_S = 1.0  # between measurements
+SHOWN_S = 10.0  # between points of a compensated run
 # At this size the equations of the first order miss the errors by 2 % (docs/procedures/sins_secondary.md).
 LINEAR_M = 60_000.0
 # Innovations of a unit that follows the equations stay far below 1: what it gives out is smooth, place_sd_m and velocity_sd_mps leave
@@ -220,7 +221,7 @@ def compensate(found: Secondary, outputs: Outputs, *, where: object = "outputs")
     constants = slice(found.rows["nu"].start, len(found.x))
     x, p = found.x[constants], found.covariance[constants, constants]
     kf = Kalman(*aligned(model, way.states[0], x, p, found.config.alignment_s), constants.start)
-    each = max(round(UPDATE_S / way.dt_s), 1)
+    each = max(round(SHOWN_S / way.dt_s), 1)
     at = list(range(0, len(way) + 1, each))
     predicted, sd = [kf.x[:4]], [np.sqrt(np.diag(kf.p)[:2])]
     for first in at[:-1]:

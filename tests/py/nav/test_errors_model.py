@@ -46,7 +46,7 @@ class Case:
     duration_s: float
 
 
-CASES = {"fixed": Case(FIXED, 3600.0), "free": Case(FREE, 900.0), "damped": Case(DAMPED, 200.0)}
+CASES = {"fixed": Case(FIXED, 1800.0), "free": Case(FREE, 600.0), "damped": Case(DAMPED, 120.0)}
 
 
 @cache
@@ -155,7 +155,7 @@ def test_the_alignment_is_that_of_a_unit_that_levels_and_finds_north() -> None:
 def test_white_noise_walks() -> None:
     """q of a step: density squared times its length in beta and dv; twice half a step is a step."""
     cfg = ErrorsConfig(gyro_noise_radps_rts=2e-7, accel_noise_mps2_rts=3e-3)
-    _, q = nav_errors.step(cfg, flown(900.0).way(), 7)
+    _, q = nav_errors.step(cfg, flown(600.0).way(), 7)
     want = np.array([0.0, 0.0, 9e-6, 9e-6, 4e-14, 4e-14, 4e-14]) * DT_S
     assert q == pytest.approx(np.diag(want))
 
@@ -167,7 +167,7 @@ def test_a_configuration_out_of_range_is_refused_with_its_field(field: str) -> N
 
 
 def test_a_way_that_is_no_way_is_refused_with_its_step() -> None:
-    way = flown(900.0).way().part(0, 10)
+    way = flown(600.0).way().part(0, 10)
     cfg = ErrorsConfig()
     kf = Kalman(np.zeros(28), np.zeros((28, 28)), 7)
     way.w_b_radps[3, 1] = np.nan

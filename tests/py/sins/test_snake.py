@@ -75,10 +75,10 @@ def test_steep_banks_rectify_misalignments() -> None:
 
 
 def test_the_increments_of_a_flight_bring_an_ideal_unit_home() -> None:
-    flown = fly(read_flight("snake"), 0.1)
+    flown = fly(read_flight("snake"), 0.2)
     unit = Strapdown(State.of(flown.states[0]), height_fixed=True)
-    unit.advance(flown.dtheta_rad, flown.dv_mps, 0.1)
-    assert math.hypot(*end_error(unit.state, flown)) < 5.0
+    unit.advance(flown.dtheta_rad, flown.dv_mps, flown.dt_s)
+    assert math.hypot(*end_error(unit.state, flown)) < 10.0
 
 
 def test_a_flight_is_read_and_refused(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def fly_unit(flown: Flown, c: Floats, rng: np.random.Generator | None, cfg: Erro
 def test_drawn_units_fly_as_far_off_as_the_covariance_says(reading: str) -> None:
     """The spread of the nonlinear ends against rho, within 3 % when the draws' own covariance takes the place of the true one; and
     with noise within three standard deviations of a sample of this size."""
-    count, rng = 200, np.random.default_rng(11)
+    count, rng = 150, np.random.default_rng(11)
     cfg = SinsConfig()
     model = snake.error_model(cfg)
     quiet = ErrorsConfig(gyro_noise_radps_rts=1e-10, accel_noise_mps2_rts=1e-6)  # hardly any: the sample's covariance is singular
