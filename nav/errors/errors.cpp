@@ -3,9 +3,9 @@
 #include "nav/common/nav_check.hpp"
 #include "nav/common/nav_math.hpp"
 
-constexpr double TURN_MAX_RAD = 0.5;                    /* in a step: the series below ends at 1e-6 of it */
-constexpr double LATITUDE_MAX_RAD = 89.9 * NAV_DEG;     /* as of the strapdown integration */
-constexpr int NOT_VERTICAL[] = {0, 1, 3, 4, 6, 7, 8};   /* of the nine moving states */
+constexpr double TURN_MAX_RAD = 0.5;                  /* in a step: the series below ends at 1e-6 of it */
+constexpr double LATITUDE_MAX_RAD = 89.9 * NAV_DEG;   /* as of the strapdown integration */
+constexpr int NOT_VERTICAL[] = {0, 1, 3, 4, 6, 7, 8}; /* of the nine moving states */
 constexpr int ALL_MOVING[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
 
 #define REAL(field, low, high, want)  CHECK_DOUBLE(struct nav_errors_cfg, field, low, high, want)
@@ -91,9 +91,10 @@ int nav_errors_step(const struct nav_errors_cfg *cfg, const struct nav_state *at
     if (status != NAV_OK) return status;
     const mat3 mean_c = mat3(Eigen::Map<const mat3_rows>(at->C_nb)) * mean_turn(w * dt_s);
     const errors_square a = errors_rates(cfg, at, mean_c * f);
+    /* To the second order. Lazy products: those of other sizes than 4 take memory of the heap. */
     const errors_square half = errors_square::Identity() + 0.5 * dt_s * a;
-    const errors_square move = errors_square::Identity() + dt_s * a * half; /* to the second order */
-    const errors_drive drive = half * errors_of_sensors(mean_c, w, f) * dt_s;
+    const errors_square move = errors_square::Identity() + dt_s * errors_square(a.lazyProduct(half));
+    const errors_drive drive = dt_s * errors_drive(half.lazyProduct(errors_of_sensors(mean_c, w, f)));
     const int moving = moving_of(cfg);
     const int *kept = moving == 9 ? ALL_MOVING : NOT_VERTICAL;
     for (int i = 0; i < moving; i++) {

@@ -3,7 +3,8 @@
 
 #include "nav/common/nav_math.hpp"
 
-namespace {
+namespace
+{
 
 enum { E, N, U };
 
@@ -26,7 +27,7 @@ Place place_of(const struct nav_errors_cfg *cfg, const struct nav_state *at)
     return p;
 }
 
-vec3 transport(const Place &p)
+vec3 transport_rate(const Place &p)
 {
     const double east = p.v(E) / p.vertical_m;
     return {-p.v(N) / p.meridian_m, east, east * p.tan_lat};
@@ -91,7 +92,7 @@ vec3 errors_earth(double lat_rad)
 errors_square errors_rates(const struct nav_errors_cfg *cfg, const struct nav_state *at, const vec3 &f_n)
 {
     const Place p = place_of(cfg, at);
-    const vec3 u = errors_earth(at->lat_rad), rho = transport(p);
+    const vec3 u = errors_earth(at->lat_rad), rho = transport_rate(p);
     const mat3 v = sins_cross(p.v);
     const mat3 du = earth_by_place(p), rho_r = transport_by_place(p), rho_v = transport_by_velocity(p);
     errors_square a = errors_square::Zero();

@@ -15,16 +15,17 @@ if TYPE_CHECKING:
     from psabench.campaign.sins_unit import Experiment
 
 ABOUT = """\
-Draw strapdown units with sensor errors, let each navigate itself on a rate table in two experiments, calibrate it from the
-first one's outputs and compensate the second. The outputs of the first unit are written as recordings that
+Draw strapdown units with sensor errors, let each navigate itself on a rate table in two experiments, calibrate it from
+the first one's outputs and compensate the second. The outputs of the first unit are written as recordings that
 psabench run sins-calibration-secondary takes.
 """
 EPILOG = """\
-An experiment is a YAML file (proto/sins_experiments): place, plan of rotations, standard deviations of the errors, repeatability.
+An experiment is a YAML file (proto/sins_experiments): place, plan of rotations, standard deviations of the errors,
+repeatability.
 
 examples:
-  psabench campaign sins-secondary                                  the article's two experiments: build/sins/first.csv, second.csv
-  psabench campaign sins-secondary --pairs 12 --repeatability 0.2   how the factor depends on what changes between experiments
+  psabench campaign sins-secondary                                 the article's two experiments, in build/sins
+  psabench campaign sins-secondary --pairs 12 --repeatability 0.2  another change between both experiments
   psabench campaign sins-secondary --experiment mine.yaml --out build/mine
 
 Exit status: 0 done, 2 bad input, 130 ended by Ctrl-C.

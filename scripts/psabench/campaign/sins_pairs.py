@@ -1,4 +1,5 @@
-"""Pairs of experiments with drawn units: the first calibrates, the second is compensated; how much smaller the errors become."""
+"""Pairs of experiments with drawn units: the first calibrates, the second is compensated; how much smaller the errors
+become."""
 
 from __future__ import annotations
 
@@ -96,6 +97,6 @@ def pair_words(pairs: Sequence[Pair], repeatability: float) -> str:
     factors = [p.factor for p in pairs]
     share = sum(f >= 3.0 for f in factors)
     return (
-        f"{len(pairs)} pairs, {100.0 * repeatability:g} % of change between experiments: {np.median(factors):.1f} times less in the "
-        f"median, at least 3 times in {share} of {len(pairs)}"
+        f"{len(pairs)} pairs, {100.0 * repeatability:g} % of change between experiments: {np.median(factors):.1f} times "
+        f"less in the median, at least 3 times in {share} of {len(pairs)}"
     )

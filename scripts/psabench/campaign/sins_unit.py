@@ -1,8 +1,8 @@
 """Drawn strapdown units that navigate themselves on a rate table: the truth of the campaign `sins-secondary`.
 
-Raw increments of a unit with errors, on turns at constant rates, in closed form; an alignment at rest by the mean force and the mean
-rate; navigation by the strapdown integration, as a unit's own computer does it. Shares nothing with the error model and the filter:
-rotations are finite, the errors multiply the increments.
+Raw increments of a unit with errors, on turns at constant rates, in closed form; an alignment at rest by the mean
+force and the mean rate; navigation by the strapdown integration, as a unit's own computer does it. Shares nothing
+with the error model and the filter: rotations are finite, the errors multiply the increments.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,9 @@ class Experiment:
     @property
     def point(self) -> Point:
         """Where the table is."""
-        return Point(lat_rad=math.radians(self.latitude_deg), lon_rad=math.radians(self.longitude_deg), h_m=self.height_m)
+        return Point(
+            lat_rad=math.radians(self.latitude_deg), lon_rad=math.radians(self.longitude_deg), h_m=self.height_m
+        )
 
 
 LIMITS: Mapping[str, tuple[float, float]] = {
@@ -78,7 +81,8 @@ LIMITS: Mapping[str, tuple[float, float]] = {
 
 
 def read_experiment(name: str) -> Experiment:
-    """Of this name (NAMED) or a YAML file with the fields of Experiment. Raises BadInput with the file and the key."""
+    """Of this name (NAMED) or a YAML file with the fields of Experiment. Raises BadInput with the file and the
+    key."""
     import yaml
 
     path = proto_file(f"sins_experiments/{name}.yaml") if name in NAMED else Path(name)
@@ -91,7 +95,8 @@ def read_experiment(name: str) -> Experiment:
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"plan"}:
         raise BadInput(expected(" ".join(["plan", *LIMITS]), " ".join(map(str, found or ())), path))
     plan = found.pop("plan", Experiment().plan)
-    return Experiment(plan=str(plan), **{k: _number(v, k, path) for k, v in found.items()})
+    numbers: dict[str, Any] = {k: _number(v, k, path) for k, v in found.items()}
+    return Experiment(plan=str(plan), **numbers)
 
 
 def _number(value: object, key: str, path: Path) -> float:
@@ -118,7 +123,8 @@ class UnitErrors:
 
 
 def draw_pair(e: Experiment, pair: int) -> tuple[UnitErrors, UnitErrors]:
-    """One unit at both experiments: from the first to the second each error changes by `repeatability` of its deviation."""
+    """One unit at both experiments: from the first to the second each error changes by `repeatability` of its
+    deviation."""
     first = draw_source(e.seed, f"unit {pair}").normal(size=(4, 3, 3))
     change = draw_source(e.seed, f"change {pair}").normal(size=(4, 3, 3))
     return _scaled(e, first), _scaled(e, first + e.repeatability * change)
@@ -154,7 +160,7 @@ def run_unit(e: Experiment, errors: UnitErrors, rng: np.random.Generator) -> Out
 def _outputs(e: Experiment, rows: Floats, rates: Floats) -> Outputs:
     assert rows.shape == (len(rates), ROW)
     return Outputs(
-        t_s=e.output_s * np.arange(len(rows)),
+        t_s=e.output_s * np.arange(len(rows), dtype=np.float64),
         dt_s=e.output_s,
         lat_rad=rows[:, 0],
         lon_rad=rows[:, 1],
@@ -209,9 +215,9 @@ def ideal(e: Experiment, c_nb: Floats, turns: Sequence[Turn]) -> Iterator[tuple[
     """Exact increments of a unit without errors: b turns at a constant rate, so a vector of n goes round in b."""
     for turn in turns:
         axis, count = np.array(turn.axis_b), round(turn.duration_s / e.sample_s)
-        angles = turn.rate_radps * e.sample_s * np.arange(count + 1)
+        angles: Floats = turn.rate_radps * e.sample_s * np.arange(count + 1, dtype=np.float64)
         u_b, g_b = c_nb.T @ earth_rate(e), c_nb.T @ gravity(e)
-        step = axis * turn.rate_radps * e.sample_s
+        step: Floats = axis * turn.rate_radps * e.sample_s
         yield step + _round_mean(axis, angles, u_b) * e.sample_s, _round_mean(axis, angles, g_b) * e.sample_s
         c_nb = c_nb @ _turned(axis, turn.rate_radps * count * e.sample_s)
 

@@ -27,7 +27,7 @@ class Kalman:
         """Scalars z = h x, rows of h. Returns rows (innovation, its variance), each before it was taken."""
         out = (InnovationStruct * len(z))()
         _check("update", library().kf_update(self.handle, _doubles(h), _doubles(z), _doubles(variance), len(z), out))
-        return np.frombuffer(out, np.float64).reshape(-1, 2)
+        return np.array([[i.value, i.variance] for i in out])
 
     @property
     def x(self) -> Floats:

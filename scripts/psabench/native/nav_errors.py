@@ -1,7 +1,8 @@
 """Errors of a navigating strapdown unit along its way: errors.h of libpsabench-nav, from Python.
 
-n is east, north, up, b the unit's axes. Errors are measured less true: dr in m, dv in m/s, beta of Chat = (I + [beta x]) C, then the
-sensors' constants. A way is rows of states as `psabench.native.strapdown` gives them, and mean rates and forces of the steps.
+n is east, north, up, b the unit's axes. Errors are measured less true: dr in m, dv in m/s, beta of Chat = (I + [beta
+x]) C, then the sensors' constants. A way is rows of states as `psabench.native.strapdown` gives them, and mean rates
+and forces of the steps.
 """
 
 from __future__ import annotations
@@ -89,7 +90,9 @@ def predict(cfg: ErrorsConfig, kf: Kalman, way: Way) -> None:
 def alignment(cfg: ErrorsConfig, state: Floats) -> Floats:
     """beta (3, n) by the constants after levelling and gyrocompassing at rest in this state. Raises Refused."""
     out = np.empty((3, layout(cfg)["gamma"].stop))
-    _check(library().errors_alignment(cfg.struct(), _rows(state[None], ROW).ctypes.data, out.ctypes.data), "alignment", 0)
+    _check(
+        library().errors_alignment(cfg.struct(), _rows(state[None], ROW).ctypes.data, out.ctypes.data), "alignment", 0
+    )
     return out
 
 

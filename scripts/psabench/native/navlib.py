@@ -1,4 +1,5 @@
-"""libpsabench-nav as ctypes sees it: declared here, in `sinslib` and `errorslib`, used by `nav`, `nav_mc`, `sins`. Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here, in `sinslib` and `errorslib`, used by `nav`, `nav_mc`, `sins`.
+Manual: nav.h."""
 
 from __future__ import annotations
 
@@ -213,7 +214,12 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 class NavLibrary(SharedLibrary):
     """The functions of nav.h, nav_mc.h, kf.h, sins.h, strapdown.h and errors.h."""
 
-    abi, prefix, variable, prototypes = ABI, "nav_", "PSABENCH_NAV_LIB", PROTOTYPES | SINS_PROTOTYPES | ERRORS_PROTOTYPES
+    abi, prefix, variable, prototypes = (
+        ABI,
+        "nav_",
+        "PSABENCH_NAV_LIB",
+        PROTOTYPES | SINS_PROTOTYPES | ERRORS_PROTOTYPES,
+    )
 
 
 @cache

@@ -129,9 +129,13 @@ OF_UNITS: Mapping[str, Mapping[str, Any]] = {
     "--first": {
         "type": Path,
         "metavar": "FILE",
-        "help": "recording of the experiment that calibrates: what the unit gave out, CSV (docs/procedures/sins_secondary.md)",
+        "help": "recording of the experiment that calibrates: what the unit gave out, CSV",
     },
-    "--second": {"type": Path, "metavar": "FILE", "help": "recording of the experiment that is compensated; none: calibrate alone"},
+    "--second": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "recording of the experiment that is compensated; none: calibrate alone",
+    },
 }
 
 

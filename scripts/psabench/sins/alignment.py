@@ -15,7 +15,8 @@ EARTH_RADPS = 7.292115e-5
 
 
 def aligned(model: ErrorsConfig, at: Floats, x: Floats, p: Floats, alignment_s: float) -> tuple[Floats, Floats]:
-    """x and P of all states after an alignment in the state `at`, from those of the constants; place and velocity are known.
+    """x and P of all states after an alignment in the state `at`, from those of the constants; place and velocity are
+    known.
 
     The attitude's errors are correlated with the constants that made them."""
     moving = nav_errors.layout(model)["nu"].start
@@ -29,7 +30,8 @@ def aligned(model: ErrorsConfig, at: Floats, x: Floats, p: Floats, alignment_s: 
 
 
 def alignment_noise(model: ErrorsConfig, at: Floats, alignment_s: float) -> Floats:
-    """Covariance of beta by white noise alone: mean force over g tilts, mean east rate over u cos lat turns, and the tilt too."""
+    """Covariance of beta by white noise alone: mean force over g tilts, mean east rate over u cos lat turns, and the
+    tilt too."""
     level = model.accel_noise_mps2_rts / gravity_mps2(at[0], at[2]) / math.sqrt(alignment_s)
     heading = model.gyro_noise_radps_rts / math.sqrt(alignment_s) / (EARTH_RADPS * math.cos(at[0]))
     into = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, math.tan(at[0]), 1.0]])

@@ -1,8 +1,8 @@
 """A level flight with a heading that swings, as data, and what an ideal unit measures on it.
 
-n is east, north, up, b the unit's axes as `axes` mounts them. The aircraft banks so that a turn has no side force. Place comes from the velocity by
-Simpson's rule over half steps; rates and forces are those of the equations of motion at each instant, so that increments differ from
-the exact ones by the rule's error alone.
+n is east, north, up, b the unit's axes as `axes` mounts them. The aircraft banks so that a turn has no side force.
+Place comes from the velocity by Simpson's rule over half steps; rates and forces are those of the equations of motion
+at each instant, so that increments differ from the exact ones by the rule's error alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from psabench.places import proto_file
 from psabench.sins.alignment import EARTH_RADPS
 
 NAMED = ("snake", "straight")  # of proto/flights
-ALONG: Mapping[str, tuple[float, float, float]] = {  # where an axis of the unit points in the aircraft: right, forward, up
+ALONG: Mapping[
+    str, tuple[float, float, float]
+] = {  # where an axis of the unit points in the aircraft: right, forward, up
     "right": (1.0, 0.0, 0.0),
     "left": (-1.0, 0.0, 0.0),
     "forward": (0.0, 1.0, 0.0),
@@ -70,7 +72,9 @@ class Flight:
     def bank_deg(self) -> float:
         """The steepest."""
         rate = math.radians(self.amplitude_deg) * 2.0 * math.pi / self.period_s
-        return math.degrees(math.atan(self.speed_mps * rate / gravity_mps2(math.radians(self.latitude_deg), self.height_m)))
+        return math.degrees(
+            math.atan(self.speed_mps * rate / gravity_mps2(math.radians(self.latitude_deg), self.height_m))
+        )
 
 
 def read_flight(name: str) -> Flight:
@@ -130,7 +134,7 @@ class Flown:
 def fly(flight: Flight, dt_s: float) -> Flown:
     """The flight in steps of dt_s."""
     n = round(flight.duration_s / dt_s)
-    t_s = 0.5 * dt_s * np.arange(2 * n + 1)
+    t_s: Floats = 0.5 * dt_s * np.arange(2 * n + 1, dtype=np.float64)
     place = _places(flight, t_s)
     w_a, f_a, c_na, v_n = _felt(flight, t_s, place[:, 0])
     w_b, f_b, c_nb = w_a @ flight.mounting, f_a @ flight.mounting, c_na @ flight.mounting
@@ -196,5 +200,3 @@ def _attitude(psi: Floats, bank: Floats) -> Floats:
     s, c, sr, cr, z = np.sin(psi), np.cos(psi), np.sin(bank), np.cos(bank), np.zeros_like(psi)
     rows = [[c * cr, s, c * sr], [-s * cr, c, -s * sr], [-sr, z, cr]]
     return np.stack([np.stack(r, -1) for r in rows], -2)
-
-

@@ -1,7 +1,9 @@
-"""What a navigating unit gives out ("secondary information"): time, place, velocity, attitude, body rates; CSV files of it.
+"""What a navigating unit gives out ("secondary information"): time, place, velocity, attitude, body rates; CSV files
+of it.
 
-A row at equal intervals: place and velocity (east, north) by the unit's own navigation, its attitude as a quaternion of C_nb (b to
-east, north, up) or as heading, pitch and roll of right, forward, up, and the mean body rates in inertial space since the row before.
+A row at equal intervals: place and velocity (east, north) by the unit's own navigation, its attitude as a quaternion
+of C_nb (b to east, north, up) or as heading, pitch and roll of right, forward, up, and the mean body rates in
+inertial space since the row before.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ COLUMNS = (*PLAIN, *QUATERNION, *RATES)
 FORMATS = ("%.3f", "%.10f", "%.10f", "%.5f", "%.5f", *["%.9f"] * 4, *["%.8f"] * 3)
 MOST_TURN_RAD = 0.2  # between rows: beyond it coefficients are too coarse
 NORM = 1e-3  # that a quaternion may be off unity
-DISAGREE_RADPS = math.radians(0.1)  # of attitude and rates, median: the Earth's rate is 0.004 deg/s, drifts are far less
+DISAGREE_RADPS = math.radians(
+    0.1
+)  # of attitude and rates, median: the Earth's rate is 0.004 deg/s, drifts are far less
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +59,8 @@ class Outputs:
 
 
 def read_outputs(path: Path) -> Outputs:
-    """A file of COLUMNS, or with ANGLES for the quaternion. Raises BadInput with the file, and the row or the column."""
+    """A file of COLUMNS, or with ANGLES for the quaternion. Raises BadInput with the file, and the row or the
+    column."""
     names, numbers = _read_table(path)
     columns = {name: numbers[:, k] for k, name in enumerate(names)}
     attitude = QUATERNION if set(QUATERNION) <= set(names) else ANGLES
@@ -98,16 +103,23 @@ def _check_turns(rates: Floats, dt_s: float, path: Path) -> None:
     most = float(np.linalg.norm(rates, axis=1).max()) * dt_s
     if most > MOST_TURN_RAD:
         got = f"{math.degrees(most):.0f} deg"
-        raise BadInput(expected(f"rows that are {math.degrees(MOST_TURN_RAD):.0f} deg of a turn apart at most", got, path))
+        raise BadInput(
+            expected(f"rows that are {math.degrees(MOST_TURN_RAD):.0f} deg of a turn apart at most", got, path)
+        )
     if most < math.radians(0.1) * dt_s:
-        raise BadInput(expected("a unit that turns by more than 0.1 deg/s", f"{math.degrees(most / dt_s):.3f} deg/s", path))
+        raise BadInput(
+            expected("a unit that turns by more than 0.1 deg/s", f"{math.degrees(most / dt_s):.3f} deg/s", path)
+        )
 
 
 def check_axes(outputs: Outputs, where: object) -> None:
-    """Raises BadInput where the rates do not turn the attitude: axes or signs in another order, attitude from n to b."""
+    """Raises BadInput where the rates do not turn the attitude: axes or signs in another order, attitude from n to
+    b."""
     c = outputs.c_nb
     turn = np.swapaxes(c[:-1], 1, 2) @ c[1:]
-    skew = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], -1)
+    skew = 0.5 * np.stack(
+        [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], -1
+    )
     off = float(np.median(np.linalg.norm(skew / outputs.dt_s - outputs.w_b_radps[1:], axis=1)))
     if off > DISAGREE_RADPS:
         got = f"a difference of {math.degrees(off):.2f} deg/s: axes in another order, or an attitude from n to b"

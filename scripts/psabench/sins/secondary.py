@@ -1,8 +1,9 @@
 """Calibration from what a navigating unit gives out on a rate table, its true place being known.
 
-The unit is coarsely calibrated, aligned and navigates while the table turns it. Its errors of place and velocity follow linear
-equations (`psabench.native.nav_errors`), whose constants are the sensors' errors: a Kalman filter finds them. With them the errors of
-another run are predicted and taken off. Attitudes and rates are coefficients alone. Pure: arrays in, arrays out.
+The unit is coarsely calibrated, aligned and navigates while the table turns it. Its errors of place and velocity
+follow linear equations (`psabench.native.nav_errors`), whose constants are the sensors' errors: a Kalman filter finds
+them. With them the errors of another run are predicted and taken off. Attitudes and rates are coefficients alone.
+Pure: arrays in, arrays out.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ UPDATE_S = 1.0  # between measurements
 SHOWN_S = 10.0  # between points of a compensated run
 # At this size the equations of the first order miss the errors by 2 % (docs/procedures/sins_secondary.md).
 LINEAR_M = 60_000.0
-# Innovations of a unit that follows the equations stay far below 1: what it gives out is smooth, place_sd_m and velocity_sd_mps leave
-# room for the second order. Above this they do not describe it.
+# Innovations of a unit that follows the equations stay far below 1: what it gives out is smooth, place_sd_m and
+# velocity_sd_mps leave room for the second order. Above this they do not describe it.
 NIS_MOST = 5.0
 
 
@@ -168,7 +169,9 @@ def check_fit(nis: float, where: object) -> None:
         raise BadInput(expected(f"innovations of a mean square of {NIS_MOST:g} variances at most", got, where))
 
 
-def calibrate(outputs: Outputs, point: Point, cfg: SecondaryConfig | None = None, *, where: object = "outputs") -> Secondary:
+def calibrate(
+    outputs: Outputs, point: Point, cfg: SecondaryConfig | None = None, *, where: object = "outputs"
+) -> Secondary:
     """The sensors' errors from one run. Raises BadInput for errors that are not linear."""
     cfg = cfg or SecondaryConfig()
     check_axes(outputs, where)

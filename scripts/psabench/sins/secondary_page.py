@@ -31,7 +31,7 @@ NOTES = (
 
 def estimate_rows(found: Secondary) -> list[tuple[str, float, float, str]]:
     """Name, value, standard deviation, unit of every constant."""
-    rows = []
+    rows: list[tuple[str, float, float, str]] = []
     for name, scale, unit in _constants(found):
         k = found.rows["nu"].start + len(rows)
         rows.append((name, float(found.x[k] / scale), float(np.sqrt(found.covariance[k, k]) / scale), unit))
@@ -151,7 +151,11 @@ def html_page(r: SecondaryResult, *more: str) -> str:
     """The whole page, with more sections. Same input, same bytes."""
     c = r.compensated
     pictures = () if c is None else (figure(draw_fig1(c), "As fig. 1 of the article."), figure(draw_left(c)))
-    facts = {"calibrates": r.first, "compensated": r.second or "none", "mean square of innovations": f"{r.found.nis:.2f}"}
+    facts = {
+        "calibrates": r.first,
+        "compensated": r.second or "none",
+        "mean square of innovations": f"{r.found.nis:.2f}",
+    }
     body = [
         verdict_line(verdict_words(r), r.within),
         section("Errors of place", html_table(error_table(r)), *pictures),

@@ -1,4 +1,5 @@
-"""`psabench run sins-calibration-secondary`: recordings of a unit's outputs in, sensors' errors and a compensated run out."""
+"""`psabench run sins-calibration-secondary`: recordings of a unit's outputs in, sensors' errors and a compensated run
+out."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Autonomous navigation after a calibration: the article's flight by covariance.
 
-The unit starts with what a calibration on the table leaves of its sensors' errors, is levelled and finds north at rest, and flies.
-rho = a sqrt(var(dlon) cos^2 lat + var(dlat)), a the semi-major axis, is the article's measure.
-The sensors' covariance is that of the table's filter with all its correlations; the alignment's errors follow from those same errors.
+The unit starts with what a calibration on the table leaves of its sensors' errors, is levelled and finds north at
+rest, and flies. rho = a sqrt(var(dlon) cos^2 lat + var(dlat)), a the semi-major axis, is the article's measure. The
+sensors' covariance is that of the table's filter with all its correlations; the alignment's errors follow from those
+same errors.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Every column of the error model against central differences of the nonlinear strapdown integration on a flight with turns."""
+"""Every column of the error model against central differences of the nonlinear strapdown integration on a flight with
+turns."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from tests.py.support.sins_truth import ARCMIN, DEGPH
 
 Floats = np.ndarray
 DT_S, MODEL_S = 0.5, 0.5  # of the integration; steps of the model
-# Steps of the central differences: what the article's priors leave after a calibration, large enough to be far from rounding.
+# Steps of the central differences: what a calibration leaves, large enough to be far from rounding.
 STEPS = {
     "dr": 100.0,
     "dv": 0.1,
@@ -87,7 +88,9 @@ def damp(s: State, true_h_m: float, cfg: ErrorsConfig) -> State:
     """The vertical channel is held by a height that is right."""
     off = s.h_m - true_h_m
     v = s.v_n_mps - np.array([0.0, 0.0, cfg.damping_per_s2 * off * DT_S])
-    return State(lat_rad=s.lat_rad, lon_rad=s.lon_rad, h_m=s.h_m - cfg.damping_per_s * off * DT_S, v_n_mps=v, C_nb=s.C_nb)
+    return State(
+        lat_rad=s.lat_rad, lon_rad=s.lon_rad, h_m=s.h_m - cfg.damping_per_s * off * DT_S, v_n_mps=v, C_nb=s.C_nb
+    )
 
 
 def errors(s: State, row: Floats) -> Floats:
@@ -130,11 +133,14 @@ def test_every_column_is_the_central_difference_of_the_nonlinear_integration(nam
         model[kept[: len(phi)]] = phi[:, column]
         for low, high in SCALES:
             most = np.abs(slope[low:high]).max()
-            assert np.abs(model - slope)[low:high].max() < 0.01 * most + 1e-9, f"{name}: state {k}, rows {low} to {high}"
+            assert np.abs(model - slope)[low:high].max() < 0.01 * most + 1e-9, (
+                f"{name}: state {k}, rows {low} to {high}"
+            )
 
 
 def test_the_alignment_is_that_of_a_unit_that_levels_and_finds_north() -> None:
-    """Exact triads of the specific force and the Earth's rate, as the unit measures them, against the model's rows."""
+    """Exact triads of the specific force and the Earth's rate, as the unit measures them, against the model's
+    rows."""
     rng = np.random.default_rng(4)
     row = fly(Flight(duration_s=1.0), DT_S).states[0].copy()
     row[3:6] = 0.0
@@ -142,7 +148,9 @@ def test_the_alignment_is_that_of_a_unit_that_levels_and_finds_north() -> None:
     u = 7.292115e-5 * np.array([0.0, math.cos(row[0]), math.sin(row[0])])
     g = np.array([0.0, 0.0, 9.78])
     x = np.zeros(31)
-    x[7:] = np.concatenate([rng.normal(0, 0.01 * DEGPH, 3), rng.normal(0, 1e-5, 9), rng.normal(0, 1e-4, 3), rng.normal(0, 1e-5, 9)])
+    x[7:] = np.concatenate(
+        [rng.normal(0, 0.01 * DEGPH, 3), rng.normal(0, 1e-5, 9), rng.normal(0, 1e-4, 3), rng.normal(0, 1e-5, 9)]
+    )
     w = (np.eye(3) + x[10:19].reshape(3, 3)) @ c.T @ u + x[7:10]
     f = (np.eye(3) + x[22:31].reshape(3, 3)) @ c.T @ g + x[19:22]
     up = f / np.linalg.norm(f)
@@ -171,7 +179,7 @@ def test_a_way_that_is_no_way_is_refused_with_its_step() -> None:
     cfg = ErrorsConfig()
     kf = Kalman(np.zeros(28), np.zeros((28, 28)), 7)
     way.w_b_radps[3, 1] = np.nan
-    with pytest.raises(Refused, match="step 3: .*finite"):
+    with pytest.raises(Refused, match=r"step 3: .*finite"):
         nav_errors.predict(cfg, kf, way)
     way.w_b_radps[3, 1] = 3.0  # 0.75 rad in a step
     with pytest.raises(Refused, match="step 3"):

@@ -1,4 +1,5 @@
-"""Calibration from the outputs of a navigating unit: drawn units that integrate their own raw data, the article's two experiments."""
+"""Calibration from the outputs of a navigating unit: drawn units that integrate their own raw data, the article's two
+experiments."""
 
 from __future__ import annotations
 
@@ -69,11 +70,14 @@ def test_the_estimates_are_those_of_the_unit() -> None:
     assert np.abs(off / np.sqrt(np.diag(s.covariance)[7:])).max() < 4.0
     assert np.degrees(s.sd("nu")) * 3600.0 == pytest.approx(np.full(3, 0.0022), rel=0.15)
     assert s.sd("theta")[[0, 4, 8]] == pytest.approx(np.full(3, 1.7e-7), rel=0.2)
-    assert s.sd("gamma")[[0, 2, 5]] == pytest.approx(np.full(3, 2.9e-4), rel=0.02)  # differences alone: sqrt(1/3) of 5e-4
+    assert s.sd("gamma")[[0, 2, 5]] == pytest.approx(
+        np.full(3, 2.9e-4), rel=0.02
+    )  # differences alone: sqrt(1/3) of 5e-4
 
 
 def test_a_unit_that_has_not_changed_is_compensated_to_its_noise() -> None:
-    """The same errors again, other noise: what is left is what the equations of the first order and the noise leave."""
+    """The same errors again, other noise: what is left is what the equations of the first order and the noise
+    leave."""
     e = replace(article(), repeatability=0.0)
     _, second = draw_pair(e, 0)
     done = compensate(calibrated(), run_unit(e, second, np.random.default_rng(5)))
@@ -166,7 +170,9 @@ def test_heading_pitch_and_roll_are_an_attitude_too(recording: Path) -> None:
     ).T
     head = "t_s,lat_deg,lon_deg,ve_mps,vn_mps,heading_deg,pitch_deg,roll_deg,wx_degps,wy_degps,wz_degps"
     other = recording.with_name("angles.csv")
-    np.savetxt(other, np.hstack([rows[:, :5], angles, rows[:, 9:]]), delimiter=",", header=head, comments="", fmt="%.10f")
+    np.savetxt(
+        other, np.hstack([rows[:, :5], angles, rows[:, 9:]]), delimiter=",", header=head, comments="", fmt="%.10f"
+    )
     assert np.abs(read_outputs(other).c_nb - c).max() < 1e-8
 
 
@@ -232,8 +238,8 @@ def test_an_experiment_that_is_none_is_refused(tmp_path: Path, text: str, says: 
 
 
 def test_what_is_left_is_what_has_changed_between_the_experiments() -> None:
-    """Five units, each calibrated once and compensated twice: with twice the change, twice as much is left; the covariance of the
-    estimates is honest."""
+    """Five units, each calibrated once and compensated twice: with twice the change, twice as much is left; the
+    covariance of the estimates is honest."""
     e = replace(article(), seed=1, sample_s=0.05)
     params = sins_pairs.params_of(e)
     left, factors, nees = [], [], []

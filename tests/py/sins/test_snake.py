@@ -1,4 +1,5 @@
-"""Navigation after a calibration: the article's figures by covariance, and by units that fly the nonlinear integration."""
+"""Navigation after a calibration: the article's figures by covariance, and by units that fly the nonlinear
+integration."""
 
 from __future__ import annotations
 
@@ -117,7 +118,8 @@ def end_error(s: State, flown: Flown) -> tuple[float, float]:
 
 
 def fly_unit(flown: Flown, c: Floats, rng: np.random.Generator | None, cfg: ErrorsConfig) -> tuple[float, float]:
-    """End of a unit with constants c (21) in the article's gauge: aligned by exact triads, then the nonlinear integration."""
+    """End of a unit with constants c (21) in the article's gauge: aligned by exact triads, then the nonlinear
+    integration."""
     gyro, accel = (cfg.gyro_noise_radps_rts, cfg.accel_noise_mps2_rts) if rng else (0.0, 0.0)
     draw = rng.standard_normal if rng else np.zeros
     nu, theta, df = c[:3], np.eye(3) + c[3:12].reshape(3, 3), c[12:15]
@@ -146,12 +148,14 @@ def fly_unit(flown: Flown, c: Floats, rng: np.random.Generator | None, cfg: Erro
 
 @pytest.mark.parametrize("reading", ["B", "B, S50"])
 def test_drawn_units_fly_as_far_off_as_the_covariance_says(reading: str) -> None:
-    """The spread of the nonlinear ends against rho, within 3 % when the draws' own covariance takes the place of the true one; and
-    with noise within three standard deviations of a sample of this size."""
+    """The spread of the nonlinear ends against rho, within 3 % when the draws' own covariance takes the place of the
+    true one; and with noise within three standard deviations of a sample of this size."""
     count, rng = 150, np.random.default_rng(11)
     cfg = SinsConfig()
     model = snake.error_model(cfg)
-    quiet = ErrorsConfig(gyro_noise_radps_rts=1e-10, accel_noise_mps2_rts=1e-6)  # hardly any: the sample's covariance is singular
+    quiet = ErrorsConfig(
+        gyro_noise_radps_rts=1e-10, accel_noise_mps2_rts=1e-6
+    )  # hardly any: the sample's covariance is singular
     sensors = snake.sensors_left(read_plan("article"), read_as(READINGS[reading], cfg))
     flown = fly(Flight(), MC_S)
     ideal = np.array(fly_unit(flown, np.zeros(21), None, model))
