@@ -1,4 +1,4 @@
-/* libpsabench-nav: a Kalman filter for problems of many constant and few moving states (docs/sins.md).
+/* libpsabench-nav: a Kalman filter for problems of many constant and few moving states (docs/procedures/sins.md).
  *
  * The first `dynamic` states move, x_d' = Phi [x_d; x_c] + noise of covariance Q; the others are constant, so that a step costs
  * dynamic n instead of n^2. A random walk or a decaying drift is a moving state. Measurements are scalars z = h x + v with
@@ -6,7 +6,7 @@
  *
  * Forms: NAV_KF_JOSEPH keeps P and subtracts w w'/s, w = P h, s = h w + r, which for this gain is Joseph's
  * (I - k h) P (I - k h)' + k r k'; NAV_KF_UD keeps P = U D U', U upper triangular with ones (Bierman 1977: the update of his V.3,
- * weighted Gram-Schmidt of Thornton for the moving rows), and can not lose the positive sign of P.
+ * weighted Gram-Schmidt of Thornton for the moving rows), and cannot lose the positive sign of P.
  * Matrices are row-major. No allocation: the caller owns the memory, one filter for one thread. Functions return NAV_OK or a status
  * below zero (nav.h) and then leave the filter as it was, but for nav_kf_update(), which keeps the scalars before the bad one. */
 #ifndef PSABENCH_NAV_KF_H

@@ -1,4 +1,4 @@
-/* libpsabench-nav: calibration of a strapdown inertial unit on a rate table (docs/sins.md; the Moscow State University method).
+/* libpsabench-nav: calibration of a strapdown inertial unit on a rate table (docs/procedures/sins.md; the Moscow State University method).
  *
  * Frames: n east, north, up at the table; b of the instrument; C (C_nb) takes coordinates in b to n. Convention: error = measured
  * less true. w absolute rate, f specific force, both in b; g_n = (0, 0, g), u the Earth's rate in n.
@@ -89,14 +89,14 @@ struct nav_sins_params { /* what the model holds; in this order in memory: 39 do
     double tau_s;
     double eps_rad[3];
 };
-/* The same instrument in the frame in which the gauge's elements are zero: I + Gamma -> (I + Gamma) R', Theta likewise, C -> C R',
- * exp(delta) -> R exp(delta); lever arms are left. r_out: R, or NULL. Compare estimates with a truth only so. */
+/* The same instrument in the frame in which the gauge's elements are zero: I + Gamma -> (I + Gamma) R',
+ * I + Theta -> (I + Theta) R', C -> C R', exp(delta) -> R exp(delta); lever arms are left. r_out: R, or NULL. Compare estimates with a truth only so. */
 NAV_API int nav_sins_to_gauge(int gauge, struct nav_sins_params *p, double r_out[9]);
 
 typedef struct nav_sins nav_sins;
 NAV_API size_t nav_sins_bytes(void);
 /* c_nb: attitude at the start as far as it is known, row-major, a rotation to 1e-6. feedback 1: what is found goes into the
- * model each second (a first pass); 0: the model stays (covariances, a second pass). */
+ * model after each step (a first pass); 0: the model stays (covariances, a second pass). */
 NAV_API int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, const double c_nb[9],
                            int feedback, nav_sins **out);
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """What the compiled core must not contain: mutable globals, allocation, output, clocks, inexact libm, circles.
 
-Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ and nav/; those of link, scenario, bench and app
-may do all this, but for circles: files, or folders, that call each other, directly or through others. Two compilers or
-machines give equal bytes only while no result depends on a libm whose last digit is its own.
+Usage: check_symbols.py OBJECT_ROOT (build/obj). Reads every object below emu/ and nav/; those of link, scenario, bench
+and app may do all this, but for circles: files, or folders, that call each other, directly or through others. Two
+compilers or machines give equal bytes only while no result depends on a libm whose last digit is its own.
 """
 
 import subprocess

@@ -13,6 +13,7 @@
 #include "board/cfg.h"
 #include "board/field.h"
 #include "board/part.h"
+#include "phys/sensor/mems.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
@@ -96,7 +97,9 @@ struct board_type {
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
     unsigned (*noises)(struct board *b,
                        struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
-    bool analog;                                            /* it has analog inputs; for faults: sample_until() first */
+    /* Its own accelerometer of a channel, where the bench puts no other sensor there; g: the site's. NULL: it has none. */
+    void (*accelerometer)(const struct board *b, unsigned axis, double g_mps2, struct mems_g *m);
+    bool analog; /* it has analog inputs; for faults: sample_until() first */
     void (*digest)(const struct board *b, struct sha256 *s); /* of all that its future depends on */
     void (*truth)(const struct board *b, board_truth_fn *put,
                   void *ctx); /* hidden parameters of the specimen; may be NULL */

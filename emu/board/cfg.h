@@ -32,7 +32,11 @@ struct board_io {
     void (*skip_accel)(void *ctx, unsigned axis, int64_t t_ns);
     double (*temp_degc)(void *ctx, unsigned channel, int64_t t_ns); /* at X, Y, Z sensor and the board itself (3) */
     void (*rate_radps)(void *ctx, int64_t t_ns, double w_ib_b[3]);  /* inertial rate, axes of the unit's case */
-    void (*event)(void *ctx, unsigned event, int64_t t_ns);         /* number in board_type.events; may be NULL */
+    /* Specific force at the unit's origin and inertial rate, axes of the unit's case; and up to which instant after t_ns they are
+     * smooth, if nothing changes abruptly before. */
+    void (*kinematics)(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3]);
+    int64_t (*smooth_ns)(void *ctx, int64_t t_ns);
+    void (*event)(void *ctx, unsigned event, int64_t t_ns); /* number in board_type.events; may be NULL */
     /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
     double (*supply_ratio)(void *ctx, int64_t t_ns);
     const struct board_platform_io *platform; /* NULL: there is none */

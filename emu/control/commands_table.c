@@ -46,15 +46,56 @@ static unsigned axis_index(const struct control_call *call)
     return (unsigned)call->v[0].count - 1;
 }
 
+static void put_shown(cJSON *to, const char *name, double value, bool shown)
+{
+    if (shown) cJSON_AddNumberToObject(to, name, value);
+    else cJSON_AddNullToObject(to, name);
+}
+
 static enum control_outcome do_read(const struct control_call *call)
 {
-    const struct table_reading r = table_read(&call->bench->lab->table, axis_index(call), call->t_ns);
-    cJSON_AddNumberToObject(call->result, "angle_deg", r.angle_deg);
-    cJSON_AddNumberToObject(call->result, "rate_dps", r.rate_dps);
+    const struct table *t = &call->bench->lab->table;
+    const struct table_reading r = table_read(t, axis_index(call), call->t_ns);
+    cJSON_AddNumberToObject(call->result, "t_s", (double)call->t_ns / 1e9);
+    put_shown(call->result, "angle_deg", r.angle_deg, !t->cfg.coarse);
+    put_shown(call->result, "rate_dps", r.rate_dps, !t->cfg.coarse);
     cJSON_AddStringToObject(call->result, "mode", motion_mode_name(r.mode));
     cJSON_AddBoolToObject(call->result, "at_rest", r.at_rest);
     if (r.rest_in_s >= 0) cJSON_AddNumberToObject(call->result, "rest_in_s", r.rest_in_s);
     else cJSON_AddNullToObject(call->result, "rest_in_s"); /* this motion does not end */
+    return CONTROL_DONE;
+}
+
+/* A log of the readout, which the controller of the table keeps: the same numbers as readings at those instants. */
+static bool check_log(const struct control_bench *b, const struct control_value *v, struct control_error *why)
+{
+    const struct table *t = &b->lab->table;
+    (void)v;
+    return !t->cfg.coarse || control_reject_in(why, "state", "this table shows no angles: it is coarse");
+}
+
+static bool is_kept(const struct control_call *call, int64_t from_ns, int64_t last_ns)
+{
+    const int64_t known_ns = table_known_ns(&call->bench->lab->table, axis_index(call));
+    if (from_ns >= known_ns && last_ns <= call->t_ns) return true;
+    return control_expected(&call->control->error, "range", "from_s", NULL,
+                            "instants from %.9g s, where the oldest of the last four motions begins, to now, %.9g s",
+                            (double)known_ns / 1e9, (double)call->t_ns / 1e9);
+}
+
+static enum control_outcome do_log(const struct control_call *call)
+{
+    const struct table *t = &call->bench->lab->table;
+    const int64_t from_ns = (int64_t)nearbyint(call->v[1].real * 1e9),
+                  every_ns = (int64_t)nearbyint(call->v[2].real * 1e9);
+    const unsigned count = (unsigned)call->v[3].count;
+    if (!check_log(call->bench, call->v, &call->control->error)) return CONTROL_REJECTED;
+    if (!is_kept(call, from_ns, from_ns + (int64_t)(count - 1) * every_ns)) return CONTROL_REJECTED;
+    cJSON *angles = cJSON_AddArrayToObject(call->result, "angles_deg");
+    for (unsigned i = 0; i < count; i++) {
+        const struct table_reading r = table_read(t, axis_index(call), from_ns + (int64_t)i * every_ns);
+        cJSON_AddItemToArray(angles, cJSON_CreateNumber(r.angle_deg));
+    }
     return CONTROL_DONE;
 }
 
@@ -144,8 +185,13 @@ static const struct control_command rows[] = {
     {"table.zero", "Sets the readout of an axis at its present position.",
      CONTROL_ARGS(AXIS, {"angle_deg", CONTROL_REAL, false, "deg", -360, 360, .what = "readout angle"}),
      .missing = no_table, .run = do_zero, .changes = true, .scpi = {{"AXIS#:ZERO", NULL}}},
-    {"table.read", "Reads an axis: angle, rate, mode, at rest or not, time until rest (null: never).", CONTROL_ARGS(AXIS), .missing = no_table, .run = do_read,
-     .scpi = {{"AXIS#:POSition?", "angle_deg"}, {"AXIS#:RATE?", "rate_dps"}, {"AXIS#:MODE?", "mode"}, {"AXIS#:REST?", "at_rest"}}},
+    {"table.log", "Reads an axis's log: angles of the readout at past instants, back to its last four motions.",
+     CONTROL_ARGS(AXIS, {"from_s", CONTROL_REAL, false, "s", 0, 1e9, .what = "first instant, time of the bench"},
+      {"every_s", CONTROL_REAL, false, "s", 1e-6, 3600, .what = "interval"},
+      {"count", CONTROL_COUNT, false, NULL, 1, 400, .what = "number of angles"}),
+     .missing = no_table, .check = check_log, .run = do_log, .scpi = {{"AXIS#:LOG?", "angles_deg"}}},
+    {"table.read", "Reads an axis: time of the reading, angle, rate, mode, at rest or not, time until rest (null: never). A coarse table shows no angle and no rate (null).", CONTROL_ARGS(AXIS), .missing = no_table, .run = do_read,
+     .scpi = {{"AXIS#:POSition?", "angle_deg"}, {"AXIS#:RATE?", "rate_dps"}, {"AXIS#:MODE?", "mode"}, {"AXIS#:REST?", "at_rest"}, {"AXIS#:STAMped?", "t_s,angle_deg"}}},
     {"table.reset", "Brings all axes to rest.", NULL, .missing = no_table, .run = do_reset, .changes = true, .scpi = {{"*RST", NULL}}},
 };
 // clang-format on

@@ -14,6 +14,20 @@ struct lab_cfg lab_default(void)
     };
 }
 
+static void set_tilt(struct lab_tilt *t, const double misalignment_rad[3])
+{
+    memcpy(t->misalignment_rad, misalignment_rad, sizeof t->misalignment_rad);
+    pose_start(&t->pose, &(struct site){0});
+    pose_tilt(&t->pose, misalignment_rad);
+}
+
+static const struct pose *tilt_of(struct lab *l, const struct lab_mounting *mounting)
+{
+    const double *askew = mounting->misalignment_rad, *was = l->tilt.misalignment_rad;
+    if (askew[0] != was[0] || askew[1] != was[1] || askew[2] != was[2]) set_tilt(&l->tilt, askew);
+    return &l->tilt.pose;
+}
+
 void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
 {
     *l = (struct lab){.site = cfg->site};
@@ -22,6 +36,7 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
     chamber_init(&l->chamber, &cfg->chamber);
     supply_init(&l->supply, &cfg->supply);
     pose_start(&l->bench, &cfg->site);
+    set_tilt(&l->tilt, (const double[3]){0.0, 0.0, 0.0});
     platform_init(&l->platform, &cfg->platform, &cfg->vehicle, &cfg->site, seed);
 }
 
@@ -43,9 +58,10 @@ bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3])
 }
 
 /* How the case is in the mount: the face of the head or the tilt of the level sensors, then the misalignment. */
-static struct pose case_in_mount(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
+static struct pose case_in_mount(struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
 {
     struct pose p;
+    if (mounting->on == LAB_TABLE || mounting->on == LAB_FIXED) return *tilt_of(l, mounting);
     pose_start(&p, &(struct site){0});
     if (mounting->on == LAB_PLATFORM) p = *platform_level(&l->platform, t_ns);
     if (mounting->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
@@ -112,6 +128,21 @@ void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const do
     pose_into(&in_mount, out->w_radps, out->w_radps);
 }
 
+int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
+{
+    switch (mounting->on) {
+    case LAB_TABLE:
+        return table_smooth_ns(&l->table, t_ns);
+    case LAB_HEAD:
+        return head_smooth_ns(&l->head, t_ns);
+    case LAB_PLATFORM:
+        return platform_smooth_ns(&l->platform, t_ns);
+    case LAB_FIXED:
+        break;
+    }
+    return INT64_MAX;
+}
+
 /* f in the mount's axes: without lever arms the platform's own arithmetic, else by way of the poses. */
 static void mount_force_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                              double f_mps2[3])
@@ -125,12 +156,9 @@ static void mount_force_mps2(struct lab *l, const struct lab_mounting *mounting,
     memcpy(f_mps2, kin.f_mps2, sizeof kin.f_mps2);
 }
 
-static void apply_misalignment(const struct lab_mounting *mounting, double a_mps2[3])
+static void apply_misalignment(struct lab *l, const struct lab_mounting *mounting, double a_mps2[3])
 {
-    struct pose misaligned;
-    pose_start(&misaligned, &(struct site){0});
-    pose_tilt(&misaligned, mounting->misalignment_rad);
-    pose_into(&misaligned, a_mps2, a_mps2);
+    pose_into(tilt_of(l, mounting), a_mps2, a_mps2);
 }
 
 /* -f in the mount's axes. */
@@ -184,7 +212,7 @@ unsigned lab_sensor_row_mps2(struct lab *l, const struct lab_sensor *s, const in
     for (unsigned i = 0; i < n; i++) {
         const enum head_face face = m->on == LAB_HEAD ? head_face(&l->head, t_ns[i]) : HEAD_DIRECT;
         head_sensor_mps2(face, s->cos_alpha0, s->sin_alpha0, a_mps2[i], a_mps2[i]);
-        if (!square) apply_misalignment(m, a_mps2[i]);
+        if (!square) apply_misalignment(l, m, a_mps2[i]);
     }
     return n;
 }

@@ -39,6 +39,12 @@ struct lab_row {
     double a_mps2[LAB_ROW][3];
 };
 
+/* A case that is askew, as it was last: the same angles give the same pose. */
+struct lab_tilt {
+    double misalignment_rad[3];
+    struct pose pose;
+};
+
 struct lab {
     struct site site;
     struct head head;
@@ -48,6 +54,7 @@ struct lab {
     struct pose bench;
     struct platform platform; /* if cfg.present */
     struct lab_row row;
+    struct lab_tilt tilt;
 };
 
 /* A unit's place. All zero: in the centre of the head, square. */
@@ -76,6 +83,10 @@ void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns);
 /* At at_m from the unit's origin, in its case's axes. */
 void lab_kinematics(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], int64_t t_ns,
                     struct kinematics *out);
+
+/* Up to which instant after t_ns rate and force of a unit there are smooth functions of time, if no command comes; INT64_MAX: for
+ * good. Who integrates them cuts there. Of a moving vehicle the platform's grid alone. */
+int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, int64_t t_ns);
 
 /* At the centre of its mount, where lever arms play no part. */
 bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3]);

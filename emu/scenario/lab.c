@@ -125,6 +125,7 @@ static bool load_axes(struct yaml_file *f, const struct yaml_node *node, void *s
 static const struct field table_rows[] = {
     {.key = "base_tilt_x_arcsec", .type = FIELD_REAL, .offset = TABLE(base_tilt_x_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's x"},
     {.key = "base_tilt_y_arcsec", .type = FIELD_REAL, .offset = TABLE(base_tilt_y_arcsec), .min = -36000, .max = 36000, .what = "tilt of the base about the bench's y"},
+    {.key = "coarse", .type = FIELD_BOOL, .offset = TABLE(coarse), .what = "it shows no angles and no rates"},
     {.key = "axes", .type = FIELD_STRUCTS, .offset = TABLE(axis), .present = TABLE(axes), .sub = &scenario_axis_of_table_fields, .load = load_axes, .what = "number of axes, 1 to 3, or a sequence of axes from the outermost"},
 };
 const struct fields scenario_table_fields = FIELDS(table_rows);

@@ -112,7 +112,8 @@ static bool do_unit(struct scpi *s, const struct scpi_unit *u, int64_t t_ns)
     const struct scpi_command *common = find_common(header, u->query);
     if (common) return do_common(s, common, u, t_ns);
     const struct control_command *row = scpi_find_row(s, header, u->query, &how, suffix);
-    if (row && u->query && u->params) return do_limit(s, header, u);
+    const bool of_its_own = row && control_arg_count(row) > scpi_suffixes(how->header);
+    if (row && u->query && u->params && !of_its_own) return do_limit(s, header, u);
     if (row) return do_row(s, row, how, suffix, u, t_ns);
     full[header.n] = '\0';
     return fail_unit(s, -113, full);

@@ -62,15 +62,26 @@ static size_t format_item(const cJSON *j, char *out, size_t cap)
     return (size_t)snprintf(out, cap, "9.91E37"); /* not a number: SCPI-99 volume 1, 7.2.1.5 */
 }
 
+enum { ITEM_MAX = 256 };
+
+/* Appends an item after a comma. */
+static size_t append_item(const cJSON *j, char *text, size_t at, size_t cap)
+{
+    if (at + ITEM_MAX >= cap) return at;
+    if (at) text[at++] = ',';
+    return at + format_item(j, text + at, cap - at);
+}
+
 void scpi_put_fields(struct scpi *s, const cJSON *result, const char *fields)
 {
-    char text[512], name[64];
+    char text[sizeof s->out + 2 * ITEM_MAX] = "", name[64]; /* longer than what scpi_put() takes */
     size_t at = 0;
-    while (*fields && at + 256 < sizeof text) {
+    while (*fields) {
         const size_t n = strcspn(fields, ",");
         snprintf(name, sizeof name, "%.*s", (int)n, fields);
-        if (at) text[at++] = ',';
-        at += format_item(cJSON_GetObjectItemCaseSensitive(result, name), text + at, sizeof text - at);
+        const cJSON *j = cJSON_GetObjectItemCaseSensitive(result, name), *item = NULL;
+        if (!cJSON_IsArray(j)) at = append_item(j, text, at, sizeof text);
+        else cJSON_ArrayForEach(item, j) at = append_item(item, text, at, sizeof text);
         fields += n + (fields[n] == ',');
     }
     scpi_put(s, text);

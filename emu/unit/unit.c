@@ -195,6 +195,22 @@ static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
     for (unsigned i = 0; i < 3; i++) w_ib_b[i] = kin.w_radps[i];
 }
 
+static void case_kinematics(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3])
+{
+    static const double origin_m[3] = {0.0, 0.0, 0.0};
+    const struct unit *u = ctx;
+    struct kinematics kin;
+    lab_kinematics(u->lab, &u->cfg.mounting, origin_m, t_ns, &kin);
+    memcpy(f_b_mps2, kin.f_mps2, sizeof kin.f_mps2);
+    memcpy(w_ib_b_radps, kin.w_radps, sizeof kin.w_radps);
+}
+
+static int64_t smooth_ns(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
+}
+
 /* To what the scenario has it at power-on. */
 static double supply_ratio(void *ctx, int64_t t_ns)
 {
@@ -289,6 +305,8 @@ static void init_board(struct unit *u, struct sched *s)
     io.accel_range = accel_range;
     io.accel_past_ns = accel_past_ns;
     io.skip_accel = skip_accel;
+    io.kinematics = case_kinematics;
+    io.smooth_ns = smooth_ns;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;
@@ -313,10 +331,29 @@ static void init_quartz(struct unit *u, unsigned axis)
                 draws_of(seed, u->sensors_serial, noise[axis]), draws_of(seed, u->sensors_serial, scatter[axis]));
 }
 
-void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
+static void init_mems(struct unit *u, unsigned axis, const struct mems_cfg *m)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
     static const char *const slow_noise[UNIT_AXES] = {"mems.slow.x", "mems.slow.y", "mems.slow.z"};
+    const struct board_cfg *of = &u->cfg.board;
+    mems_init(&u->mems[axis], m, draws_of(of->seed, of->serial, noise[axis]),
+              draws_of(of->seed, of->serial, slow_noise[axis]));
+}
+
+/* A unit with accelerometers of its own has them where the bench puts no other sensor. */
+static void fit_own_accelerometers(struct unit *u)
+{
+    for (unsigned i = 0; u->type->accelerometer && i < UNIT_AXES; i++) {
+        if (u->cfg.axis[i].sensor != UNIT_NO_SENSOR) continue;
+        u->cfg.axis[i].sensor = UNIT_MEMS;
+        u->type->accelerometer(u->board, i, u->lab->site.g_mps2, &u->cfg.axis[i].mems);
+        const struct mems_cfg m = mems_cfg_si(&u->cfg.axis[i].mems, u->lab->site.g_mps2);
+        init_mems(u, i, &m);
+    }
+}
+
+void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, struct sched *s)
+{
     u->cfg = *cfg;
     u->lab = lab;
     u->type = cfg->type;
@@ -329,8 +366,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         u->sensor_faults[i] = NULL;
         u->warm_step[i] = -1;
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
-        mems_init(&u->mems[i], &m, draws_of(cfg->board.seed, cfg->board.serial, noise[i]),
-                  draws_of(cfg->board.seed, cfg->board.serial, slow_noise[i]));
+        init_mems(u, i, &m);
         init_quartz(u, i);
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
@@ -342,6 +378,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
     for (unsigned i = 0; i < UNIT_AXES; i++)
         if (is_quartz(u, i)) chamber_play_add(&u->body, &u->play[i], cfg->axis[i].quartz.play_k);
     init_board(u, s);
+    fit_own_accelerometers(u);
 }
 
 void unit_connect(struct unit *u, const struct board_can_cfg *cfg, struct can_bus *bus, struct sched *s)

@@ -30,7 +30,7 @@ int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_k
     return NAV_OK;
 }
 
-static bool symmetric(int n, const double *p)
+static bool is_symmetric(int n, const double *p)
 {
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++) {
@@ -45,7 +45,7 @@ int nav_kf_set(nav_kf *kf, const double *x, const double *p)
     const int n = kf->n;
     double d[KF_MAX];
     if (!all_finite(p, n * n) || (x && !all_finite(x, n))) return NAV_NOT_FINITE;
-    if (!symmetric(n, p) || !kf_factor(n, p, kf->work, d)) return NAV_SINGULAR;
+    if (!is_symmetric(n, p) || !kf_factor(n, p, kf->work, d)) return NAV_SINGULAR;
     memcpy(kf->p, kf->form == NAV_KF_UD ? kf->work : p, sizeof *p * (size_t)(n * n));
     memcpy(kf->d, d, sizeof *d * (size_t)n);
     for (int i = 0; i < n; i++) kf->x[i] = x ? x[i] : 0.0;

@@ -79,7 +79,7 @@ void kf_ud_update(struct nav_kf *kf, const double *, double r, struct kf_gain *g
 }
 
 /* Gram-Schmidt of the rows of W, weights given: U and D of W diag(weight) W'. */
-static void triangularise(int nd, int n, double (*w)[2 * KF_MAX], const double *weight, double *ut, double *d)
+static void triangularise_rows(int nd, int n, double (*w)[2 * KF_MAX], const double *weight, double *ut, double *d)
 {
     for (int i = nd - 1; i >= 0; i--) {
         double sum = 0.0;
@@ -105,6 +105,8 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
     double uq[KF_MAX * KF_MAX];
     double weight[2 * KF_MAX];
     double w[KF_MAX][2 * KF_MAX];
+    memset(w, 0, sizeof *w * (size_t)nd);
+    memset(weight, 0, sizeof weight);
     if (!kf_factor(nd, q, uq, weight + nd)) return false;
     for (int j = 0; j < n; j++) {
         double *col = kf->p + j * n;
@@ -119,7 +121,7 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
         weight[j] = kf->d[j];
         for (int i = 0; i < nd; i++) w[i][nd + j] = uq[j * nd + i];
     }
-    triangularise(nd, n, w, weight, kf->p, kf->d);
+    triangularise_rows(nd, n, w, weight, kf->p, kf->d);
     return true;
 }
 

@@ -5,7 +5,7 @@
 #define PSABENCH_NAV_RANDOM_HPP
 
 #include "nav/common/nav_math.hpp"
-#include "nav/north/nav_width.hpp"
+#include "nav/common/nav_width.hpp"
 
 #include <cstring>
 

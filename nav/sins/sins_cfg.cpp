@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-/* Priors, noise: the article's (sources sins 1), at Moscow's latitude. */
+/* Priors, noise: the article's (sources instruments 5.1), at Moscow's latitude. */
 void nav_sins_default(struct nav_sins_cfg *cfg)
 {
     *cfg = {};
@@ -72,6 +72,11 @@ static const struct check_rule rules[] = {
     REAL(stand_guard_s, 0.0, 1.0, "from 0 to 1 s"),
 };
 
+double sins_kept_s(const struct nav_sins_cfg *cfg)
+{
+    return 2.0 * cfg->stand_guard_s + 2.0 * cfg->step_s + 0.4;
+}
+
 int nav_sins_check(const struct nav_sins_cfg *cfg, struct nav_refusal *why)
 {
     const int status = check_all(cfg, rules, why);
@@ -82,9 +87,7 @@ int nav_sins_check(const struct nav_sins_cfg *cfg, struct nav_refusal *why)
     if (cfg->lever % 3 == 0 && cfg->lever == 6) return check_refuse(why, NAV_RANGE, "lever", 6.0, "0, 3 or 9");
     if (cfg->lever % 3 != 0) return check_refuse(why, NAV_RANGE, "lever", cfg->lever, "0, 3 or 9");
     if (cfg->base && !cfg->stand) return check_refuse(why, NAV_RANGE, "base", 1.0, "0 without a stand");
-    /* From the sample before the guard to the sample after the filter's step. */
-    const double kept_s = 2.0 * cfg->stand_guard_s + 2.0 * cfg->step_s + 0.4;
-    if (cfg->stand && kept_s > (SINS_RING - 2) * cfg->sample_s)
+    if (cfg->stand && sins_kept_s(cfg) > (SINS_RING - 3) * cfg->sample_s)
         return check_refuse(why, NAV_RANGE, "sample_s", cfg->sample_s, "longer samples, or a shorter stand_guard_s");
     return NAV_OK;
 }

@@ -79,6 +79,9 @@ mat3 sins_normal(const mat3 &c); /* the nearest rotation, of a matrix that is on
 bool sins_is_rotation(const mat3 &c, double within);
 void sins_store(const mat3 &c, double rows[9]);
 
+/* How far back the ring must reach: from the sample before the guard to the one after the filter's step. */
+double sins_kept_s(const struct nav_sins_cfg *cfg);
+
 /* ---- the model and the state */
 
 void sins_use_model(struct nav_sins *s);                                  /* after a change of s->model */

@@ -16,7 +16,7 @@ static mat3 lever_rows(const vec3 &w, const vec3 &dw)
     return w * w.transpose() - w.squaredNorm() * mat3::Identity() + sins_cross(dw);
 }
 
-/* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (sins 1, below (3)). */
+/* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (docs/procedures/sins.md (2)). */
 static void add_drift(struct nav_sins *s, const mat3 &middle, const vec3 &dtheta)
 {
     const mat3 m = middle * s->gyro_back;
@@ -40,11 +40,12 @@ static void add_accel(struct nav_sins *s, const mat3 &middle, const mat3 &lever)
         }
 }
 
-/* C of the sample's start times this is the integral of C f: exact to the third order of the turn for a force constant in n. */
-static vec3 undo_turn(const vec3 &dtheta, const vec3 &dv)
+/* C of the sample's start times this is the integral of C f: exact to the third order of the turn relative to n, for a force
+ * constant there. */
+static vec3 undo_turn(const vec3 &turn, const vec3 &dv)
 {
-    const vec3 once = dtheta.cross(dv);
-    return dv + 0.5 * once + dtheta.cross(once) / 12.0;
+    const vec3 once = turn.cross(dv);
+    return dv + 0.5 * once + turn.cross(once) / 12.0;
 }
 
 static vec3 without_lever(const struct nav_sins *s, const vec3 &dv, const mat3 &lever)
@@ -71,7 +72,8 @@ void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv
     const mat3 middle = 0.5 * (s->c + after);
     add_drift(s, middle, dtheta);
     add_accel(s, middle, lever);
-    s->z_sum += s->c * undo_turn(dtheta, dv);
+    const vec3 turn_rel = dtheta - middle.transpose() * s->earth_n * dt;
+    s->z_sum += s->c * undo_turn(turn_rel, dv);
 
     s->c = after;
     s->dtheta_before = dtheta;
@@ -80,5 +82,5 @@ void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv
     struct sins_ring_entry *kept = &s->ring[s->samples % SINS_RING];
     kept->t_s = s->start_s + (double)s->samples * dt;
     kept->c = s->c;
-    kept->w_rel_b = w - middle.transpose() * s->earth_n;
+    kept->w_rel_b = turn_rel / dt;
 }

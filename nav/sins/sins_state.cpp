@@ -37,6 +37,17 @@ void sins_add_state(const struct nav_sins *s, struct nav_sins_params *p)
         }
 }
 
+/* The samples that an angle of the stand may still be compared with. */
+static void turn_ring(struct nav_sins *s, const mat3 &back)
+{
+    const int64_t kept = (int64_t)(sins_kept_s(&s->cfg) / s->cfg.sample_s) + 2;
+    const int64_t from = s->samples - kept < 1 ? 1 : s->samples - kept;
+    for (int64_t k = from; k <= s->samples; k++) {
+        struct sins_ring_entry *entry = &s->ring[k % SINS_RING];
+        entry->c = back * entry->c;
+    }
+}
+
 void sins_feed_back(struct nav_sins *s)
 {
     double *x = s->kf.x;
@@ -45,8 +56,7 @@ void sins_feed_back(struct nav_sins *s)
     sins_use_model(s);
     const mat3 back = sins_exp(-vec3(x[0], x[1], x[2]));
     s->c = back * s->c;
-    if (s->cfg.stand)
-        for (struct sins_ring_entry &kept : s->ring) kept.c = back * kept.c;
+    if (s->cfg.stand) turn_ring(s, back);
     if (s->cfg.clone) s->c0 = sins_exp(-vec3(start[0], start[1], start[2])) * s->c0;
     for (int i = 0; i < s->n; i++)
         if (i < 3 || i >= s->dynamic) x[i] = 0.0;

@@ -5,8 +5,6 @@
 
 #include <cstring>
 
-constexpr double FEEDBACK_S = 1.0; /* from one feedback to the next */
-
 static int offset_of(const struct nav_sins *s, int block)
 {
     return s->at[block].offset;
@@ -103,13 +101,13 @@ int sins_finish_step(struct nav_sins *s)
     set_q(s, s->carry.time_s);
     int status = nav_kf_predict(&s->kf, s->phi, s->q);
     if (status == NAV_OK) status = take_accel(s);
-    s->found.t_s = s->start_s + (double)(s->steps * s->per_step + s->per_step / 2) * s->cfg.sample_s;
+    const int64_t middle = s->steps * s->per_step + s->per_step / 2;
+    s->found.t_s = s->start_s + (double)middle * s->cfg.sample_s;
     if (status == NAV_OK && s->cfg.stand) status = sins_take_angles(s, s->found.t_s);
     s->carry = s->now;
     clear_sums(s);
     s->c = sins_normal(s->c);
     s->steps++;
-    const int64_t period = (int64_t)nav_floor(FEEDBACK_S / s->cfg.step_s + 0.5);
-    if (status == NAV_OK && s->feedback && s->steps % (period > 0 ? period : 1) == 0) sins_feed_back(s);
+    if (status == NAV_OK && s->feedback) sins_feed_back(s);
     return status;
 }

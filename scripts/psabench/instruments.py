@@ -31,6 +31,7 @@ REPLY_S = 10.0  # timeout for an answer, real time
 CONNECT_S = 5.0
 LATE_S = 0.05  # real time in which what came late is read away
 REST_LIMIT_S = 3600.0  # timeout for it, bench time
+LOG_COUNT = 400  # angles that a table gives at a time
 TURN_OFF_DEG = 5.0  # a head that is farther off did not turn: five times the largest setting error of a scenario
 NS = 1_000_000_000
 
@@ -250,6 +251,23 @@ class Table(Instrument):
 
     def angle_deg(self, *, axis: int = 1) -> float:
         return self.number(f"AXIS{axis}:POS?")
+
+    def stamped(self, *, axis: int = 1) -> tuple[float, float]:
+        """Time of the reading, s, and the angle, deg: the table's own clock; a coarse table shows 9.91e37."""
+        t_s, angle_deg = self.query(f"AXIS{axis}:STAM?").split(",")
+        return float(t_s), float(angle_deg)
+
+    def log(self, from_s: float, every_s: float, count: int, *, axis: int = 1) -> list[float]:
+        """Angles of the readout at past instants, deg: its log goes back to the last four motions of the axis."""
+        angles: list[float] = []
+        while len(angles) < count:
+            part = min(count - len(angles), LOG_COUNT)
+            at_s = from_s + len(angles) * every_s
+            command = f"AXIS{axis}:LOG? {at_s:.9f},{every_s:.9f},{part}"
+            answer, _, error = self.query(f"{command};:SYST:ERR?").partition(";")
+            self._raise_error(command, error if '"' not in answer else f"{answer};{error}")
+            angles += [float(a) for a in answer.split(",")]
+        return angles
 
     def rate_dps(self, *, axis: int = 1) -> float:
         return self.number(f"AXIS{axis}:RATE?")

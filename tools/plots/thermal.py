@@ -41,7 +41,8 @@ def report_of(text: str) -> ThermalReport:
         schedule.write_text(text, encoding="utf-8")
         unit = ROOT / "examples/thermal/small_unit.yaml"
         options = ThermalOptions(out=Path(work), schedule=str(schedule), scenario=unit)
-        return thermal_grading.graded_report(run_thermal(options, Bar()).result, None, {})
+        with run_thermal(options, Bar()) as done:
+            return thermal_grading.graded_report(done.result, None, {})
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 #include "board/digest.h"
 #include "board/life.h"
+#include "board/psa2/inside.h"
 #include "board/psa2/internal.h"
 
 #include <stdio.h>
@@ -25,15 +26,15 @@ static void about(const void *profile, char *out, size_t cap)
 #define KPSA(field) OF(psa2_counters, field, field)
 
 // clang-format off
-static const struct board_counter kpsa_counters[] = {
+const struct board_counter psa2_kpsa_counters[PSA2_KPSA_COUNTERS] = {
     KPSA(frames), KPSA(resets), KPSA(requests), KPSA(timeouts), KPSA(overruns), KPSA(int_late),
 };
-static const struct board_counter adc_counters[] = {
+const struct board_counter psa2_adc_counters[PSA2_ADC_COUNTERS] = {
     ADC(conversions), ADC(overruns), ADC(torn_reads), ADC(late_reads), ADC(bad_opcodes), ADC(refused), ADC(gap_violations),
     ADC(restarts), ADC(clipped), ADC(realigned), ADC(calibrations),
     OF(ads1282, bad_register, regs.bad_access), OF(ads1282, unmodelled_bit, regs.unimp_access), OF(ads1282, read_only_write, regs.ro_write),
 };
-static const struct board_counter temp_counters[] = {
+const struct board_counter psa2_temp_counters[PSA2_TEMP_COUNTERS] = {
     TADC(conversions), TADC(overruns), TADC(torn_reads), TADC(window_reads), TADC(clipped), TADC(buffer_clipped),
     TADC(range_exceeded), TADC(bad_mux), TADC(calibrations), TADC(cal_clamped), TADC(restarts), TADC(power_downs),
     TADC(bad_opcodes), TADC(refused), TADC(bad_drate), TADC(gap_violations), TADC(dropped),
@@ -41,59 +42,37 @@ static const struct board_counter temp_counters[] = {
 };
 // clang-format on
 
-enum { PART_KPSA, PART_ADC_X, PART_ADC_Y, PART_ADC_Z, PART_TADC, PARTS };
-
-static void adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+/* Which converter a part is, in whatever table of parts it is. */
+static struct ads1282 *adc_of(struct board *board, unsigned part)
 {
-    ads1282_fault(&((struct psa2 *)board)->adc[part - PART_ADC_X], f, t_ns);
+    return (struct ads1282 *)(void *)((char *)board + board->type->parts[part].offset);
 }
 
-static void tadc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+void psa2_adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
+{
+    ads1282_fault(adc_of(board, part), f, t_ns);
+}
+
+void psa2_temp_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns)
 {
     (void)part;
     ads1256_fault(&((struct psa2 *)board)->tadc, f, t_ns);
 }
 
 /* Registers without power hold nothing. */
-static bool adc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+bool psa2_adc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
-    struct psa2 *b = (struct psa2 *)board;
-    return b->mode != PSA2_OFF && reg_flip(&b->adc[part - PART_ADC_X].regs, reg, mask, t_ns);
+    return ((struct psa2 *)board)->mode != PSA2_OFF && reg_flip(&adc_of(board, part)->regs, reg, mask, t_ns);
 }
 
-static bool tadc_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
+bool psa2_temp_flip(struct board *board, unsigned part, unsigned reg, uint8_t mask, int64_t t_ns)
 {
     struct psa2 *b = (struct psa2 *)board;
     (void)part;
     return b->mode != PSA2_OFF && reg_flip(&b->tadc.regs, reg, mask, t_ns);
 }
 
-#define EVERY_FAULT (BOARD_FAULT_DRDY | BOARD_FAULT_DOUT | BOARD_FAULT_SYNC | BOARD_FAULT_CLOCK)
-#define DRD_A_IS_X  "DRD_A is the pin of converter X only, this pin is not connected; use adc.x"
-
-static const struct board_part parts[PARTS] = {
-    [PART_KPSA] = {.name = "kpsa",
-                   .label = "board",
-                   .offset = offsetof(struct psa2, counters),
-                   BOARD_COUNTERS(kpsa_counters)},
-#define ADC_PART(nr, axis, faults_of, why_not)                                                                         \
-    {                                                                                                                  \
-        .name = "adc." axis, .label = "adc_" axis,                                                                     \
-        .offset = offsetof(struct psa2, adc) + (nr) * sizeof(struct ads1282), BOARD_COUNTERS(adc_counters),            \
-        .faults = (faults_of), .unless = (why_not), .registers = ADS1282_REGS, .fault = adc_fault, .flip = adc_flip    \
-    }
-    [PART_ADC_X] = ADC_PART(0, "x", EVERY_FAULT, NULL),
-    [PART_ADC_Y] = ADC_PART(1, "y", EVERY_FAULT & ~(unsigned)BOARD_FAULT_DRDY, DRD_A_IS_X),
-    [PART_ADC_Z] = ADC_PART(2, "z", EVERY_FAULT & ~(unsigned)BOARD_FAULT_DRDY, DRD_A_IS_X),
-    [PART_TADC] = {.name = "tadc",
-                   .label = "adc_temp",
-                   .offset = offsetof(struct psa2, tadc),
-                   BOARD_COUNTERS(temp_counters),
-                   .faults = EVERY_FAULT,
-                   .registers = ADS1256_REGS,
-                   .fault = tadc_fault,
-                   .flip = tadc_flip},
-};
+static const struct board_part parts[] = {PSA2_KPSA_PART("kpsa", "board"), PSA2_CHIP_PARTS};
 
 static unsigned pulses(const struct board *board)
 {
@@ -151,9 +130,8 @@ static void add_ads1256(struct sha256 *s, const struct ads1256 *a)
     board_digest_u64(s, (uint64_t)a->word);
 }
 
-static void digest(const struct board *board, struct sha256 *s)
+void psa2_digest(const struct psa2 *b, struct sha256 *s)
 {
-    const struct psa2 *b = (const struct psa2 *)board;
     const struct psa2_counters *c = &b->counters;
     board_digest_u64(s, (uint64_t)b->mode << 32 | b->seq);
     board_digest_u64(s, (uint64_t)b->drd_a_ns);
@@ -177,6 +155,11 @@ static unsigned temp_count(const struct board *board)
 static void open_temps(struct board *board, uint32_t open)
 {
     ((struct psa2 *)board)->open_temps = open;
+}
+
+static void digest(const struct board *board, struct sha256 *s)
+{
+    psa2_digest((const struct psa2 *)board, s);
 }
 
 static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};

@@ -1,6 +1,7 @@
 #include "board/psa2/psa2.h"
 
 #include "base/bits.h"
+#include "board/psa2/inside.h"
 #include "board/psa2/internal.h"
 
 #include <assert.h>
@@ -311,10 +312,16 @@ static void res_up(void *ctx, int64_t t_ns)
 void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_cfg *cfg, const struct board_io *io,
                struct sched *s)
 {
+    psa2_init_inside(b, p, psa2_lines, PSA2_LINES, cfg, io, s);
+}
+
+void psa2_init_inside(struct psa2 *b, const struct psa2_profile *p, const struct board_line *lines, unsigned count,
+                      const struct board_cfg *cfg, const struct board_io *io, struct sched *s)
+{
     assert(io->accel && io->temp_degc);
     board_clear(&b->base, sizeof *b);
     b->profile = *p;
-    board_init(&b->base, psa2_lines, PSA2_LINES, cfg, io, s);
+    board_init(&b->base, lines, count, cfg, io, s);
     b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
     init_trace(b);

@@ -88,6 +88,8 @@ bool ads1282_models(uint8_t config0);
 int64_t
 ads1282_settle_ns(const struct ads1282 *a); /* restart to first settled DRDY with the present CONFIG0; 0: none */
 int64_t ads1282_period_ns(const struct ads1282 *a); /* DRDY to DRDY with the present CONFIG0, rounded down; 0: none */
+int64_t ads1282_delay_ns(const struct ads1282 *a);  /* group delay at DC, input to DRDY, with the present CONFIG0 */
+double ads1282_dc_gain(const struct ads1282 *a);    /* of the filter's integer taps; 1 of the sinc alone */
 
 /* ---- Faults ---- */
 

@@ -322,6 +322,16 @@ static int64_t direct_delay_tclk(const struct ads1282 *a)
     return sinc + FIR_LATENCY_TCLK + (int64_t)(4.0 * (double)n * fir_dc(a->filter.phase).delay + 0.5);
 }
 
+int64_t ads1282_delay_ns(const struct ads1282 *a)
+{
+    return clk_span_ns(a->clk.hz, direct_delay_tclk(a));
+}
+
+double ads1282_dc_gain(const struct ads1282 *a)
+{
+    return ads1282_sinc_only(a) ? 1.0 : fir_dc(a->filter.phase).gain;
+}
+
 static void sample_direct(struct ads1282 *a, int64_t until_ns)
 {
     const struct draws noise = step_draws(a);

@@ -112,6 +112,12 @@ int64_t head_rest_ns(const struct head *h)
     return h->end_ns;
 }
 
+int64_t head_smooth_ns(const struct head *h, int64_t t_ns)
+{
+    if (t_ns < h->start_ns) return h->start_ns;
+    return t_ns < h->end_ns ? h->end_ns : INT64_MAX;
+}
+
 double head_angle_rad(const struct head *h, int64_t t_ns)
 {
     return mount_angle_rad(h, t_ns) + (t_ns < h->face_ns ? h->mount_before_rad : h->mount_rad);

@@ -71,6 +71,9 @@ enum head_face head_face(const struct head *h, int64_t t_ns);
 bool head_at_rest(const struct head *h, int64_t t_ns);
 int64_t head_rest_ns(const struct head *h); /* when the present turn ends or the last one ended */
 
+/* The first instant after t_ns at which the acceleration may jump without a further command; INT64_MAX: none. */
+int64_t head_smooth_ns(const struct head *h, int64_t t_ns);
+
 /* True angle of the mount, the unit's tilt of mounting included: the bench's truth. */
 double head_angle_rad(const struct head *h, int64_t t_ns);
 

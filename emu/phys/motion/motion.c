@@ -54,6 +54,24 @@ struct motion_state motion_at(const struct motion *m, int64_t t_ns)
     return coast_from(&piece->from, t_s - piece->t_s);
 }
 
+int64_t motion_known_ns(const struct motion *m)
+{
+    return m->plan[(m->latest + 1) % MOTION_HISTORY].start_ns;
+}
+
+/* Pieces begin between two nanoseconds: the later one it is. */
+int64_t motion_smooth_ns(const struct motion *m, int64_t t_ns)
+{
+    const struct motion_plan *p = plan_at(m, t_ns);
+    for (unsigned i = 0; i < p->count; i++) {
+        const double after_s = p->piece[i].t_s;
+        if (after_s > FAR_S) break;
+        const int64_t at_ns = p->start_ns + (int64_t)ceil(after_s * (double)NS_PER_S);
+        if (at_ns > t_ns) return at_ns;
+    }
+    return INT64_MAX;
+}
+
 int64_t motion_rest_ns(const struct motion *m)
 {
     const struct motion_plan *p = &m->plan[m->latest];

@@ -81,6 +81,12 @@ struct motion_state motion_at(const struct motion *m, int64_t t_ns);
 enum motion_mode motion_mode(const struct motion *m);
 bool motion_at_rest(const struct motion *m, int64_t t_ns);
 
+/* From which instant on motion_at() knows: the start of the oldest plan that is kept. */
+int64_t motion_known_ns(const struct motion *m);
+
+/* The first instant after t_ns at which the acceleration may jump without a further command; INT64_MAX: none. */
+int64_t motion_smooth_ns(const struct motion *m, int64_t t_ns);
+
 /* When the present motion ends or the last one ended; INT64_MAX if it does not end. */
 int64_t motion_rest_ns(const struct motion *m);
 

@@ -451,6 +451,11 @@ static double sensor_rad(struct platform *p, int64_t t_ns)
     return (p->stuck ? p->stuck_rad : q_rad(p, t_ns)) + p->cfg.angle_zero_arcmin * RAD_PER_ARCMIN;
 }
 
+int64_t platform_smooth_ns(const struct platform *p, int64_t t_ns)
+{
+    return (t_ns / p->cfg.step_ns + 1) * p->cfg.step_ns;
+}
+
 double platform_servo_rad(struct platform *p, int64_t t_ns)
 {
     return det_wrap_rad(sensor_rad(p, t_ns) + setting_at(p, t_ns)->set_rad);

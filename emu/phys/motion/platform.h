@@ -105,6 +105,9 @@ struct vehicle *platform_vehicle(struct platform *p, int64_t t_ns);
 
 void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out);
 
+/* The first instant after t_ns at which a rate may jump without a further command: the next grid point. */
+int64_t platform_smooth_ns(const struct platform *p, int64_t t_ns);
+
 /* The angle sensor's q: as the azimuth loop has it, with zero and setting error; as the encoder tells it, with zero, reading
  * error and step. Both in (-pi, pi]. */
 double platform_servo_rad(struct platform *p, int64_t t_ns);

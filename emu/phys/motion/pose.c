@@ -22,25 +22,36 @@ static void turn_pair(double *i, double *j, double c, double s)
     *j = c * *j - s * was;
 }
 
+struct pose_angle pose_angle(double angle_rad)
+{
+    if (fabs(angle_rad) > REDUCE_ABOVE) angle_rad = fmod(angle_rad, TURN_RAD); /* exact */
+    return (struct pose_angle){angle_rad, angle_rad != 0.0 ? det_sin_cos(angle_rad) : (struct det_pair){0.0, 1.0}};
+}
+
 /* w' = R^T w + e rate; dw' = R^T dw - e rate x (R^T w) + e accel. */
-void pose_turn(struct pose *p, enum pose_axis axis, double angle_rad, double rate_radps, double accel_radps2)
+void pose_turn_by(struct pose *p, enum pose_axis axis, const struct pose_angle *a, double rate_radps,
+                  double accel_radps2)
 {
     const unsigned k = (unsigned)axis;
     const unsigned i = (k + 1) % 3;
     const unsigned j = (k + 2) % 3;
     double *w = p->w_ib_b_radps;
     double *dw = p->dw_ib_b_radps2;
-    if (fabs(angle_rad) > REDUCE_ABOVE) angle_rad = fmod(angle_rad, TURN_RAD); /* exact */
-    if (angle_rad != 0.0) {
-        const struct det_pair a = det_sin_cos(angle_rad);
-        for (unsigned row = 0; row < 3; row++) turn_pair(&p->C_nb[row][i], &p->C_nb[row][j], a.cos, a.sin);
-        turn_pair(&w[i], &w[j], a.cos, a.sin);
-        turn_pair(&dw[i], &dw[j], a.cos, a.sin);
+    if (a->angle_rad != 0.0) {
+        for (unsigned row = 0; row < 3; row++) turn_pair(&p->C_nb[row][i], &p->C_nb[row][j], a->of.cos, a->of.sin);
+        turn_pair(&w[i], &w[j], a->of.cos, a->of.sin);
+        turn_pair(&dw[i], &dw[j], a->of.cos, a->of.sin);
     }
     dw[i] += rate_radps * w[j];
     dw[j] -= rate_radps * w[i];
     dw[k] += accel_radps2;
     w[k] += rate_radps;
+}
+
+void pose_turn(struct pose *p, enum pose_axis axis, double angle_rad, double rate_radps, double accel_radps2)
+{
+    const struct pose_angle a = pose_angle(angle_rad);
+    pose_turn_by(p, axis, &a, rate_radps, accel_radps2);
 }
 
 void pose_tilt(struct pose *p, const double angle_rad[3])

@@ -6,6 +6,7 @@
 #ifndef PSABENCH_PHYS_MOTION_POSE_H
 #define PSABENCH_PHYS_MOTION_POSE_H
 
+#include "base/detmath.h"
 #include "phys/motion/earth.h"
 
 enum pose_axis { POSE_X, POSE_Y, POSE_Z };
@@ -21,6 +22,17 @@ void pose_start(struct pose *p, const struct site *site);
 
 /* The frame that is turned by the angle about one axis of the present one, right-handed, with rate and acceleration. */
 void pose_turn(struct pose *p, enum pose_axis axis, double angle_rad, double rate_radps, double accel_radps2);
+
+/* The angle as it is turned by, with its sine and cosine: for one that stays. */
+struct pose_angle {
+    double angle_rad;
+    struct det_pair of;
+};
+struct pose_angle pose_angle(double angle_rad);
+
+/* The same bits as pose_turn() of that angle. */
+void pose_turn_by(struct pose *p, enum pose_axis axis, const struct pose_angle *a, double rate_radps,
+                  double accel_radps2);
 
 /* Turns about x, then y, then z by fixed angles: small ones are a rotation vector. */
 void pose_tilt(struct pose *p, const double angle_rad[3]);

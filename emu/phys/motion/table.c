@@ -27,23 +27,6 @@ struct table_cfg table_default(unsigned axes)
     return c;
 }
 
-void table_init(struct table *t, const struct table_cfg *cfg, const struct site *site, uint64_t seed)
-{
-    assert(cfg->axes <= TABLE_AXES_MAX);
-    *t = (struct table){.cfg = *cfg, .site = *site, .seed = seed, .cached_to_ns = -1};
-    for (unsigned i = 0; i < cfg->axes; i++) {
-        const struct table_axis_cfg *a = &cfg->axis[i];
-        const struct motion_limits limits = {
-            .rate_radps = a->rate_max_dps * RAD_PER_DEG,
-            .accel_radps2 = a->accel_max_dps2 * RAD_PER_DEG,
-            .bounded = a->angle_min_deg != 0.0 || a->angle_max_deg != 0.0,
-            .min_rad = a->angle_min_deg * RAD_PER_DEG,
-            .max_rad = a->angle_max_deg * RAD_PER_DEG,
-        };
-        motion_init(&t->axis[i], &limits);
-    }
-}
-
 /* ---- commands */
 
 /* What the readout shows above the true angle. */
@@ -164,12 +147,23 @@ static double readout_noise_rad(const struct table *t, unsigned axis, int64_t t_
     return rms_rad * rng_gauss(&r);
 }
 
+static int64_t delay_ns(const struct table *t, unsigned axis)
+{
+    return (int64_t)nearbyint(t->cfg.axis[axis].readout_delay_s * (double)NS_PER_S);
+}
+
+int64_t table_known_ns(const struct table *t, unsigned axis)
+{
+    const int64_t known_ns = motion_known_ns(&t->axis[axis]);
+    return known_ns > 0 ? known_ns + delay_ns(t, axis) : 0;
+}
+
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns)
 {
     assert(axis < t->cfg.axes);
     const struct table_axis_cfg *c = &t->cfg.axis[axis];
     const struct motion *m = &t->axis[axis];
-    const int64_t shown_ns = t_ns - (int64_t)nearbyint(c->readout_delay_s * (double)NS_PER_S);
+    const int64_t shown_ns = t_ns - delay_ns(t, axis);
     const struct motion_state s = axis_state(t, axis, shown_ns);
     const double angle_rad = det_quantise(s.angle_rad + offset_rad(t, axis) + readout_noise_rad(t, axis, t_ns),
                                           c->readout_resolution_arcsec * RAD_PER_ARCSEC);
@@ -194,6 +188,18 @@ static bool all_at_rest(const struct table *t, int64_t t_ns)
     return true;
 }
 
+int64_t table_smooth_ns(const struct table *t, int64_t t_ns)
+{
+    int64_t first_ns = INT64_MAX;
+    for (unsigned i = 0; i < t->cfg.axes; i++) {
+        const int64_t at_ns = motion_smooth_ns(&t->axis[i], t_ns);
+        if (at_ns < first_ns) first_ns = at_ns;
+    }
+    for (const struct table_ripple *r = t->ripples; r; r = r->next)
+        if (r->from_ns > t_ns && r->from_ns < first_ns) first_ns = r->from_ns;
+    return first_ns;
+}
+
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns)
 {
     assert(axis < t->cfg.axes);
@@ -202,21 +208,40 @@ struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_n
 
 /* The cone: turns about the two axes across by w cos(n angle + phase) and w sin(n angle + phase). det_sin() takes up to 1e6
  * rad: whole turns are taken off a table that has been turning for long. */
-static void apply_wobble(struct pose *p, const struct table_axis_cfg *c, const struct motion_state *s)
+static void set_cone(const struct table_axis_cfg *c, struct table_turns *t)
 {
     const double w_rad = c->wobble_arcsec * RAD_PER_ARCSEC;
     if (w_rad == 0.0) return;
     const double n = c->wobble_order ? (double)c->wobble_order : 1.0;
-    const double sum_rad = n * s->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
+    const double sum_rad = n * t->angle_rad + c->wobble_phase_deg * RAD_PER_DEG;
     const struct det_pair phase = det_sin_cos(fabs(sum_rad) > WHOLE_ABOVE ? fmod(sum_rad, TURN_RAD) : sum_rad);
-    const double cos_rad = w_rad * phase.cos;
-    const double sin_rad = w_rad * phase.sin;
+    t->cone_rad[0] = w_rad * phase.cos;
+    t->cone_rad[1] = w_rad * phase.sin;
+    for (unsigned i = 0; i < 2; i++) t->cone[i] = pose_angle(t->cone_rad[i]);
+}
+
+static const struct table_turns *turns_at(const struct table_axis_cfg *c, struct table_turns *t, double angle_rad)
+{
+    if (t->angle_rad == angle_rad) return t;
+    t->angle_rad = angle_rad;
+    t->angle = pose_angle(angle_rad);
+    set_cone(c, t);
+    return t;
+}
+
+static void apply_wobble(struct pose *p, const struct table_axis_cfg *c, const struct table_turns *t,
+                         const struct motion_state *s)
+{
+    if (c->wobble_arcsec == 0.0) return;
+    const double n = c->wobble_order ? (double)c->wobble_order : 1.0;
     const double rate = n * s->rate_radps;
     const double accel = n * s->accel_radps2;
-    pose_turn(p, (enum pose_axis)((c->along + 1u) % 3u), cos_rad, -sin_rad * rate,
-              -cos_rad * rate * rate - sin_rad * accel);
-    pose_turn(p, (enum pose_axis)((c->along + 2u) % 3u), sin_rad, cos_rad * rate,
-              -sin_rad * rate * rate + cos_rad * accel);
+    const double cos_rad = t->cone_rad[0];
+    const double sin_rad = t->cone_rad[1];
+    pose_turn_by(p, (enum pose_axis)((c->along + 1u) % 3u), &t->cone[0], -sin_rad * rate,
+                 -cos_rad * rate * rate - sin_rad * accel);
+    pose_turn_by(p, (enum pose_axis)((c->along + 2u) % 3u), &t->cone[1], cos_rad * rate,
+                 -sin_rad * rate * rate + cos_rad * accel);
 }
 
 /* The axis across both this one and the one outside: a turn about it changes the angle between them. */
@@ -225,11 +250,16 @@ static enum pose_axis axis_across(enum pose_axis a, enum pose_axis b)
     return a == b ? (enum pose_axis)((a + 1u) % 3u) : (enum pose_axis)(3u - a - b);
 }
 
-static void set_pose(const struct table *t, int64_t t_ns, struct pose *p)
+static void set_base(struct table *t)
 {
     const double tilt_rad[3] = {t->cfg.base_tilt_x_arcsec * RAD_PER_ARCSEC, t->cfg.base_tilt_y_arcsec * RAD_PER_ARCSEC};
-    pose_start(p, &t->site);
-    pose_tilt(p, tilt_rad);
+    pose_start(&t->base, &t->site);
+    pose_tilt(&t->base, tilt_rad);
+}
+
+static void set_pose(struct table *t, int64_t t_ns, struct pose *p)
+{
+    *p = t->base;
     for (unsigned i = 0; i < t->cfg.axes; i++) {
         const struct table_axis_cfg *c = &t->cfg.axis[i];
         const struct motion_state s = axis_state(t, i, t_ns);
@@ -237,8 +267,9 @@ static void set_pose(const struct table *t, int64_t t_ns, struct pose *p)
             pose_turn(p, axis_across(c->along, t->cfg.axis[i - 1].along), c->nonorthogonality_arcsec * RAD_PER_ARCSEC,
                       0.0, 0.0);
         }
-        apply_wobble(p, c, &s);
-        pose_turn(p, c->along, s.angle_rad, s.rate_radps, s.accel_radps2);
+        const struct table_turns *turns = turns_at(c, &t->turns[i], s.angle_rad);
+        apply_wobble(p, c, turns, &s);
+        pose_turn_by(p, c->along, &turns->angle, s.rate_radps, s.accel_radps2);
     }
 }
 
@@ -250,4 +281,25 @@ const struct pose *table_pose(struct table *t, int64_t t_ns)
         t->cached_to_ns = all_at_rest(t, t_ns) ? INT64_MAX : t_ns;
     }
     return &t->cached;
+}
+
+/* ---- life */
+
+void table_init(struct table *t, const struct table_cfg *cfg, const struct site *site, uint64_t seed)
+{
+    assert(cfg->axes <= TABLE_AXES_MAX);
+    *t = (struct table){.cfg = *cfg, .site = *site, .seed = seed, .cached_to_ns = -1};
+    for (unsigned i = 0; i < cfg->axes; i++) {
+        const struct table_axis_cfg *a = &cfg->axis[i];
+        const struct motion_limits limits = {
+            .rate_radps = a->rate_max_dps * RAD_PER_DEG,
+            .accel_radps2 = a->accel_max_dps2 * RAD_PER_DEG,
+            .bounded = a->angle_min_deg != 0.0 || a->angle_max_deg != 0.0,
+            .min_rad = a->angle_min_deg * RAD_PER_DEG,
+            .max_rad = a->angle_max_deg * RAD_PER_DEG,
+        };
+        motion_init(&t->axis[i], &limits);
+        t->turns[i].angle_rad = NAN;
+    }
+    set_base(t);
 }

@@ -28,6 +28,7 @@ struct table_axis_cfg {
 
 struct table_cfg {
     unsigned axes; /* 0: there is no table */
+    bool coarse;   /* it shows no angles */
     double base_tilt_x_arcsec, base_tilt_y_arcsec;
     struct table_axis_cfg axis[TABLE_AXES_MAX]; /* from the outermost */
 };
@@ -49,6 +50,13 @@ struct table_ripple {
     struct table_ripple *next;
 };
 
+/* Turns of an axis at an angle: kept while it rests. */
+struct table_turns {
+    double angle_rad;   /* NaN: none are kept */
+    double cone_rad[2]; /* about the two axes across */
+    struct pose_angle cone[2], angle;
+};
+
 struct table {
     struct table_cfg cfg;
     struct site site;
@@ -56,6 +64,8 @@ struct table {
     struct motion axis[TABLE_AXES_MAX];
     double set_zero_rad[TABLE_AXES_MAX]; /* by table_zero() */
     struct table_ripple *ripples;
+    struct pose base; /* at the site, tilted */
+    struct table_turns turns[TABLE_AXES_MAX];
     int64_t cached_from_ns, cached_to_ns;
     struct pose cached;
 };
@@ -85,8 +95,14 @@ void table_ripple_remove(struct table *t, struct table_ripple *r); /* the axis i
 /* Pure: the same instant shows the same noise. The axis exists. */
 struct table_reading table_read(const struct table *t, unsigned axis, int64_t t_ns);
 
+/* From which instant on table_read() can be asked. */
+int64_t table_known_ns(const struct table *t, unsigned axis);
+
 /* Truth. */
 struct motion_state table_axis(const struct table *t, unsigned axis, int64_t t_ns);
+
+/* The first instant after t_ns at which an acceleration may jump without a further command; INT64_MAX: none. */
+int64_t table_smooth_ns(const struct table *t, int64_t t_ns);
 
 /* Attitude and motion of t. Cached: valid until the next call. */
 const struct pose *table_pose(struct table *t, int64_t t_ns);

@@ -118,3 +118,13 @@ class GyroObjects(Common):
     CLOCK = 0x210A
     SELF_TEST = 0x210B
     LATEST = 0x2200
+
+
+class BinsObjects(Common):
+    """Of a BINS unit."""
+
+    INCREMENTS = 0x2200
+    READING = 0x2202
+    TEMPERATURES = 0x2205
+    WEIGHTS = 0x2220
+    TIMING = 0x2221

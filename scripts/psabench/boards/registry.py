@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from psabench.boards.bins.board import BOARD as BINS
 from psabench.boards.board import Board
 from psabench.boards.gyro.board import BOARD as GYRO
 from psabench.boards.pik.board import BOARD as PIK
@@ -11,7 +12,7 @@ from psabench.boards.pmka.board import BOARD as PMKA
 from psabench.boards.psa2.board import BOARD as PSA2
 from psabench.boards.psd1.board import BOARD as PSD1
 
-BOARDS: Mapping[str, Board] = {board.name: board for board in (PSA2, PSD1, PMKA, PIK, GYRO)}
+BOARDS: Mapping[str, Board] = {board.name: board for board in (PSA2, PSD1, PMKA, PIK, GYRO, BINS)}
 ALIASES: Mapping[str, str] = {alias: board.name for board in BOARDS.values() for alias in board.aliases}
 NAMES = (*BOARDS, *ALIASES)
 BUS_BOARDS = tuple(name for name, board in BOARDS.items() if board.bus)  # boards with a parallel bus

@@ -1,7 +1,7 @@
-"""Calibration of a strapdown inertial unit on a rate table: libpsabench-nav (docs/sins.md), from Python.
+"""Calibration of a strapdown inertial unit on a rate table: libpsabench-nav (docs/procedures/sins.md), from Python.
 
-n is east, north, up at the table, b the instrument; C_nb takes b to n. Errors are measured less true. rad, s, m. Arrays are
-NumPy's, float64 and C-contiguous ones go to the library without a copy. An estimator belongs to one thread.
+n is east, north, up at the table, b the instrument; C_nb takes b to n. Errors are measured less true. Units: rad, s, m.
+Arrays that are float64 and C-contiguous go to the library without a copy. An estimator belongs to one thread.
 """
 
 from __future__ import annotations
@@ -135,39 +135,39 @@ class Sins:
     def __init__(self, cfg: SinsConfig, c_nb: Floats, *, feedback: bool = False) -> None:
         lib = library()
         self.cfg = cfg
-        self.rows = layout(cfg)
+        self.rows = state_layout(cfg)
         self.states = sum(r.stop - r.start for r in self.rows.values())
         self._memory = c.create_string_buffer(lib.sins_bytes() + 16)
         at = (c.addressof(self._memory) + 15) & ~15
         self._s = c.c_void_p()
         struct = config_struct(cfg)
-        status = lib.sins_start(at, lib.sins_bytes(), struct, _doubles(c_nb, 9), int(feedback), c.byref(self._s))
-        _check("start", status)
+        status = lib.sins_start(at, lib.sins_bytes(), struct, _doubles_at(c_nb, 9), int(feedback), c.byref(self._s))
+        _check_status("start", status)
 
     def about(self, params: Params) -> None:
         """Before the first increments: linearised about this model, with the prior as it is."""
-        _check("model", library().sins_about(self._s, c.byref(_params_struct(params))))
+        _check_status("model", library().sins_about(self._s, c.byref(_params_struct(params))))
 
     def samples(self, t_s: float, dtheta_rad: Floats, dv_mps: Floats) -> None:
         """Increments, rows of three; the first over t_s to t_s + sample_s."""
         count = len(dtheta_rad)
-        data = _doubles(dtheta_rad, 3 * count), _doubles(dv_mps, 3 * count)
-        _check("samples", library().sins_samples(self._s, t_s, *data, count))
+        data = _doubles_at(dtheta_rad, 3 * count), _doubles_at(dv_mps, 3 * count)
+        _check_status("samples", library().sins_samples(self._s, t_s, *data, count))
 
     def stand(self, t_s: float, c_st: Floats) -> None:
         """Angles of the table as a rotation, before the increments that follow."""
-        _check("stand", library().sins_stand(self._s, t_s, _doubles(c_st, 9)))
+        _check_status("stand", library().sins_stand(self._s, t_s, _doubles_at(c_st, 9)))
 
     def plan(self, turns: Sequence[Turn]) -> None:
         """Covariance over a plan, without data."""
         structs = (TurnStruct * len(turns))(
             *(TurnStruct((c.c_double * 3)(*t.axis_b), t.rate_radps, t.duration_s, int(t.remount)) for t in turns)
         )
-        _check("plan", library().sins_plan(self._s, structs, len(turns)))
+        _check_status("plan", library().sins_plan(self._s, structs, len(turns)))
 
     def again(self) -> None:
         """From the start about what was found: the second pass."""
-        _check("second pass", library().sins_again(self._s))
+        _check_status("second pass", library().sins_again(self._s))
 
     def state(self) -> State:
         """Estimates as they are now."""
@@ -179,7 +179,7 @@ class Sins:
             nis = np.array([s.nis_accel, s.nis_stand]) / np.array([s.count_accel, s.count_stand])
         return State(
             t_s=s.t_s,
-            params=_params(s.params),
+            params=_params_of(s.params),
             c_nb=np.array(s.c_nb).reshape(3, 3),
             c0_nb=np.array(s.c0_nb).reshape(3, 3),
             nis_accel=float(nis[0]),
@@ -191,7 +191,7 @@ class Sins:
     def covariance(self) -> tuple[Floats, Floats]:
         """x, which counts from the model, and P."""
         x, p = np.empty(self.states), np.empty((self.states, self.states))
-        library().sins_covariance(self._s, _doubles(x, self.states), _doubles(p, p.size))
+        library().sins_covariance(self._s, _doubles_at(x, self.states), _doubles_at(p, p.size))
         return x, p
 
     def sd(self, block: str) -> Floats:
@@ -202,13 +202,13 @@ class Sins:
         """phi, q and h of the last step; rows 3 to 5 of h: of the last angle of the stand."""
         moving = self.rows["nu"].start
         phi, q, h = np.empty((moving, self.states)), np.empty((moving, moving)), np.empty((6, self.states))
-        library().sins_jacobians(self._s, *(_doubles(a, a.size) for a in (phi, q, h)))
+        library().sins_jacobians(self._s, *(_doubles_at(a, a.size) for a in (phi, q, h)))
         return phi, q, h
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """Result of `calibrate`."""
+    """Result of `calibrate_unit`."""
 
     state: State
     first: State  # of the first pass
@@ -216,7 +216,7 @@ class Calibration:
     rows: Mapping[str, slice]
 
 
-def calibrate(
+def calibrate_unit(
     cfg: SinsConfig,
     c_nb: Floats,
     dtheta_rad: Floats,
@@ -227,26 +227,27 @@ def calibrate(
 ) -> Calibration:
     """Both passes over recorded increments from t = 0; stand: times and rotations (count x 3 x 3).
 
-    cfg.clone must be set for two passes: one pass without the stand claims less than its errors (docs/sins.md)."""
+    cfg.clone must be set for two passes: one pass without the stand claims less than its errors
+    (docs/procedures/sins.md)."""
     s = Sins(cfg, c_nb, feedback=True)
-    _run(s, dtheta_rad, dv_mps, stand)
+    _feed_data(s, dtheta_rad, dv_mps, stand)
     first = s.state()
     for _ in range(passes - 1):
         s.again()
-        _run(s, dtheta_rad, dv_mps, stand)
+        _feed_data(s, dtheta_rad, dv_mps, stand)
     return Calibration(state=s.state(), first=first, covariance=s.covariance()[1], rows=s.rows)
 
 
-def _run(s: Sins, dtheta: Floats, dv: Floats, stand: tuple[Floats, Floats] | None) -> None:
+def _feed_data(s: Sins, dtheta: Floats, dv: Floats, stand: tuple[Floats, Floats] | None) -> None:
     """All data through an estimator, the stand's angles before the increments that they are compared with."""
     size = max(round(CHUNK_S / s.cfg.sample_s), 1) if stand else max(len(dtheta), 1)
-    for low, angles in _chunks(len(dtheta), size, s.cfg.sample_s, stand):
+    for low, angles in _chunks_of(len(dtheta), size, s.cfg.sample_s, stand):
         for t_s, c_st in angles:
             s.stand(t_s, c_st)
         s.samples(low * s.cfg.sample_s, dtheta[low : low + size], dv[low : low + size])
 
 
-def _chunks(
+def _chunks_of(
     count: int, size: int, sample_s: float, stand: tuple[Floats, Floats] | None
 ) -> Iterator[tuple[int, list[tuple[float, Floats]]]]:
     times, angles = stand if stand else (np.empty(0), np.empty((0, 3, 3)))
@@ -255,7 +256,7 @@ def _chunks(
         yield low, [(float(times[i]), angles[i]) for i in range(edges[k], edges[k + 1])]
 
 
-def layout(cfg: SinsConfig) -> dict[str, slice]:
+def state_layout(cfg: SinsConfig) -> dict[str, slice]:
     """Where each block is in the state; empty slices are of blocks that it lacks. Raises Refused."""
     rows = (RowsStruct * len(BLOCKS))()
     struct, why = config_struct(cfg), RefusalStruct()
@@ -265,25 +266,25 @@ def layout(cfg: SinsConfig) -> dict[str, slice]:
     return {name: slice(r.offset, r.offset + r.size) for name, r in zip(BLOCKS, rows, strict=True)}
 
 
-def prior(cfg: SinsConfig) -> Floats:
+def prior_covariance(cfg: SinsConfig) -> Floats:
     """Covariance at the start. Raises Refused."""
-    n = max(rows.stop for rows in layout(cfg).values())
+    n = max(rows.stop for rows in state_layout(cfg).values())
     p = np.empty((n, n))
-    library().sins_prior(config_struct(cfg), _doubles(p, p.size))
+    library().sins_prior(config_struct(cfg), _doubles_at(p, p.size))
     return p
 
 
 def to_gauge(gauge: Gauge, params: Params) -> tuple[Params, Floats]:
     """The same instrument in the frame of a gauge, and R: b of the result is R b (nav_sins_to_gauge)."""
     struct, r = _params_struct(params), np.eye(3)
-    _check("gauge", library().sins_to_gauge(int(gauge), c.byref(struct), _doubles(r, 9)))
-    return _params(struct), r
+    _check_status("gauge", library().sins_to_gauge(int(gauge), c.byref(struct), _doubles_at(r, 9)))
+    return _params_of(struct), r
 
 
-def nees(error: Floats, covariance: Floats) -> float:
+def error_nees(error: Floats, covariance: Floats) -> float:
     """error' P^-1 error."""
     n = len(error)
-    return float(library().kf_nees(n, _doubles(error, n), _doubles(covariance, n * n)))
+    return float(library().kf_nees(n, _doubles_at(error, n), _doubles_at(covariance, n * n)))
 
 
 def config_struct(cfg: SinsConfig) -> SinsConfigStruct:
@@ -296,7 +297,7 @@ def config_struct(cfg: SinsConfig) -> SinsConfigStruct:
     return struct
 
 
-def _params(struct: ParamsStruct) -> Params:
+def _params_of(struct: ParamsStruct) -> Params:
     got = {name: np.array(getattr(struct, name)) for name, *_ in ParamsStruct._fields_ if name != "tau_s"}
     matrices = {name: got[name].reshape(3, 3) for name in ("theta", "gamma", "lever_m")}
     return Params(tau_s=struct.tau_s, **(got | matrices))
@@ -304,13 +305,13 @@ def _params(struct: ParamsStruct) -> Params:
 
 def _params_struct(params: Params) -> ParamsStruct:
     struct = ParamsStruct(tau_s=params.tau_s)
-    for name, kind in ParamsStruct._fields_:
+    for name, kind, *_ in ParamsStruct._fields_:
         if name != "tau_s":
             setattr(struct, name, kind(*np.ravel(getattr(params, name))))
     return struct
 
 
-def _doubles(array: Floats, count: int) -> Any:
+def _doubles_at(array: Floats, count: int) -> Any:
     """A pointer to `count` doubles of an array; results need one that is float64 and contiguous."""
     a = np.ascontiguousarray(array, dtype=np.float64)
     if a.size != count:
@@ -318,6 +319,6 @@ def _doubles(array: Floats, count: int) -> Any:
     return a.ctypes.data_as(c.POINTER(c.c_double))
 
 
-def _check(what: str, status: int) -> None:
+def _check_status(what: str, status: int) -> None:
     if status < 0:
         raise Refused(f"calibration, {what}", status)

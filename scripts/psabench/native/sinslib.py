@@ -10,7 +10,7 @@ _DOUBLES = _P(_D)
 BLOCKS = ("beta", "walk", "nu", "theta", "df", "gamma", "lever", "delta", "tau", "eps", "beta0")
 
 
-def _doubles(*names: str) -> list[tuple[str, Any]]:
+def _named_doubles(*names: str) -> list[tuple[str, Any]]:
     return [(name, _D) for name in names]
 
 
@@ -18,13 +18,13 @@ class SinsConfigStruct(c.Structure):
     """struct nav_sins_cfg."""
 
     _fields_ = [
-        *_doubles("latitude_rad", "gravity_mps2", "sample_s", "step_s"),
+        *_named_doubles("latitude_rad", "gravity_mps2", "sample_s", "step_s"),
         *[(name, _I) for name in ("form", "gauge", "lever", "stand", "base", "walk", "clone")],
         ("beta_sd_rad", _D * 3),
-        *_doubles("nu_sd_radps", "theta_scale_sd", "theta_angle_sd_rad", "df_sd_mps2", "gamma_scale_sd"),
-        *_doubles("gamma_angle_sd_rad", "lever_sd_m", "delta_sd_rad", "tau_sd_s", "eps_sd_rad", "walk_sd_radps"),
-        *_doubles("walk_tau_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts", "accel_noise_multiplier"),
-        *_doubles("stand_sd_rad", "stand_noise_rate_hz", "stand_interval_s", "stand_guard_s"),
+        *_named_doubles("nu_sd_radps", "theta_scale_sd", "theta_angle_sd_rad", "df_sd_mps2", "gamma_scale_sd"),
+        *_named_doubles("gamma_angle_sd_rad", "lever_sd_m", "delta_sd_rad", "tau_sd_s", "eps_sd_rad", "walk_sd_radps"),
+        *_named_doubles("walk_tau_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts", "accel_noise_multiplier"),
+        *_named_doubles("stand_sd_rad", "stand_noise_rate_hz", "stand_interval_s", "stand_guard_s"),
     ]
 
 
@@ -58,7 +58,7 @@ class TurnStruct(c.Structure):
 class InnovationStruct(c.Structure):
     """struct nav_kf_innovation."""
 
-    _fields_ = _doubles("value", "variance")
+    _fields_ = _named_doubles("value", "variance")
 
 
 class StateStruct(c.Structure):
@@ -69,7 +69,7 @@ class StateStruct(c.Structure):
         ("params", ParamsStruct),
         ("c_nb", _D * 9),
         ("c0_nb", _D * 9),
-        *_doubles("nis_accel", "nis_stand"),
+        *_named_doubles("nis_accel", "nis_stand"),
         *[(name, c.c_int64) for name in ("count_accel", "count_stand", "stand_left_out")],
         ("last", InnovationStruct * 6),
     ]

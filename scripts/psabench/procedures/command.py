@@ -18,7 +18,18 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import KEPT, Parser, natural, node_id, of_fields, positive, yes_no
-from psabench.procedures.run_table import COMPARE, CONDITIONS, G_MPS2, ON_THE_HEAD, ON_THE_PLATFORM, SINS, THERMAL
+from psabench.procedures.run_table import (
+    COMPARE,
+    CONDITIONS,
+    COVARIANCE,
+    G_MPS2,
+    ON_THE_HEAD,
+    ON_THE_PLATFORM,
+    SECONDARY,
+    SINS,
+    SNAKE,
+    THERMAL,
+)
 from psabench.progress import Bar
 from psabench.shell import command_line
 
@@ -49,7 +60,7 @@ are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit stat
 outputs by more than its limits.
 """
 
-NOTES_SINS = """
+NOTES_OUTPUTS = """
 Exit status 1: a figure is out of its limits. docs/procedures/sins_secondary.md derives the method.
 """
 
@@ -116,16 +127,15 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     },
     "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
 }
-# Of the thermal run alone.
-IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
-    "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
-    "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
-    "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
+# Of the calibration on a rate table alone.
+ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
+    "--table": {"metavar": "VISA-ADDRESS", "help": f"rate table, real or emulated: {EXAMPLES}"},
+    "--data": {"type": Path, "metavar": "FILE", "help": "increments of a recording in place of a bench"},
+    "--layout": {"type": Path, "metavar": "FILE", "help": "what the recording's columns are (docs/sins_data.md)"},
+    "--angles": {"type": Path, "metavar": "FILE", "help": "angles of the table, as table_angles.csv of a run"},
 }
-
-
-# Of the calibration of a unit that navigates.
-OF_UNITS: Mapping[str, Mapping[str, Any]] = {
+# Recordings of a unit that navigates.
+FROM_OUTPUTS: Mapping[str, Mapping[str, Any]] = {
     "--first": {
         "type": Path,
         "metavar": "FILE",
@@ -136,6 +146,12 @@ OF_UNITS: Mapping[str, Mapping[str, Any]] = {
         "metavar": "FILE",
         "help": "recording of the experiment that is compensated; none: calibrate alone",
     },
+}
+# Of the thermal run alone.
+IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
+    "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
+    "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
+    "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
 
@@ -227,7 +243,7 @@ def _parser_of(command: Command) -> Parser:
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        how = COMMON.get(option) or IN_THE_CHAMBER.get(option) or OF_UNITS[option]
+        how = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE, **FROM_OUTPUTS}[option]
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **how)
     return p
 
@@ -376,15 +392,42 @@ def _run_thermal(args: argparse.Namespace) -> int:
     from psabench.report import thermal_grading, thermal_page
     from psabench.thermal import run as thermal_run
 
-    done = thermal_run.run_thermal(of_fields(thermal_run.ThermalOptions, args, params=_params(args)), Bar())
-    truth = thermal_grading.read_truth(done.folder, done.result.recordings)
-    report = thermal_grading.graded_report(done.result, truth, done.facts)
-    page = thermal_page.write_page(done.folder.path, report)
+    options = of_fields(thermal_run.ThermalOptions, args, params=_params(args))
+    with thermal_run.run_thermal(options, Bar()) as done:
+        truth = thermal_grading.read_truth(done.folder, done.result.recordings)
+        report = thermal_grading.graded_report(done.result, truth, done.facts)
+        page = thermal_page.write_page(done.folder.path, report)
     if args.verbose:
         print(thermal_grading.console_lines(report))
     print(thermal_grading.state_verdict(report))
     print(f"report: {page}")
     return 0 if thermal_grading.within_limits(report) else 1
+
+
+def _calibrate_sins(args: argparse.Namespace) -> int:
+    """Minutes on a table through the wire, or a recording of them."""
+    from psabench.report.grading import aligned
+    from psabench.sins import calibration_run as sins_run
+
+    done = sins_run.run_calibration(of_fields(sins_run.SinsOptions, args, params=_params(args)), Bar())
+    page = sins_run.write_page(args.out, done)
+    if args.verbose:
+        print("\n".join(aligned(sins_run.table_rows(done))))
+    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
+    print(sins_run.verdict(done))
+    print(f"report: {page}")
+    return 0 if done.within else 1
+
+
+def _predict_sins(args: argparse.Namespace) -> int:
+    """A covariance: no bench, no data."""
+    from psabench.procedures.result import made_params
+    from psabench.sins import covariance_run
+
+    study = covariance_run.run_study(made_params(covariance_run.CovarianceParams, args.procedure, _params(args)))
+    print(covariance_run.console_lines(study))
+    print(f"report: {covariance_run.write_page(args.out, study)}")
+    return 0
 
 
 def _snake(args: argparse.Namespace) -> int:
@@ -423,14 +466,6 @@ _CHAMBER = (
 )
 
 _EXAMPLES: Mapping[str, str] = {
-    "sins-calibration-secondary": """\
-  psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
-  psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
-""",
-    "sins-snake": """\
-  psabench run sins-snake
-  psabench run sins-snake --flight my_flight.yaml --plan two_rates
-""",
     "turns": """\
   psabench run turns
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
@@ -464,6 +499,25 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run thermal                       a quick look, on an emulator started for it
   psabench run thermal --schedule full --out build/run/qa-0001
   psabench run thermal --resume build/run/qa-0001
+""",
+    SINS[0]: """\
+  psabench run sins-calibration                     the article's plan on an emulated precise table, 45 minutes
+  psabench run sins-calibration --stand no          on a coarse table, which shows no angles
+  psabench run sins-calibration --data build/run/increments.bin --layout build/run/increments.yaml --stand no
+  psabench nav apply run.csv --calibration build/run/result.json --out corrected.csv
+""",
+    SECONDARY[0]: """\
+  psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
+  psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+""",
+    SNAKE[0]: """\
+  psabench run sins-snake
+  psabench run sins-snake --flight my_flight.yaml --plan two_rates
+""",
+    COVARIANCE[0]: """\
+  psabench run sins-covariance                                the article's two tables in every reading of its noise
+  psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
+  psabench run sins-covariance --plan two_rates --lever 3     lever arms of the accelerometers
 """,
 }
 
@@ -500,7 +554,19 @@ def _of_the_chamber() -> Parameters:
     return Parameters(fields={k: f for k, f in BenchAccuracy.__dataclass_fields__.items() if k != "chain_off_k"})
 
 
-def _of_sins(name: str) -> Parameters:
+def _of_the_sins() -> Parameters:
+    from psabench.sins.calibration_run import CalibrationParams
+
+    return Parameters(fields=CalibrationParams.__dataclass_fields__)
+
+
+def _of_the_covariance() -> Parameters:
+    from psabench.sins.covariance_run import CovarianceParams
+
+    return Parameters(fields=CovarianceParams.__dataclass_fields__)
+
+
+def _of_outputs(name: str) -> Parameters:
     from psabench.sins import secondary_run, snake
 
     kind = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
@@ -522,6 +588,24 @@ def _commands() -> Iterator[Command]:
         )
     name, summary = COMPARE
     yield Command(name=name, summary=summary, handler=_compare, common=_STARTED, examples=_EXAMPLES[name])
+    name, summary = SINS
+    yield Command(
+        name=name,
+        summary=summary,
+        handler=_calibrate_sins,
+        common=("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose"),
+        load=_of_the_sins,
+        examples=_EXAMPLES[name],
+    )
+    name, summary = COVARIANCE
+    yield Command(
+        name=name,
+        summary=summary,
+        handler=_predict_sins,
+        common=("--out",),
+        load=_of_the_covariance,
+        examples=_EXAMPLES[name],
+    )
     name, summary = THERMAL
     yield Command(
         name=name,
@@ -543,16 +627,15 @@ def _commands() -> Iterator[Command]:
             examples=_EXAMPLES[name],
             notes=NOTES_PLATFORM,
         )
-    handlers = {"sins-snake": (_snake, ("--out",)), "sins-calibration-secondary": (_secondary, (*OF_UNITS, "--out"))}
-    for name, summary in SINS.items():
+    for (name, summary), handler, takes in ((SNAKE, _snake, ()), (SECONDARY, _secondary, tuple(FROM_OUTPUTS))):
         yield Command(
             name=name,
             summary=summary,
-            handler=handlers[name][0],
-            common=handlers[name][1],
-            load=partial(_of_sins, name),
+            handler=handler,
+            common=(*takes, "--out"),
+            load=partial(_of_outputs, name),
             examples=_EXAMPLES[name],
-            notes=NOTES_SINS,
+            notes=NOTES_OUTPUTS,
         )
 
 

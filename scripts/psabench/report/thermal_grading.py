@@ -6,7 +6,6 @@ compensation is compared with it at the temperature of the element. No part of t
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,8 +17,9 @@ from psabench.budget.gum import COVERAGE
 from psabench.errors import BadInput, expected
 from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import Compared, aligned, as_ratio, estimate_dict, finite_or_none, with_ci
+from psabench.thermal.budget import estimate_at, unit_of
 from psabench.thermal.compensation import compensation_dict
-from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, whole_lines
+from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, number_in, read_rows
 from psabench.thermal.reduce import SIDE_FACES, Points, points_of, quantity_names
 from psabench.thermal.result import (
     Difference,
@@ -28,9 +28,7 @@ from psabench.thermal.result import (
     case_lag_s,
     degrees_of,
     difference_of,
-    estimate_at,
     residuals_of,
-    unit_of,
 )
 from psabench.thermal.schedule import POSITIONS
 
@@ -88,13 +86,7 @@ def read_truth(folder: RunFolder, recordings: Sequence[Recording]) -> ThermalTru
 
 def _truth_rows(path: Path) -> list[dict[str, float]]:
     """By column. Raises BadInput for a file of another form."""
-    rows = list(csv.reader(whole_lines(path)))
-    if rows and tuple(rows[0]) != TRUTH_COLUMNS:
-        raise BadInput(expected(f"the columns {','.join(TRUTH_COLUMNS)}", ",".join(rows[0]), f"{path}:1"))
-    try:
-        return [dict(zip(TRUTH_COLUMNS, map(float, row), strict=True)) for row in rows[1:]]
-    except ValueError as e:
-        raise BadInput(expected("numbers in each column", e, path)) from e
+    return [{n: number_in(n, text, where) for n, text in row.items()} for where, row in read_rows(path, TRUTH_COLUMNS)]
 
 
 def _true_recording(r: Recording, at: Mapping[str, float]) -> Recording:
@@ -130,7 +122,7 @@ def _graded_rows(result: ThermalResult, truth: ThermalTruth) -> list[GradedAt]:
         for k in _graded_at(m, truth.element_c, result.normal_c):
             temp_c = float(truth.element_c[k])
             for q in quantity_names():
-                e = estimate_at(m, q, temp_c, result.accuracy)
+                e = estimate_at(m.fitted(q), temp_c, result.accuracy)
                 true = float(truth.points.quantity(q)[k])
                 rows.append(GradedAt(method=m.name, temp_c=temp_c, estimate=e, truth=true, error=e.value - true))
     return rows
@@ -250,7 +242,7 @@ def interpolation_lines(report: ThermalReport) -> list[str]:
     lines = []
     for m in report.result.sweeps:
         scale = float(m.points.scale_v_per_g.mean())
-        rms, most = (float(x.max()) / 2.0**0.5 / scale * 1e6 for x in _interpolation_of(m))
+        rms, most = (float(x.max()) / scale * 1e6 for x in _interpolation_of(m))
         lines.append(
             f"{m.title}: positions are interpolated to one instant a round; that is off by {rms:.2g} µg rms, "
             f"{most:.2g} µg at most, found by leaving out recordings"

@@ -14,7 +14,8 @@ from psabench.report import plots
 from psabench.report import thermal_grading as grading
 from psabench.report.page import bullets, figure, folded, section, table, verdict_line, whole_page, write_report
 from psabench.report.thermal_grading import ThermalReport
-from psabench.thermal.result import Method, element_of, estimate_at, predicted_sweep, symbol_of
+from psabench.thermal.budget import element_of, estimate_at, symbol_of
+from psabench.thermal.result import Method, predicted_sweep
 
 TITLE = "Accelerometers against temperature"
 CAPTIONS = {
@@ -91,7 +92,7 @@ def _method_section(report: ThermalReport, m: Method, ident: str) -> str:
 def _budget_table(report: ThermalReport, m: Method) -> list[tuple[str, ...]]:
     """Standard uncertainties at the normal temperature, of the quantities of x."""
     rows: list[tuple[str, ...]] = [("", "component", "u", "unit")]
-    for e in (estimate_at(m, q, report.result.normal_c, report.result.accuracy) for q in m.fits if "_x" in q):
+    for e in (estimate_at(m.fitted(q), report.result.normal_c, report.result.accuracy) for q in m.fits if "_x" in q):
         rows += [(e.name, c.name, f"{c.u:.2g}", e.unit) for c in e.budget]
     return rows
 

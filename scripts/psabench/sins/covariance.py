@@ -1,6 +1,7 @@
 """Accuracy of a calibration before it is done: covariance of the article's filter over a plan of rotations.
 
-`predict` is one run of the filter without data; READINGS are the ways to read the article's noise (docs/sins.md).
+`predict_accuracy` is one run of the filter without data; READINGS are the ways to read the article's noise
+(docs/procedures/sins.md).
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psabench.native.nav import ARCMIN, DEGPH, Floats
-from psabench.native.sins import Gauge, Sins, SinsConfig, prior
+from psabench.native.sins import Gauge, Sins, SinsConfig, prior_covariance
 from psabench.sins.plan import RotationPlan, rates_of
 
 SAMPLE_S = 0.05  # of the ideal increments: two a step
-EAST_DEG = 25.0  # the axis nearer than this to east: drifts hang on the heading (sources sins 2)
+EAST_DEG = 25.0  # the axis nearer than this to east: drifts hang on the heading (sources instruments 5.2)
 LEAST_CYCLE_S = 300.0
 KNOWN = 0.5  # part of its prior that a block may keep before it is called undetermined
 
@@ -32,25 +33,25 @@ class Quantity:
     chosen: Callable[[int, int], bool]  # of an element, row and column
 
 
-def _each(_: int, __: int) -> bool:
+def _any_element(_: int, __: int) -> bool:
     return True
 
 
-def _diagonal(i: int, j: int) -> bool:
+def _on_diagonal(i: int, j: int) -> bool:
     return i == j
 
 
-def _crossed(i: int, j: int) -> bool:
+def _off_diagonal(i: int, j: int) -> bool:
     return i != j
 
 
 QUANTITIES: tuple[Quantity, ...] = (
-    Quantity(key="nu_degph", label="ν", unit="°/h", block="nu", scale=1.0 / DEGPH, chosen=_each),
-    Quantity(key="theta_ii", label="Θii", unit="", block="theta", scale=1.0, chosen=_diagonal),
-    Quantity(key="theta_ij_arcmin", label="Θij", unit="′", block="theta", scale=1.0 / ARCMIN, chosen=_crossed),
-    Quantity(key="df_mps2", label="Δf", unit="m/s²", block="df", scale=1.0, chosen=_each),
-    Quantity(key="gamma_ii", label="Γii", unit="", block="gamma", scale=1.0, chosen=_diagonal),
-    Quantity(key="gamma_ij_arcmin", label="Γij", unit="′", block="gamma", scale=1.0 / ARCMIN, chosen=_crossed),
+    Quantity(key="nu_degph", label="ν", unit="°/h", block="nu", scale=1.0 / DEGPH, chosen=_any_element),
+    Quantity(key="theta_ii", label="Θii", unit="", block="theta", scale=1.0, chosen=_on_diagonal),
+    Quantity(key="theta_ij_arcmin", label="Θij", unit="′", block="theta", scale=1.0 / ARCMIN, chosen=_off_diagonal),
+    Quantity(key="df_mps2", label="Δf", unit="m/s²", block="df", scale=1.0, chosen=_any_element),
+    Quantity(key="gamma_ii", label="Γii", unit="", block="gamma", scale=1.0, chosen=_on_diagonal),
+    Quantity(key="gamma_ij_arcmin", label="Γij", unit="′", block="gamma", scale=1.0 / ARCMIN, chosen=_off_diagonal),
 )
 # Tables 1 and 2 as printed.
 PRINTED: Mapping[bool, Mapping[str, float]] = {
@@ -116,21 +117,21 @@ class Prediction:
     covariance: Floats
 
 
-def predict(plan: RotationPlan, cfg: SinsConfig) -> Prediction:
+def predict_accuracy(plan: RotationPlan, cfg: SinsConfig) -> Prediction:
     """One run of the filter without data. Raises Refused."""
     cfg = replace(cfg, sample_s=SAMPLE_S)
     s = Sins(cfg, plan.start_c_nb)
     s.plan(plan.turns)
     p = s.covariance()[1]
-    after, before = np.sqrt(np.diag(p)), np.sqrt(np.diag(prior(cfg)))
+    after, before = np.sqrt(np.diag(p)), np.sqrt(np.diag(prior_covariance(cfg)))
     return Prediction(
-        columns={q.key: _spread(q, cfg.gauge, after[s.rows[q.block]], before[s.rows[q.block]]) for q in QUANTITIES},
+        columns={q.key: _spread_of(q, cfg.gauge, after[s.rows[q.block]], before[s.rows[q.block]]) for q in QUANTITIES},
         sd={name: after[rows] for name, rows in s.rows.items() if rows.stop > rows.start},
         covariance=p,
     )
 
 
-def _spread(q: Quantity, gauge: Gauge, after: Floats, before: Floats) -> Spread:
+def _spread_of(q: Quantity, gauge: Gauge, after: Floats, before: Floats) -> Spread:
     at = {"gamma": GAMMA_AT[gauge], "theta": tuple(range(9))}.get(q.block, (0, 4, 8))
     chosen = np.array([q.chosen(*divmod(k, 3)) for k in at])
     sd = after[chosen] * q.scale
@@ -157,7 +158,7 @@ def warnings_of(plan: RotationPlan, cfg: SinsConfig, found: Prediction) -> list[
     said = []
     if plan.axis_from_east_deg < EAST_DEG and cfg.beta_sd_rad[2] > ARCMIN:
         said.append(
-            f"the table's axis is {plan.axis_from_east_deg:.0f} deg from east: gyro drifts can not be told from the "
+            f"the table's axis is {plan.axis_from_east_deg:.0f} deg from east: gyro drifts cannot be told from the "
             "heading; turn the table to north +-60 deg, or give the heading to 1'"
         )
     rates = rates_of(plan.turns)

@@ -51,7 +51,7 @@ class RotationPlan:
         return abs(90.0 - self.axis_azimuth_deg % 180.0)
 
     def with_azimuth(self, azimuth_deg: float) -> RotationPlan:
-        """The same turns on a table that stands otherwise."""
+        """The same turns on a table of another azimuth."""
         return RotationPlan(name=self.name, axis_azimuth_deg=azimuth_deg, turns=self.turns)
 
 
@@ -79,7 +79,9 @@ def plan_of_dict(found: object, where: str, name: str = "") -> RotationPlan:
         raise BadInput(expected(f"a list of 1 to {MOST_TURNS}", turns, f"{where}: turns"))
     return RotationPlan(
         name=name,
-        axis_azimuth_deg=_number(found.get("axis_azimuth_deg", 0.0), -360.0, 360.0, f"{where}: axis_azimuth_deg"),
+        axis_azimuth_deg=_checked_number(
+            found.get("axis_azimuth_deg", 0.0), -360.0, 360.0, f"{where}: axis_azimuth_deg"
+        ),
         turns=tuple(_turn_of_dict(t, f"{where}: turns[{k}]") for k, t in enumerate(turns)),
     )
 
@@ -93,13 +95,13 @@ def _turn_of_dict(found: Any, where: str) -> Turn:
         raise BadInput(expected("true or false", found["remount"], f"{where}: remount"))
     return Turn(
         axis_b=AXES[found["axis"]],
-        rate_radps=_number(found["rate_degps"], -MOST_DEGPS, MOST_DEGPS, f"{where}: rate_degps") * DEG,
-        duration_s=_number(found["for_s"], 0.0, MOST_S, f"{where}: for_s"),
+        rate_radps=_checked_number(found["rate_degps"], -MOST_DEGPS, MOST_DEGPS, f"{where}: rate_degps") * DEG,
+        duration_s=_checked_number(found["for_s"], 0.0, MOST_S, f"{where}: for_s"),
         remount=found.get("remount", False),
     )
 
 
-def _number(value: object, low: float, high: float, where: str) -> float:
+def _checked_number(value: object, low: float, high: float, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise BadInput(expected(f"{low:g} to {high:g}", value, where))
     return float(value)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from psabench.errors import BadInput, expected
+from psabench.link.own import output_text
 from psabench.sins.increments import Floats, Increments
 from psabench.sins.layout import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, Layout, turn
 
@@ -146,6 +147,15 @@ def _read_mf4(path: Path, layout: Layout) -> Floats:
             said = done.stderr.decode(errors="replace").splitlines()
             raise BadInput(expected("an MF4 file", said[-1][:200] if said else f"status {done.returncode}", path))
         return np.asarray(np.load(out, allow_pickle=False), np.float64)
+
+
+def write_csv(path: Path, data: Increments) -> None:
+    """As `read_increments` reads it without a layout, to the last digit. Raises BadInput, OutputError."""
+    default = Layout()
+    with output_text(path) as file:
+        file.write(",".join(map(str, [default.time, *default.gyro, *default.accel])) + "\n")
+        for t_s, *row in np.column_stack([data.end_s, data.dtheta_rad, data.dv_mps]).tolist():
+            file.write(",".join([f"{t_s:.9f}", *map(repr, row)]) + "\n")
 
 
 READERS: Mapping[str, Callable[[Path, Layout], Floats]] = {

@@ -18,7 +18,7 @@ import numpy as np
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import BadInput, expected
 from psabench.passport.store import UnitRun
-from psabench.thermal.bench import CASE_CHANNEL, SENSOR_HIGH_C, SENSOR_LOW_C
+from psabench.thermal.bench import CASE_CHANNEL, SENSOR_HIGH_C, SENSOR_LOW_C, input_v
 from psabench.thermal.compensation import Array, Compensation, element_temperature
 from psabench.thermal.reduce import ARCSEC, AXES, quantity_names
 
@@ -66,7 +66,7 @@ class Compensator:
         if case is None:
             self.blind += len(frames)
             return np.full((len(frames), 3), np.nan)
-        return self._solve(frames.u_v / self._gain, self._values_at(t_s, case))
+        return self._solve(input_v(frames.u_v, self._gain), self._values_at(t_s, case))
 
     def columns(self, frames: Frames) -> dict[str, Array]:
         """For a table."""

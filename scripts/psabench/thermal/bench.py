@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from psabench.boards.psa2.device import CONFIG0, DATA_HZ, SETTLE_PERIODS, Psa2
+from psabench.boards.psa2.device import CODE_V, CONFIG0, DATA_HZ, SETTLE_PERIODS, Psa2
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import LinkError, expected
 from psabench.instruments import Chamber, Head
@@ -29,7 +29,7 @@ class Sample:
     """A recording as the unit gives it."""
 
     t_s: float  # its middle
-    u_v: Array  # (3,) means at the loads, the filter's gain taken out
+    u_v: Array  # (3,) means at the loads, the filter's gain and half a code taken out
     sd_v: Array  # (3,) of the means
     temps_degc: Array  # (4,) elements of X, Y, Z, case
 
@@ -121,10 +121,15 @@ def sample_of_frames(frames: Frames, t_s: float, gain: float) -> Sample:
         raise LinkError(expected("settled readings", f"{int((~frames.settled).sum())} that are not", "unit"))
     return Sample(
         t_s=t_s,
-        u_v=frames.u_v.mean(axis=0) / gain,
+        u_v=input_v(frames.u_v, gain).mean(axis=0),
         sd_v=scatter_of_means(frames.u_v) / gain,
         temps_degc=np.array([_channel_degc(frames, k) for k in range(len(CHANNELS))]),
     )
+
+
+def input_v(u_v: Array, gain: float) -> Array:
+    """What the readings mean: codes are cut off, half a code below the voltage on average; gain of the filter."""
+    return np.asarray((u_v + CODE_V / 2.0) / gain)
 
 
 def scatter_of_means(u_v: Array) -> Array:

@@ -189,8 +189,8 @@ def _design_matrix(scaled: Array, degree: int, column: Array | None) -> Array:
     return np.asarray(rows if column is None else np.column_stack([rows, column]), np.float64)
 
 
-def _residual_squares(case_c: Array, element_c: Array, y: Array, degree: int) -> float:
-    """Sum of the residuals' squares with that temperature of the element."""
+def residual_squares(case_c: Array, element_c: Array, y: Array, degree: int) -> float:
+    """Sum of the residuals' squares of a fit with that temperature of the element, (n,) each, and the lag's column."""
     scaled = scale_temperature(element_c, float(element_c.min()), float(element_c.max()))
     rows = _design_matrix(scaled, degree, case_c - element_c)
     residual = y - rows @ np.linalg.lstsq(rows, y, rcond=None)[0]
@@ -203,7 +203,7 @@ def _best_tau_s(sweep: SweepCase, y: Array, degree: int) -> float:
     for _ in range(SCANS):
         scan = np.geomspace(low, high, SCAN)
         element = sweep.element_c(scan)
-        best = int(np.argmin([_residual_squares(sweep.case_c, column, y, degree) for column in element.T]))
+        best = int(np.argmin([residual_squares(sweep.case_c, column, y, degree) for column in element.T]))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, SCAN - 1)]
     return float(np.sqrt(low * high))
 

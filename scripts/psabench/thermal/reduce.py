@@ -4,7 +4,7 @@ Along gravity and against it, half the difference of an axis's readings is its s
 another axis along gravity, half the difference over the scale is the component of the misalignment towards that axis.
 During a sweep the positions are recorded one after the other, at different temperatures: each is interpolated to one
 instant a round, by cubics through the four nearest of its recordings. How far off that may be is measured, by leaving
-out recordings: `Points.interpolation_v`.
+out recordings: `Points.left_out`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,24 @@ Array = npt.NDArray[np.float64]
 
 AXES = "xyz"
 ARCSEC = float(np.degrees(1.0)) * 3600.0
-LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 16 times
+LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 7 times
 LEAST_VISITS = 6  # of a position in a sweep
 TOP_K = 0.1  # noise of the chamber's reading
 SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LeftOut:
+    """Guesses of a sweep's readings by their neighbours, less the readings: mean squares, V^2; 0 for a soak.
+
+    The two positions of a pair are recorded one after the other, so their errors are nearly the same: they add up in
+    half the sum and cancel in half the difference.
+    """
+
+    half_sum_v2: Array  # (3,) of an axis that is vertical
+    half_diff_v2: Array  # (3, 3) of the axis, with the other one vertical
+    most_v2: Array  # (3,) the largest of half_sum_v2
+    noise_part: float  # of a reading's variance that is in a guess less the reading
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,11 +55,22 @@ class Points:
     scale_v_per_g: Array  # (n, 3)
     base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
     scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
-    interpolation_v: Array  # (3,) of one position's reading, rms; 0 for a soak
-    interpolation_most_v: Array  # (3,) the largest
+    left_out: LeftOut
+    noise_part: Array  # (3,) of a reading's variance that is in a point's, by the axis that is vertical
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
+    samples: int  # of a recording
     turn_s: float  # when the chamber has reached the top of a sweep; the last instant of a soak
     notes: tuple[str, ...] = ()
+
+    @property
+    def interpolation_v(self) -> Array:
+        """Of the half sum of an axis's two readings, rms, (3,)."""
+        return left_out_error(self.left_out.half_sum_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
+
+    @property
+    def interpolation_most_v(self) -> Array:
+        """The same, the largest, (3,)."""
+        return left_out_error(self.left_out.most_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
 
     @property
     def up(self) -> npt.NDArray[np.bool_]:
@@ -74,12 +99,19 @@ def gravity_at(position: Position, alpha_deg: float) -> Array:
     return np.array([along, 0.0, across] if position.face in SIDE_FACES else [along, across, 0.0])
 
 
-def points_of(recordings: Sequence[Recording]) -> dict[str, Points]:
+def turning_axes(vertical: int) -> tuple[int, ...]:
+    """Axes in the plane in which the head turns the unit where this one is vertical; the other is along the head's."""
+    (face,) = {p.face for p in POSITIONS.values() if p.axis == vertical}
+    return (0, 2) if face in SIDE_FACES else (0, 1)
+
+
+def points_of(recordings: Sequence[Recording], samples: int = 1) -> dict[str, Points]:
     """By segment, in the order of the run. Raises BadInput where there are too few recordings."""
     segments: dict[str, list[Recording]] = {}
     for r in recordings:
         segments.setdefault(r.segment, []).append(r)
-    found = {name: _soak_points(rows) if name == SOAK else _sweep_points(rows) for name, rows in segments.items()}
+    of = {name: _soak_points if name == SOAK else _sweep_points for name in segments}
+    found = {name: replace(of[name](rows), samples=samples) for name, rows in segments.items()}
     if not found:
         raise BadInput(expected("recordings", "none", "thermal run"))
     return found
@@ -160,9 +192,10 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        interpolation_v=np.zeros(3),
-        interpolation_most_v=np.zeros(3),
+        left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3), noise_part=1.0),
+        noise_part=np.ones(3),
         history=(t_s, case_c),
+        samples=1,
         turn_s=float(t_s[-1]),
         notes=tuple(notes),
     )
@@ -184,8 +217,6 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
     middle = middle[(middle >= first) & (middle <= last)]
     by = {p: interpolate_cubic(t_s[at], level[at], middle) for p, at in visits.items()}
     zero, scale, base = _solve_positions(by)
-    scatter = _scatter_of(rows)
-    off = np.concatenate([left_out_error(t_s[at], level[at], scatter) for at in visits.values()])
     return Points(
         segment=name,
         t_s=middle,
@@ -193,10 +224,11 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         zero_ug=zero,
         scale_v_per_g=scale,
         base_arcsec=base,
-        scatter_v=scatter,
-        interpolation_v=np.sqrt(np.mean(off**2, axis=0)),
-        interpolation_most_v=off.max(axis=0),
+        scatter_v=_scatter_of(rows),
+        left_out=_left_out({p: (left_out_weights(t_s[at]), level[at]) for p, at in visits.items()}),
+        noise_part=_noise_part({p: cubic_weights(t_s[at], middle)[1] for p, at in visits.items()}),
         history=(t_s, case_c),
+        samples=1,
         turn_s=_turn_of(rows),
     )
 
@@ -206,8 +238,28 @@ def _turn_of(rows: Sequence[Recording]) -> float:
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
-def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
-    """Through the four nearest of the readings u (m, k) at t_s (m,); (n, k) at at_s (n,)."""
+def _noise_part(weights: Mapping[str, Array]) -> Array:
+    """By each position's weights of interpolation, (n, 4)."""
+    squares = {p: float((w**2).sum(axis=1).mean()) for p, w in weights.items()}
+    return np.array([(squares[f"{axis}_down"] + squares[f"{axis}_up"]) / 2.0 for axis in AXES])
+
+
+def _left_out(visits: Mapping[str, tuple[Array, Array]]) -> LeftOut:
+    """By each position's weights, (m - 2, m), and readings, (m, 3); a round has both positions of a pair."""
+    off = {p: weights @ u for p, (weights, u) in visits.items()}
+    half_sum, half_diff, most = np.empty(3), np.empty((3, 3)), np.empty(3)
+    for j, axis in enumerate(AXES):
+        rounds = min(len(off[f"{axis}_down"]), len(off[f"{axis}_up"]))
+        down, up = off[f"{axis}_down"][:rounds], off[f"{axis}_up"][:rounds]
+        squares = ((down[:, j] + up[:, j]) / 2.0) ** 2
+        half_sum[j], most[j] = squares.mean(), squares.max()
+        half_diff[:, j] = (((down - up) / 2.0) ** 2).mean(axis=0)
+    noise_part = float(np.mean([(weights**2).sum(axis=1).mean() for weights, _ in visits.values()]))
+    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most, noise_part=noise_part)
+
+
+def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    """The four nearest of the instants t_s (m,), and their weights at at_s (n,): (n, 4) each."""
     begin = np.clip(np.searchsorted(t_s, at_s) - 2, 0, len(t_s) - 4)
     near = begin[:, None] + np.arange(4)
     t = t_s[near]
@@ -216,18 +268,30 @@ def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
         for m in range(4):
             if m != j:
                 weights[:, j] *= (at_s - t[:, m]) / (t[:, j] - t[:, m])
+    return near, weights
+
+
+def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
+    """Through the four nearest of the readings u (m, k) at t_s (m,); (n, k) at at_s (n,)."""
+    near, weights = cubic_weights(t_s, at_s)
     return np.asarray(np.einsum("nj,njk->nk", weights, u[near]))
 
 
-def left_out_error(t_s: Array, u: Array, scatter_v: Array) -> Array:
-    """How far off an interpolation may be, (m - 2, k): each reading from its neighbours, a gap twice as long, without
-    what the scatter does to that; divided by LEFT_OUT."""
-    found = []
-    for k in range(1, len(t_s) - 1):
-        rest = np.arange(len(t_s)) != k
-        guess = interpolate_cubic(t_s[rest], u[rest], t_s[k : k + 1])[0]
-        found.append((guess - u[k]) ** 2 - 1.64 * scatter_v**2)  # 1 + 2 (9/16)^2 + 2 (1/16)^2
-    return np.asarray(np.sqrt(np.maximum(np.array(found), 0.0)) / LEFT_OUT)
+def left_out_weights(t_s: Array) -> Array:
+    """Of the readings at t_s (m,), in what its neighbours give for each one less the reading, (m - 2, m): a gap twice
+    as long."""
+    found = -np.eye(len(t_s))[1:-1]
+    for row, k in zip(found, range(1, len(t_s) - 1), strict=True):
+        rest = np.flatnonzero(np.arange(len(t_s)) != k)
+        near, weights = cubic_weights(t_s[rest], t_s[k : k + 1])
+        row[rest[near[0]]] = weights[0]
+    return found
+
+
+def left_out_error(squares: npt.ArrayLike, noise: npt.ArrayLike, noise_part: float) -> Array:
+    """How far off an interpolation may be, the same shape: without what noise of a reading does, over LEFT_OUT."""
+    beyond = np.asarray(squares) - noise_part * np.asarray(noise) ** 2
+    return np.asarray(np.sqrt(np.maximum(beyond, 0.0)) / LEFT_OUT)
 
 
 def up_leg(p: Points) -> Points:

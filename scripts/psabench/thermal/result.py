@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from psabench.boards.psa2.device import CODE_V
 from psabench.budget.accuracy import BenchAccuracy
-from psabench.budget.gum import expand_estimate
 from psabench.errors import BadInput
-from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
+from psabench.estimate.uncertainty import Estimate
+from psabench.thermal.budget import Fitted, Leftover, element_of, estimate_at, leftover_of
 from psabench.thermal.compensation import (
     Compensation,
-    SweepCase,
     element_temperature,
     fit_soak,
     fit_sweep,
@@ -23,19 +21,15 @@ from psabench.thermal.compensation import (
 )
 from psabench.thermal.degree import DegreeRow, degree_rows
 from psabench.thermal.records import Recording
-from psabench.thermal.reduce import ARCSEC, AXES, Points, points_of, quantity_names, up_leg
+from psabench.thermal.reduce import Points, points_of, quantity_names, up_leg
 from psabench.thermal.schedule import Schedule, sweep_names
 
 Array = npt.NDArray[np.float64]
 
 START_C = 25.0  # of the chamber, before a run
 NORMAL_C = 30.0  # the article's normal temperature: where a passport has its numbers
-TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
-MANY_DOF = 20  # with fewer the residual is too uncertain to take the noise off it
-PLAY_K = 0.3  # limit of what the element's temperature leaves undecided, by the way on which it was reached (E0)
 CASE_TAU_S, ELEMENT_TAU_S = 180.0, 360.0  # lags where no sweep has found them (E0)
 SETTLE_STEP_S = 5.0
-SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn again at each turn, so in the scatter
 ENDS = 0.05  # of the range: what a loop is not taken from, at either end
 DEGREES = (1, 2, 3, 4, 5, 6, 7, 8)
 
@@ -46,13 +40,14 @@ class Fits:
 
     quantity: str
     best: Compensation  # what a passport gets: with the lag where both legs are there
+    leftover: Leftover  # what that leaves of the points
     one_leg: Compensation | None = None  # of a sweep's way up, against the case
     both_legs: Compensation | None = None  # the same of both legs, without a lag
     largest: float = 0.0  # of the quantity: residuals are percents of it
 
     def percent_of(self, residual: Array) -> float:
-        """The largest one, of the largest value (zero) or change (scale, base)."""
-        return 100.0 * float(np.abs(residual).max()) / self.largest
+        """The largest one, of the largest value (zero) or change (scale, base); 0 where there is none."""
+        return 100.0 * float(np.abs(residual).max()) / self.largest if self.largest else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,6 +59,12 @@ class Method:
     points: Points
     fits: dict[str, Fits]
     settling_k: float = 0.0  # that the element may miss the case by, at the end of a dwell
+    play: bool = True  # whether the way to a temperature was not that of the soak
+
+    def fitted(self, quantity: str) -> Fitted:
+        """What the budget of a quantity is made from."""
+        f = self.fits[quantity]
+        return Fitted(points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play)
 
     @property
     def title(self) -> str:
@@ -92,29 +93,19 @@ class ThermalResult:
         return [m for m in self.methods if m.rate_k_per_min is not None]
 
 
-def unit_of(quantity: str) -> str:
-    """By the name of the quantity."""
-    return {"zero": "µg", "scale": "V/g", "base": "″"}[quantity.partition("_")[0]]
-
-
-def symbol_of(quantity: str) -> str:
-    """As on pages."""
-    kind, axes = quantity.split("_")[:2]
-    return {"zero": f"g_t,{axes}", "scale": f"U_k,{axes}", "base": f"δ_{axes}"}[kind]
-
-
 def estimate_run(
     recordings: Sequence[Recording], schedule: Schedule, g_mps2: float, accuracy: BenchAccuracy
 ) -> ThermalResult:
     """Pure. Raises BadInput where a method has too few recordings for its fits."""
-    rates = sweep_names(schedule)
-    methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings).items())
+    rates, samples = sweep_names(schedule), round(schedule.record_s * schedule.samples_hz)
+    methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings, samples).items())
     settling_k = _settling_k(methods, recordings, schedule)
-    methods = tuple(replace(m, settling_k=settling_k) if m.rate_k_per_min is None else m for m in methods)
+    play = schedule.soak is not None and _goes_both_ways(schedule.soak.temperatures_c)
+    methods = tuple(replace(m, settling_k=settling_k, play=play) if m.rate_k_per_min is None else m for m in methods)
     low = max(float(m.points.case_c.min()) for m in methods)
     high = min(float(m.points.case_c.max()) for m in methods)
     normal_c = min(max(NORMAL_C, low), high)
-    estimates = {m.name: tuple(estimate_at(m, q, normal_c, accuracy) for q in quantity_names()) for m in methods}
+    estimates = {m.name: tuple(estimate_at(m.fitted(q), normal_c, accuracy) for q in quantity_names()) for m in methods}
     return ThermalResult(
         schedule=schedule,
         g_mps2=g_mps2,
@@ -153,90 +144,26 @@ def _settling_k(methods: Sequence[Method], recordings: Sequence[Recording], sche
     return float(abs(case - element_temperature(t_s, case, element_s))[-1])
 
 
+def _goes_both_ways(temps_c: Sequence[float]) -> bool:
+    """Whether a soak comes to its temperatures, after the first one, from below and from above."""
+    ways = np.sign(np.diff(temps_c))
+    return bool(len(ways)) and bool(np.any(ways != ways[0]))
+
+
 def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | None) -> Fits:
     y = p.quantity(quantity)
     largest = float(np.abs(y).max() if quantity.startswith("zero") else np.ptp(y))
     if not sweep:
-        return Fits(quantity=quantity, best=fit_soak(quantity, p.case_c, y, degree), largest=largest)
-    up = up_leg(p)
-    one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
-    if turns_of(p.case_c) == 0:
-        return Fits(quantity=quantity, best=one_leg, one_leg=one_leg, largest=largest)
-    return Fits(
-        quantity=quantity,
-        best=fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s),
-        one_leg=one_leg,
-        both_legs=fit_soak(quantity, p.case_c, y, degree),
-        largest=largest,
-    )
-
-
-# ---- uncertainty
-
-
-def estimate_at(m: Method, quantity: str, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
-    """The quantity at a temperature of the element, with its budget."""
-    c, noise = m.fits[quantity].best, _noise_of(m, quantity)
-    # A residual of few degrees of freedom may be small by chance: it is no less than the scatter of the readings.
-    larger = max(1.0, noise / c.rms) if c.rms > 0.0 else 1.0
-    sd = float(c.half_width([temp_c])[0]) / t_quantile(c.dof) * larger
-    made = estimate(quantity, symbol_of(quantity), unit_of(quantity), float(c.value_at(temp_c)), sd, c.dof)
-    parts = [*_fit_parts(m, quantity, temp_c, noise), *_bench_parts(m, quantity, temp_c, accuracy)]
-    return expand_estimate(made, [part for part in parts if part.u > 0.0])
-
-
-def _per_volt(m: Method, quantity: str) -> float:
-    """The quantity's unit a volt of half a sum or a difference."""
-    kind, axes = quantity.split("_")[:2]
-    scale = float(m.points.scale_v_per_g[:, AXES.index(axes[0])].mean())
-    per_volt: dict[str, float] = {"zero": 1e6 / scale, "scale": 1.0, "base": ARCSEC / scale}
-    return per_volt[kind]
-
-
-def _noise_of(m: Method, quantity: str) -> float:
-    """Standard deviation of one point of the quantity by the scatter within recordings."""
-    i = AXES.index(quantity.split("_")[1][0])
-    return float(m.points.scatter_v[i] / 2.0**0.5) * _per_volt(m, quantity)
-
-
-def _slope_of(c: Compensation, temp_c: float) -> float:
-    """A kelvin, within the range."""
-    inside_c = min(max(temp_c, c.low_c + 0.5), c.high_c - 0.5)
-    return float(c.value_at(inside_c + 0.5) - c.value_at(inside_c - 0.5))
-
-
-def _fit_parts(m: Method, quantity: str, temp_c: float, noise: float) -> list[Component]:
-    """What the points and the curve are off by, in the quantity's unit, beside the scatter of the fit."""
-    c, i = m.fits[quantity].best, AXES.index(quantity.split("_")[1][0])
-    interpolation = float(m.points.interpolation_v[i]) / 2.0**0.5 * _per_volt(m, quantity)
-    head = SCALE_U_ARCSEC / 2.0**0.5 if quantity.startswith("base") else 0.0
-    known_square = noise**2 + interpolation**2 + head**2 if c.dof >= MANY_DOF else 0.0
-    slope = abs(_slope_of(c, temp_c))
-    return [
-        Component(name="misfit", u=max(c.rms**2 - known_square, 0.0) ** 0.5, dof=c.dof),
-        Component(name="interpolation", u=interpolation),
-        Component(name="temperature", u=slope * TEMP_U_K),
-        within_limit("play", slope * PLAY_K),
-        within_limit("settling", slope * m.settling_k),
-    ]
-
-
-def _bench_parts(m: Method, quantity: str, temp_c: float, a: BenchAccuracy) -> list[Component]:
-    """Chain and head, in the quantity's unit."""
-    per_v, board_k = _per_volt(m, quantity), abs(temp_c - 25.0)
-    if quantity.startswith("scale"):
-        scale = float(m.fits[quantity].best.value_at(temp_c))
-        return [
-            Component(name="chain gain", u=scale * a.chain_gain_ppm * 1e-6),
-            Component(name="chain over temperature", u=scale * a.chain_gain_tc_ppm_per_k * board_k * 1e-6),
-        ]
-    if quantity.startswith("zero"):
-        return [
-            Component(name="chain zero", u=a.chain_zero_uv * 1e-6 * per_v),
-            Component(name="chain over temperature", u=a.chain_zero_tc_uv_per_k * board_k * 1e-6 * per_v),
-            within_limit("resolution", CODE_V / 2.0 * per_v),  # codes are cut off: on average half a code
-        ]
-    return [Component(name="circle", u=a.circle_arcsec / 2.0**0.5), Component(name="mounting", u=a.mount_arcsec)]
+        best, one_leg, both_legs = fit_soak(quantity, p.case_c, y, degree), None, None
+    else:
+        up = up_leg(p)
+        best = one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
+        both_legs = None
+    if sweep and turns_of(p.case_c):
+        best = fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s)
+        both_legs = fit_soak(quantity, p.case_c, y, degree)
+    leftover = leftover_of(p, best)
+    return Fits(quantity=quantity, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest)
 
 
 # ---- the two methods beside each other
@@ -254,7 +181,7 @@ class Difference:
     loop_predicted: float | None
 
     def percent(self, value: float) -> float:
-        return 100.0 * value / self.largest
+        return 100.0 * value / self.largest if self.largest else 0.0
 
 
 def difference_of(soak: Method, sweep: Method, quantity: str) -> Difference:
@@ -280,14 +207,6 @@ def predicted_sweep(soak: Method, sweep: Method, quantity: str) -> Array:
     element = element_of(p, found)
     per_k = found.lag.per_k if found.lag else 0.0
     return np.asarray(curve.value_at(element) + per_k * (p.case_c - element))
-
-
-def element_of(p: Points, c: Compensation) -> Array:
-    """Temperature of the element by the lag of a fit, (n,); that of the case where it has none."""
-    if c.lag is None:
-        return p.case_c
-    sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
-    return sweep.element_c(np.array([c.lag.tau_s]))[:, 0]
 
 
 def _loop_of(case_c: Array, y: Array, up: npt.NDArray[np.bool_]) -> float:

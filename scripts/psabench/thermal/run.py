@@ -70,13 +70,25 @@ class ThermalRun:
     facts: dict[str, str]
 
 
-def run_thermal(options: ThermalOptions, progress: Progress) -> ThermalRun:
-    """Measure and estimate. Raises BadInput, BenchError; what was recorded stays."""
+@contextmanager
+def run_thermal(options: ThermalOptions, progress: Progress) -> Iterator[ThermalRun]:
+    """Measure and estimate. Raises BadInput, BenchError; what was recorded stays.
+
+    The folder is this process's alone until the context ends. Its report is written within; after that nothing is
+    left to go on from, and checkpoints go.
+    """
     folder = RunFolder(options.resume or options.out)
-    if not options.resume:
-        _refuse_unfinished(folder)
-    setup = _resumed_setup(options, folder) if options.resume else _new_setup(options)
-    schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
+    new = None if options.resume else _new_setup(options)
+    with folder.own_folder():
+        if new is not None:
+            _refuse_unfinished(folder)
+        setup = _resumed_setup(options, folder) if new is None else new
+        yield _run_of(options, setup, folder, progress)
+        folder.drop_checkpoints()
+
+
+def _run_of(options: ThermalOptions, setup: dict[str, Any], folder: RunFolder, progress: Progress) -> ThermalRun:
+    schedule = schedule_of_dict(setup["schedule"], str(folder.setup_path), str(setup["name"]))
     recordings = _whole_recordings(setup, folder, schedule) if options.resume else None
     if recordings is not None:
         provenance.note_recorded(setup)
@@ -106,7 +118,7 @@ def _is_complete(folder: RunFolder) -> bool:
     """Whether every recording of its schedule is there; a result.json may be of another procedure."""
     try:
         setup = folder.read_setup()
-        schedule = schedule_of_dict(setup["schedule"], str(folder.path), str(setup["name"]))
+        schedule = schedule_of_dict(setup["schedule"], str(folder.setup_path), str(setup["name"]))
         return _whole_recordings(setup, folder, schedule) is not None
     except BadInput:
         return False

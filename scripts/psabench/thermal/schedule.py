@@ -311,7 +311,7 @@ def schedule_of_dict(found: object, where: str, name: str = "") -> Schedule:
         if soak is not None:
             top["soak"] = _made_part(Soak, _checked_keys(soak, Soak, "soak"))
         return _made_part(Schedule, top)
-    except (TypeError, ValueError) as e:
+    except (TypeError, ValueError, OverflowError) as e:
         raise BadInput(f"{where}: {e}") from e
 
 

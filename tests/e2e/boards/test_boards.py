@@ -104,11 +104,12 @@ def test_all_boards_stand_on_one_bench(tmp_path: Path) -> None:
 def test_settings_that_a_board_has_not_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     for board in set(ALL) - {"psa1", "psa2"}:
-        path.write_text(f"units:\n  - board: {board}\n    adc_chain: exact\n")
+        key, value = ("frame_form", "0") if board == "bins" else ("adc_chain", "exact")  # it has a PSA-2 inside
+        path.write_text(f"units:\n  - board: {board}\n    {key}: {value}\n")
         done = psa_emu(path, "--dump")
         assert done.returncode == 2
-        assert "units.a.adc_chain: expected a key of a " in one_line(done.stderr, "psa-emu")
-        assert ":3:16:" in done.stderr
+        assert f"units.a.{key}: expected a key of a " in one_line(done.stderr, "psa-emu")
+        assert f":3:{len(key) + 7}:" in done.stderr
         path.write_text(f"units:\n  - board: {board}\n    profile: article\n")
         done = psa_emu(path, "--dump")
         assert done.returncode == 2

@@ -103,3 +103,12 @@ def test_a_fault_of_the_bench_ends_the_run_and_what_it_has_is_kept(
     (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("psabench: ")]
     assert re.search(says, line)
     assert rows_in(tmp_path / "run") == rows
+
+
+def test_a_chamber_that_cannot_reach_a_temperature_ends_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(started(tmp_path / "run", UNIT.replace("chamber: {", "chamber: {max_degc: 30, "))) == 3
+    (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("psabench: ")]
+    assert re.search("chamber: TEMP 35.0: Data out of range;temp_degc: expected -60 to 30 degC, got 35", line)
+    assert rows_in(tmp_path / "run") == 12  # of the two temperatures that it reached

@@ -5,14 +5,14 @@ from __future__ import annotations
 import ctypes as c
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
+from kalman_reference import Step, dense_step, joseph, relative
 from psabench.native.nav import Floats
 from psabench.native.navlib import library
-from psabench.native.sins import Form, nees
+from psabench.native.sins import Form, error_nees
 from psabench.native.sinslib import InnovationStruct
 
 NOT_FINITE, RANGE, SINGULAR = -4, -5, -7
@@ -49,17 +49,6 @@ class Filter:
         return x, p
 
 
-@dataclass
-class Step:
-    """A step of a random system."""
-
-    phi: Floats
-    q: Floats
-    h: Floats
-    z: Floats
-    r: Floats
-
-
 def random_steps(n: int, moving: int, count: int, seed: int = 1) -> Iterator[Step]:
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -68,29 +57,6 @@ def random_steps(n: int, moving: int, count: int, seed: int = 1) -> Iterator[Ste
         root = rng.normal(0, 0.1, (moving, moving))
         h = rng.normal(0, 1, (3, n)) * (rng.random((3, n)) < 0.7)
         yield Step(phi, root @ root.T, h, rng.normal(0, 1, 3), rng.uniform(0.1, 2.0, 3))
-
-
-def joseph(x: Floats, p: Floats, h: Floats, z: Floats, r: Floats) -> tuple[Floats, Floats]:
-    """All measurements at once, as a textbook has it."""
-    k = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(r))
-    left = np.eye(len(x)) - k @ h
-    return x + k @ (z - h @ x), left @ p @ left.T + k @ np.diag(r) @ k.T
-
-
-def dense_step(x: Floats, p: Floats, s: Step) -> tuple[Floats, Floats, Floats, Floats]:
-    """Predicted and updated."""
-    moving, n = s.phi.shape
-    whole = np.eye(n)
-    whole[:moving] = s.phi
-    x1, p1 = whole @ x, whole @ p @ whole.T
-    p1[:moving, :moving] += s.q
-    return x1, p1, *joseph(x1, p1, s.h, s.z, s.r)
-
-
-def relative(p: Floats, reference: Floats) -> float:
-    """Largest difference in standard deviations of the reference."""
-    sd = np.sqrt(np.diag(reference))
-    return float(np.max(np.abs(p - reference) / np.outer(sd, sd)))
 
 
 def start_covariance(n: int) -> Floats:
@@ -169,7 +135,11 @@ def test_what_is_no_covariance_is_rejected_and_changes_nothing(form: Form) -> No
     f, good = Filter(2, 1, form), np.array([[2.0, 0.5], [0.5, 1.0]])
     f.set(np.ones(2), good)
     bad = {
-        SINGULAR: [np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([[-1.0, 0.0], [0.0, 1.0]]), np.array([[1.0, 0.2], [0.1, 1.0]])],
+        SINGULAR: [
+            np.array([[1.0, 2.0], [2.0, 1.0]]),
+            np.array([[-1.0, 0.0], [0.0, 1.0]]),
+            np.array([[1.0, 0.2], [0.1, 1.0]]),
+        ],
         NOT_FINITE: [np.array([[math.nan, 0.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [0.0, math.inf]])],
     }
     for status, matrices in bad.items():
@@ -208,7 +178,7 @@ def test_the_smoother_is_that_of_the_textbook() -> None:
     assert relative(ps, want_p) < 1e-6
 
 
-def test_the_smoother_rejects_what_it_can_not_go_back_through() -> None:
+def test_the_smoother_rejects_what_it_cannot_go_back_through() -> None:
     phi, one, x = np.zeros((1, 2)), np.ones((1, 1)), np.zeros(2)
     p = np.eye(2)
     assert library().kf_smooth(2, 1, at(phi), at(one), at(x), at(p), at(x), at(p)) == SINGULAR
@@ -216,13 +186,19 @@ def test_the_smoother_rejects_what_it_can_not_go_back_through() -> None:
 
 def test_nees_is_the_quadratic_form() -> None:
     p, e = start_covariance(10), np.arange(10.0)
-    assert nees(e, p) == pytest.approx(e @ np.linalg.inv(p) @ e, rel=1e-6)
-    assert math.isnan(nees(np.ones(2), np.array([[1.0, 0.0], [0.0, 0.0]])))
+    assert error_nees(e, p) == pytest.approx(e @ np.linalg.inv(p) @ e, rel=1e-6)
+    assert math.isnan(error_nees(np.ones(2), np.array([[1.0, 0.0], [0.0, 0.0]])))
 
 
 def test_sizes_and_forms_beyond_the_limits_are_rejected() -> None:
     lib, memory, kf = library(), c.create_string_buffer(library().kf_bytes()), c.c_void_p()
     size = len(memory)
-    for n, moving, form, given in [(0, 0, 0, size), (65, 1, 0, size), (4, 5, 0, size), (4, 1, 2, size), (4, 1, 0, size - 1)]:
+    for n, moving, form, given in [
+        (0, 0, 0, size),
+        (65, 1, 0, size),
+        (4, 5, 0, size),
+        (4, 1, 2, size),
+        (4, 1, 0, size - 1),
+    ]:
         assert lib.kf_start(memory, given, n, moving, form, c.byref(kf)) == RANGE
     assert lib.kf_start(None, size, 4, 1, 0, c.byref(kf)) == RANGE

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import sins_truth as truth
 from psabench.native import sins
 from psabench.native.nav import Floats
 from psabench.native.sins import SinsConfig
+from sins_truth import ARTICLE, DEG, DEGPH, Errors, Table, rotation_vector, turned
 
-from tests.py.support import sins_truth as truth
-from tests.py.support.sins_truth import ARTICLE, DEG, DEGPH, Errors, Table, rotation_vector, turned
-
-SAMPLE_S, STAND_HZ = 0.025, 10.0
+SAMPLE_S, STAND_HZ = 0.05, 10.0
 
 
 @dataclass
@@ -30,7 +29,13 @@ def errors_of(state: sins.State, e: Errors, c_end: Floats, stand: bool) -> Float
     """Estimate less truth, in the order of the state; the attitude's error is true less estimate."""
     p = state.params
     gamma = np.array([(p.gamma - e.gamma)[k] for k in ARTICLE])
-    found = [-rotation_vector(state.c_nb @ c_end.T), p.nu_radps - e.nu, (p.theta - e.theta).ravel(), p.df_mps2 - e.df, gamma]
+    found = [
+        -rotation_vector(state.c_nb @ c_end.T),
+        p.nu_radps - e.nu,
+        (p.theta - e.theta).ravel(),
+        p.df_mps2 - e.df,
+        gamma,
+    ]
     if stand:
         found += [p.delta_rad - e.delta, np.array([p.tau_s - e.tau])]
     return np.concatenate(found)
@@ -53,30 +58,31 @@ def calibrated(seed: int, accel_noise_multiplier: float, stand: bool) -> Outcome
     sd = cfg.stand_sd_rad * np.sqrt(STAND_HZ / 50.0)
     angles = truth.angles(table, e, 1.0 / STAND_HZ, sd_rad=sd, seed=seed + 5000) if stand else None
     start = turned(rng.normal(0, 1, 3) * np.array([1.0, 1.0, 3.0]) * DEG) @ truth.placed()
-    done = sins.calibrate(cfg, start, d.dtheta, d.dv, stand=angles)
+    done = sins.calibrate_unit(cfg, start, d.dtheta, d.dv, stand=angles)
     n = 28 if stand else 24
     p = np.ascontiguousarray(done.covariance[:n, :n])
     last = errors_of(done.state, e, d.c_end, stand)
     return Outcome(
-        first=sins.nees(errors_of(done.first, e, d.c_end, stand), p),
-        second=sins.nees(last, p),
+        first=sins.error_nees(errors_of(done.first, e, d.c_end, stand), p),
+        second=sins.error_nees(last, p),
         normal=last / np.sqrt(np.diag(p)),
         nis=done.state.nis_accel,
     )
 
 
-@pytest.mark.parametrize(("stand", "seed"), [(False, 0), (True, 1)])
+@pytest.mark.parametrize(("stand", "seed"), [(False, 0), (True, 0)])
 def test_a_unit_is_found_within_what_is_claimed(stand: bool, seed: int) -> None:
     """chi^2 of 24 and 28 degrees: 99.9 % lie below 51 and 57."""
     done = calibrated(seed, 4.0, stand)
     assert done.second < (57.0 if stand else 51.0)
     assert np.max(np.abs(done.normal)) < 4.0
+    assert done.first < 57.0 or not stand  # 71 when the first pass takes no products of unknown angles into account
     assert done.nis == pytest.approx(1.0, abs=0.02)  # 81,000 innovations
 
 
 @pytest.mark.parametrize(
     ("multiplier", "first"), [(4.0, 31.0), (1.0, 58.0)], ids=["B", "A"]
-)  # of the first pass: sources sins 3
+)  # of the first pass: sources instruments 5.3
 def test_two_passes_are_consistent_and_one_is_not(multiplier: float, first: float) -> None:
     """24 states, 40 units: the mean of NEES is 24 +- 1.1 when errors are what the covariance says."""
     done = [calibrated(seed, multiplier, False) for seed in range(40)]

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from psabench.cli import main
 from psabench.errors import BadInput
 from psabench.native.nav import ARCMIN, DEGPH
-from psabench.native.sins import DEG, Gauge, Sins, SinsConfig, prior
-from psabench.sins.covariance import PRINTED, QUANTITIES, READINGS, Prediction, predict, read_as, warnings_of
+from psabench.native.sins import DEG, Gauge, Sins, SinsConfig, prior_covariance
+from psabench.sins.covariance import PRINTED, QUANTITIES, READINGS, Prediction, predict_accuracy, read_as, warnings_of
 from psabench.sins.plan import RotationPlan, plan_of_dict, read_plan
 
 CFG = SinsConfig()
 B = read_as(READINGS["B"], CFG)
 KEYS = [q.key for q in QUANTITIES]
-predicted = cache(predict)
+predicted = cache(predict_accuracy)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +27,7 @@ def article() -> RotationPlan:
     return read_plan("article")
 
 
-# An independent simulation of the same model (sources sins 2): root mean squares, and least and most where they differ.
+# An independent simulation of the same model (sources instruments 5.2): root mean squares over the elements.
 TABLES = {
     "A": (0.0042, 1.67e-7, 0.020, 2.32e-5, 3.39e-6, 0.021),
     "B": (0.0101, 5.40e-7, 0.079, 9.24e-5, 1.36e-5, 0.082),
@@ -71,7 +73,7 @@ def test_the_floors_are_those_of_white_noise(article: RotationPlan) -> None:
 def test_nine_elements_of_gamma_leave_three_null_directions(article: RotationPlan) -> None:
     cfg = replace(CFG, gauge=Gauge.FREE9)
     found = predicted(article, cfg)
-    sd = np.sqrt(np.diag(prior(cfg)))
+    sd = np.sqrt(np.diag(prior_covariance(cfg)))
     values = np.sort(np.linalg.eigvalsh(found.covariance / np.outer(sd, sd)))
     assert values[-3:] == pytest.approx(np.ones(3), abs=2e-3)
     assert values[-4] < 2e-4
@@ -155,7 +157,10 @@ TURN = {"axis": "z1", "rate_degps": 10, "for_s": 5}
         ([], r"^plan.yaml: expected axis_azimuth_deg and turns, got \[\]$"),
         ({"turns": []}, r"^plan.yaml: turns: expected a list of 1 to 1000, got \[\]$"),
         ({"turns": [{**TURN, "axis": "x"}]}, r"turns\[0\]: axis: expected z1, z2, z3, got x$"),
-        ({"turns": [TURN, {**TURN, "rate_degps": "fast"}]}, r"turns\[1\]: rate_degps: expected -1000 to 1000, got fast$"),
+        (
+            {"turns": [TURN, {**TURN, "rate_degps": "fast"}]},
+            r"turns\[1\]: rate_degps: expected -1000 to 1000, got fast$",
+        ),
         ({"turns": [{**TURN, "for_s": float("nan")}]}, r"for_s: expected 0 to 86400, got nan$"),
         ({"turns": [{**TURN, "remount": 1}]}, r"remount: expected true or false, got 1$"),
         ({"turns": [{"axis": "z1"}]}, r"turns\[0\]: expected axis, rate_degps, for_s"),
@@ -189,3 +194,38 @@ def test_a_plan_in_one_piece_is_a_plan_in_many(article: RotationPlan) -> None:
         for _ in range(9):
             pieces.plan([replace(t, duration_s=50.0)])
     assert np.array_equal(whole.covariance()[1], pieces.covariance()[1])
+
+
+# ---- the command
+
+
+def test_the_command_prints_both_tables_and_stores_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(["run", "sins-covariance", "--azimuth-deg", "85", "--lever", "3", "--base", "yes", "--out", str(tmp_path)])
+        == 0
+    )
+    said = capsys.readouterr().out
+    assert "Table 1: without the table's angles" in said
+    assert "article    0.01   5.1e-07" in said
+    assert "WARNING: the table's axis is 5 deg from east" in said
+    found = json.loads((tmp_path / "result.json").read_text())
+    assert list(found["readings"]) == list(READINGS)
+    assert len(found["readings"]["B, S1"]["sd"]["eps"]) == 3
+    assert "eps" not in found["readings"]["B"]["sd"]
+    assert found["printed"]["table_2"]["theta_ii"] == 9.7e-8
+    assert found["plan"]["duration_s"] == 2718.0
+    assert len(found["warnings"]) == 2
+    assert "Table 2: with them" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--gauge", "upper"], "--gauge: expected article, lower, free9, got upper"),
+        (["--lever", "4"], "lever is 4; want 0, 3 or 9"),
+        (["--latitude-deg", "89"], "latitude_rad is 1.55334; want from -85 to 85 deg"),
+    ],
+)
+def test_the_command_names_what_it_rejects(options: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "sins-covariance", *options]) == 2
+    assert says in capsys.readouterr().err

@@ -17,7 +17,7 @@ from psabench.chips import Bench, parts
 from psabench.errors import BadInput
 from psabench.link.vcd import read_vcd
 from psabench.native import clib
-from psabench.native.navlib import PROTOTYPES as NAV_PROTOTYPES
+from psabench.native.navlib import NavLibrary
 from psabench.native.navlib import library as nav_library
 from psabench.report.waveform import rdata_picture
 
@@ -89,7 +89,7 @@ def test_the_navigation_library_exports_its_headers_and_needs_no_runtime_of_anot
     assert len(declared_of_nav()) > 20
     assert defined("-D", ROOT / "build/libpsabench-nav.so.1") == declared_of_nav()
     assert defined(ROOT / "build/libpsabench-nav.a") == declared_of_nav()
-    assert {f"nav_{name}" for name in NAV_PROTOTYPES} == declared_of_nav()
+    assert {f"nav_{name}" for name in NavLibrary.prototypes} == declared_of_nav()
     dynamic = run(["readelf", "-d", ROOT / "build/libpsabench-nav.so.1"])
     assert "Library soname: [libpsabench-nav.so.1]" in dynamic
     assert set(re.findall(r"Shared library: \[([^]]*)\]", dynamic)) <= {"libc.so.6", "libm.so.6"}
@@ -276,11 +276,13 @@ def test_the_page_explains_every_counter(part: str) -> None:
 def test_a_program_in_another_language_can_include_the_header(installed: Path, tmp_path: Path, cxx: str) -> None:
     source, program = tmp_path / "outside.cpp", tmp_path / "outside"
     source.write_text(
-        "#include <nav/nav_mc.h>\n#include <psabench.h>\n#include <cstdio>\n"
+        "#include <nav/nav_mc.h>\n#include <nav/sins.h>\n#include <nav/strapdown.h>\n"
+        "#include <psabench.h>\n#include <cstdio>\n"
         "int main()\n{\n    psabench *b = psabench_new(1);\n"
         '    psabench_part *p = psabench_part_new(b, "ads1255", "a", "start=at_once");\n'
         '    const int done = psabench_run_until_level(p, psabench_pin(p, "DRDY"), 0, 1000000000);\n'
-        "    const int same = psabench_abi() == PSABENCH_ABI && nav_abi() == NAV_ABI;\n"
+        "    const int ordered = nav_kf_bytes() < nav_sins_bytes();\n"
+        "    const int same = psabench_abi() == PSABENCH_ABI && nav_abi() == NAV_ABI && ordered;\n"
         '    std::printf("%d %d %d\\n", done, psabench_peek(p, ~0u), same);\n'
         "    psabench_free(b);\n}\n"
     )

@@ -46,7 +46,10 @@ def check_includes(root: Path, files: dict[str, str]) -> subprocess.CompletedPro
         ("emu/base/a.h", "//\n" * 150),
         ("emu/api/psabench.h", "//\n" * 250),
         ("emu/api/a.c", '#include "board/psa2/psa2.h"\n#include "trace/trace.h"\n'),
-        ("nav/common/a.hpp", '#include "emu/base/detmath.h"\n#include "nav/nav.h"\n#include <Eigen/Dense>\n#include <cmath>\n'),
+        (
+            "nav/common/a.hpp",
+            '#include "emu/base/detmath.h"\n#include "nav/nav.h"\n#include <Eigen/Dense>\n#include <cmath>\n',
+        ),
         ("nav/north/a.cpp", '#include "nav/common/nav_math.hpp"\n#include "nav/north/b.hpp"\n'),
         ("nav/nav.h", "//\n" * 250),
     ],

@@ -26,18 +26,17 @@ Leg = tuple[tuple[float, float, float], float, float]
 
 def cross(v: Array) -> Array:
     """[v x], of one vector or of rows."""
-    v = np.asarray(v, dtype=float)
     m = np.zeros((*v.shape[:-1], 3, 3))
     m[..., 0, 1], m[..., 0, 2], m[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return m - np.swapaxes(m, -1, -2)
+    return np.asarray(m - np.swapaxes(m, -1, -2), dtype=np.float64)
 
 
 def turned(v: Array) -> Array:
     """exp[v x], of one vector or of rows."""
-    v = np.asarray(v, dtype=float)
     a = np.linalg.norm(v, axis=-1)[..., None, None]
     k = cross(v)
-    return np.eye(3) + np.sinc(a / np.pi) * k + 0.5 * np.sinc(a / (2 * np.pi)) ** 2 * (k @ k)
+    c = np.eye(3) + np.sinc(a / np.pi) * k + 0.5 * np.sinc(a / (2 * np.pi)) ** 2 * (k @ k)
+    return np.asarray(c, dtype=np.float64)
 
 
 def rotation_vector(c: Array) -> Array:
@@ -118,15 +117,14 @@ class Data:
     c_end: Array
 
 
-def measured(
-    table: Table, e: Errors, sample_s: float, *, gyro: float = 0.0, accel: float = 0.0, seed: int = 0
-) -> Data:
+def measured(table: Table, e: Errors, sample_s: float, *, gyro: float = 0.0, accel: float = 0.0, seed: int = 0) -> Data:
     """Increments by Simpson's rule in each sample. gyro, accel: densities of the noise."""
     rng = np.random.default_rng(seed)
     count = round(table.edges[-1] / sample_s)
     edges = np.arange(count + 1) * sample_s
     middle = edges[:-1] + 0.5 * sample_s
     ends, mid = table.attitude(edges), table.attitude(middle)
+
     # The end of a leg is the start of the next one: the same attitude.
     def mean(v: Array) -> Array:
         at_ends, at_mid = np.einsum("kji,j->ki", ends, v), np.einsum("kji,j->ki", mid, v)
@@ -142,9 +140,7 @@ def measured(
     )
 
 
-def angles(
-    table: Table, e: Errors, interval_s: float, *, sd_rad: float = 0.0, seed: int = 0
-) -> tuple[Array, Array]:
+def angles(table: Table, e: Errors, interval_s: float, *, sd_rad: float = 0.0, seed: int = 0) -> tuple[Array, Array]:
     """Times and rotations C_st(t) = C(t + tau) exp(delta) of the table, each with noise."""
     t = np.arange(0.0, table.edges[-1], interval_s)
     t = t[(t + e.tau > 0.0) & (t + e.tau < table.edges[-1])]

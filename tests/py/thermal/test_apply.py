@@ -17,6 +17,7 @@ from psabench.thermal.reduce import ARCSEC, AXES, quantity_names
 SEED = 240
 TAU_S = 200.0
 RATE_HZ, READ_S = 5.0, 1500.0
+HALF_CODE_V = 5.0 / 2**23  # codes are cut off: readings are lower by that on average
 CODES_PER_K, ZERO_C_K = 65.536, 273.15  # docs/boards/psa2.md
 
 
@@ -58,7 +59,7 @@ def frames_of(curves: dict[str, Compensation], felt_g: np.ndarray, low_c: float 
     u_v = np.empty((n, 3))
     for i, a in enumerate(AXES):
         across = sum(value[f"base_{a}{b}_arcsec"] / ARCSEC * felt_g[j] for j, b in enumerate(AXES) if j != i)
-        u_v[:, i] = value[f"scale_{a}_v_per_g"] * (felt_g[i] + value[f"zero_{a}_ug"] * 1e-6 + across)
+        u_v[:, i] = value[f"scale_{a}_v_per_g"] * (felt_g[i] + value[f"zero_{a}_ug"] * 1e-6 + across) - HALF_CODE_V
     absent = np.zeros(n, np.int64)
     return Frames(
         t_rx_s=t_s,

@@ -19,7 +19,7 @@ from psabench.report import thermal_grading, thermal_page
 from psabench.thermal.bench import CASE_CHANNEL, sample_of_frames
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts
 from psabench.thermal.records import Recording, RunFolder, read_recordings, recording_row
-from psabench.thermal.reduce import interpolate_cubic, left_out_error, points_of
+from psabench.thermal.reduce import interpolate_cubic, left_out_error, left_out_weights, points_of
 from psabench.thermal.result import ThermalResult, case_lag_s, difference_of, estimate_run, residuals_of
 from psabench.thermal.run import ThermalOptions, run_thermal
 from psabench.thermal.schedule import (
@@ -161,7 +161,7 @@ def test_interpolation_is_not_worse_than_it_says(every_s: float, phase: float) -
     taken = np.arange(phase * every_s, 1499.0, every_s).astype(int)
     inside = np.arange(taken[1], taken[-2])
     off = np.abs(interpolate_cubic(taken.astype(float), every[taken], inside.astype(float)) - every[inside])
-    said = left_out_error(taken.astype(float), every[taken], np.zeros(1))
+    said = left_out_error((left_out_weights(taken.astype(float)) @ every[taken]) ** 2, 0.0, 1.0)
     assert off.max() <= said.max()
     assert said.max() <= 10 * off.max()
     assert np.sqrt(np.mean(off**2)) <= np.sqrt(np.mean(said**2))
@@ -201,9 +201,10 @@ def frames_of(**columns: np.ndarray) -> Frames:
     return Frames(t_rx_s=none_s, t_sample_s=none_s, seq=some, **given)
 
 
-def test_a_recording_is_the_means_of_its_frames() -> None:
+def test_a_recording_is_the_means_of_its_frames_and_half_a_code() -> None:
+    code_v = 10.0 / 2**23  # cut off: the voltage was half a code higher on average
     s = sample_of_frames(frames_of(), 7.0, 2.0)
-    assert s.u_v.tolist() == [0.5, 0.5, 0.5]
+    assert s.u_v.tolist() == pytest.approx([(1.0 + code_v / 2.0) / 2.0] * 3, rel=1e-12)
     assert s.temps_degc == pytest.approx([20.0] * 4, abs=0.01)
 
 
@@ -234,6 +235,12 @@ def test_a_position_that_is_missing_is_named(short: list[Recording]) -> None:
 # ---- files
 
 
+def refused(options: ThermalOptions) -> None:
+    """A run that does not come to its report."""
+    with run_thermal(options, Silent()):
+        raise AssertionError
+
+
 def stored_in(tmp_path: Path, recordings: Sequence[Recording]) -> RunFolder:
     folder = RunFolder(tmp_path)
     with folder.open_series() as series:
@@ -258,7 +265,7 @@ def test_recordings_are_read_as_they_were_stored_without_the_row_that_was_cut(
     ("line", "text", "says"),
     [
         (0, "t_s,segment", "thermal.csv:1: expected the columns"),
-        (2, "1,soak,0,x_over,9", "thermal.csv:3: expected a recording"),
+        (2, "1,soak,0,x_over,9", "thermal.csv:3: expected 16 values, got 5"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_line(
@@ -298,26 +305,26 @@ def test_a_full_disk_ends_a_run_in_one_line(short: list[Recording], tmp_path: Pa
         (None, "expected a folder of psabench run thermal, with thermal-run.json, got none"),
         ("{", "thermal-run.json: expected the set-up of a run"),
         ('{"format": 2}', "expected the set-up of a run, format 1"),
-        ('{"format": 1, "name": "quick"}', "expected schedule, ours, scenario, node, .* got none"),
+        ('{"format": 1, "name": "quick"}', "expected schedule, ours, scenario, seed, node, .* got none"),
     ],
 )
 def test_a_folder_without_a_run_is_not_resumed(text: str | None, says: str, tmp_path: Path) -> None:
     if text is not None:
         (tmp_path / "thermal-run.json").write_text(text)
     with pytest.raises(BadInput, match=says):
-        run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path), Silent())
+        refused(ThermalOptions(out=tmp_path, resume=tmp_path))
 
 
 def test_recordings_of_a_run_that_is_not_complete_are_not_overwritten(short: list[Recording], tmp_path: Path) -> None:
     folder = stored_in(tmp_path, short[:4])
     with pytest.raises(BadInput, match=r"--resume .* got one with 4 recordings of a run that is not complete"):
-        run_thermal(ThermalOptions(out=tmp_path), Silent())
+        refused(ThermalOptions(out=tmp_path))
     assert read_recordings(folder.data) == short[:4]
 
 
 def test_what_a_run_has_already_is_not_given_again(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="--resume: expected no option that the run has already, got --seed"):
-        run_thermal(ThermalOptions(out=tmp_path, resume=tmp_path, seed=3), Silent())
+        refused(ThermalOptions(out=tmp_path, resume=tmp_path, seed=3))
 
 
 def test_a_run_goes_on_where_it_was_interrupted(short: list[Recording]) -> None:

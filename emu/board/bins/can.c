@@ -1,0 +1,125 @@
+#include "board/bins/board.h"
+
+#include "gen/bins_od.h"
+#include "gen/psabench_can.h"
+
+#include <math.h>
+
+enum { FRAMES = 4, SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
+#define NM_PER_M       1e9
+#define UAS_PER_ARCSEC 1e6
+
+/* ---- readings ---- */
+
+static uint32_t tstamp_us(const struct bins_reading *r)
+{
+    return (uint32_t)((r->t_ns + 500) / 1000);
+}
+
+static struct psabench_bins_gyro_z_t gyro_z_of(const struct bins_reading *r)
+{
+    return (struct psabench_bins_gyro_z_t){
+        .gz = r->gyro[2],
+        .seq = (uint16_t)r->seq,
+        .words = r->words,
+        .settled = (r->flags & BINS_SETTLED) != 0,
+        .clip = (r->flags & BINS_CLIP) != 0,
+        .incomplete = (r->flags & BINS_INCOMPLETE) != 0,
+        .stretched = (r->flags & BINS_STRETCHED) != 0,
+        .temp_new = (r->flags & BINS_TEMP_NEW) != 0,
+    };
+}
+
+static void end_conditions(struct board_node *n, const struct bins_reading *r, int64_t t_ns)
+{
+    co_node_error_end(&n->node, BINS_EMCY_ACCEL_PORT, t_ns);
+    if (r->flags & BINS_TEMP_NEW) co_node_error_end(&n->node, BINS_EMCY_TEMP_PORT, t_ns);
+}
+
+static void on_reading(void *ctx, const struct bins_reading *r, int64_t t_ns)
+{
+    struct board_node *n = ctx;
+    struct can_msg m[FRAMES] = {{0}, {0}, {0}, {0}};
+    const struct psabench_bins_gyro_xy_t gyro_xy = {r->gyro[0], r->gyro[1]};
+    const struct psabench_bins_gyro_z_t gyro_z = gyro_z_of(r);
+    const struct psabench_bins_accel_xy_t accel_xy = {r->accel[0], r->accel[1]};
+    const struct psabench_bins_accel_z_t accel_z = {r->accel[2], tstamp_us(r)};
+    m[0].len = (uint8_t)psabench_bins_gyro_xy_pack(m[0].data, &gyro_xy, sizeof m[0].data);
+    m[1].len = (uint8_t)psabench_bins_gyro_z_pack(m[1].data, &gyro_z, sizeof m[1].data);
+    m[2].len = (uint8_t)psabench_bins_accel_xy_pack(m[2].data, &accel_xy, sizeof m[2].data);
+    m[3].len = (uint8_t)psabench_bins_accel_z_pack(m[3].data, &accel_z, sizeof m[3].data);
+    end_conditions(n, r, t_ns);
+    board_node_stream(n, BINS_GYRO_XY_TPDO, m, FRAMES, t_ns);
+}
+
+static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
+{
+    const bool accel = code == PSA2_FAULT_ACCEL_PORT;
+    board_node_condition(ctx, accel ? BINS_EMCY_ACCEL_PORT : BINS_EMCY_TEMP_PORT,
+                         accel ? SOURCE_ACCEL_PORT : SOURCE_TEMP_PORT, true, t_ns);
+}
+
+/* ---- objects ---- */
+
+static const struct bins *bins_of(const struct board_node *n)
+{
+    return n->board;
+}
+
+static double read_increments(const struct board_node *n, const struct co_entry *e)
+{
+    const struct bins_reading *r = &bins_of(n)->latest;
+    return e->sub <= 3 ? r->gyro[e->sub - 1] : r->accel[e->sub - 4];
+}
+
+static double read_head(const struct board_node *n, const struct co_entry *e)
+{
+    const struct bins_reading *r = &bins_of(n)->latest;
+    const uint32_t value[] = {0, (uint16_t)r->seq, r->words, r->flags, tstamp_us(r)};
+    return value[e->sub];
+}
+
+static double read_temperature(const struct board_node *n, const struct co_entry *e)
+{
+    return bins_of(n)->temp_code[e->sub - 1];
+}
+
+static double read_weight(const struct board_node *n, const struct co_entry *e)
+{
+    const struct bins *b = bins_of(n);
+    return e->sub == 1 ? floor(b->profile.gyro_arcsec_per_count * UAS_PER_ARCSEC + 0.5)
+                       : bins_accel_mps_per_code(b) * NM_PER_M;
+}
+
+static double read_timing(const struct board_node *n, const struct co_entry *e)
+{
+    const struct bins *b = bins_of(n);
+    const int64_t value[] = {0, b->profile.words_per_reading, bins_word_ns(b), ads1282_delay_ns(&b->psa2.adc[0]),
+                             bins_accel_age_ns(b)};
+    return (double)value[e->sub];
+}
+
+static const struct board_object objects[] = {
+    {BINS_OD_INCREMENTS, .value = read_increments},
+    {BINS_OD_READING, .value = read_head},
+    {BINS_OD_TEMPERATURES, .value = read_temperature},
+    {BINS_OD_WEIGHTS, .value = read_weight},
+    {BINS_OD_TIMING, .value = read_timing},
+};
+
+static int64_t period_ns(const void *board)
+{
+    return bins_period_ns(&((const struct bins *)board)->profile);
+}
+
+static const struct board_node_type type = {
+    .device = &bins_device, BOARD_NODE_OBJECTS(objects), .period_ns = period_ns};
+
+static void init_can(void *can, const struct board_can_cfg *cfg, struct board *board, struct can_bus *bus,
+                     struct sched *s)
+{
+    board_node_init(can, &type, cfg, board, bus, s);
+    ((struct bins *)board)->host = (struct bins_host){.ctx = can, .reading = on_reading, .fault = on_fault};
+}
+
+const struct board_can bins_can = {.size = sizeof(struct bins_can), .init = init_can, BOARD_NODE_LIFE};

@@ -1,0 +1,1 @@
+"""БИНС, an inertial unit."""

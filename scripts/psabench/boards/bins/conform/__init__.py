@@ -1,0 +1,1 @@
+"""The conformance tests of the inertial unit: stimulus and check."""

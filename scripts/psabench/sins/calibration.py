@@ -1,0 +1,229 @@
+"""Calibration of a strapdown unit from what a table run recorded: two passes, the filter's own checks, estimates.
+
+Pure: no bench, no truth. The method is the article's on rate tables (docs/procedures/sins.md); angles of the table are
+used where they were recorded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from psabench.errors import BadInput, expected
+from psabench.native.nav import ARCMIN, DEGPH, Floats, Refused
+from psabench.native.sins import Params, Sins, SinsConfig
+from psabench.sins.correction import Correction
+from psabench.sins.covariance import GAMMA_AT, KNOWN
+from psabench.sins.data_check import findings
+from psabench.sins.increments import Increments
+
+WHITE = 3.3  # standard deviations of a correlation between innovations of neighbouring seconds, 1 in 1000
+NIS_SPAN = 3.3  # the same of the mean of value^2/variance
+T95 = 1.959963984540054
+LEAST_S = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """Of SI to the unit that a parameter is shown in."""
+
+    unit: str
+    per_si: float
+    symbol: str
+
+
+SCALES: Mapping[str, Scale] = {
+    "nu": Scale(unit="°/h", per_si=1.0 / DEGPH, symbol="ν{i}"),
+    "theta_ii": Scale(unit="ppm", per_si=1e6, symbol="Θ{i}{j}"),
+    "theta_ij": Scale(unit="″", per_si=60.0 / ARCMIN, symbol="Θ{i}{j}"),
+    "df": Scale(unit="µm/s²", per_si=1e6, symbol="Δf{i}"),
+    "gamma_ii": Scale(unit="ppm", per_si=1e6, symbol="Γ{i}{j}"),
+    "gamma_ij": Scale(unit="″", per_si=60.0 / ARCMIN, symbol="Γ{i}{j}"),
+    "lever": Scale(unit="mm", per_si=1e3, symbol="r{i}{j}"),
+    "delta": Scale(unit="″", per_si=60.0 / ARCMIN, symbol="δ{i}"),
+    "tau": Scale(unit="ms", per_si=1e3, symbol="τ"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One estimate, in its unit."""
+
+    name: str  # nu_1, theta_12, df_3, gamma_21 ...
+    symbol: str
+    unit: str
+    value: float
+    sd: float  # of the filter's covariance
+    prior_sd: float
+
+    @property
+    def half95(self) -> float:
+        return T95 * self.sd
+
+    @property
+    def determined(self) -> bool:
+        return self.sd <= KNOWN * self.prior_sd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SinsResult:
+    """What a calibration found."""
+
+    cfg: SinsConfig
+    parameters: tuple[Parameter, ...]
+    covariance: Floats  # of the parameters, in their units
+    params: Params
+    correction: Correction
+    nis_accel: float
+    nis_stand: float  # NaN: no angles
+    correlation: Floats  # (6,) of innovations a second apart; NaN: none
+    seconds: int  # that the correlation is of
+    doubts: tuple[str, ...]
+
+    def parameter(self, name: str) -> Parameter:
+        """Raises KeyError."""
+        return next((p for p in self.parameters if p.name == name), None) or _no_such(name)
+
+
+def _no_such(name: str) -> Parameter:
+    raise KeyError(name)
+
+
+def calibrate_unit(
+    cfg: SinsConfig, start_c_nb: Floats, data: Increments, stand: tuple[Floats, Floats] | None
+) -> SinsResult:
+    """Both passes. Raises BadInput for data that no estimate should be made from: what is wrong is named."""
+    refused = [f.what for f in findings(data) if f.refuse]
+    if refused:
+        raise BadInput(f"sins-calibration: {'; '.join(refused)}")
+    if len(data) * data.dt_s < LEAST_S:
+        raise BadInput(expected(f"{LEAST_S:g} s or more", f"{len(data) * data.dt_s:.2f} s", "sins-calibration"))
+    try:
+        first = Sins(cfg, start_c_nb, feedback=True)
+        feed(first, data, stand)
+        first.again()
+        innovations = feed(first, data, stand)
+    except Refused as e:
+        raise BadInput(f"sins-calibration: {e}") from e
+    return _result_of(cfg, first, innovations)
+
+
+def feed(s: Sins, data: Increments, stand: tuple[Floats, Floats] | None) -> Floats:
+    """All data through an estimator, a second at a time; the last innovations of each second, (n, 6)."""
+    second = round(1.0 / data.dt_s)
+    times, angles = stand if stand else (np.empty(0), np.empty((0, 3, 3)))
+    at, seen = 0, []
+    for low in range(0, len(data), second):
+        part = slice(low, low + second)
+        end_s = (low + second) * data.dt_s
+        while at < len(times) and times[at] < end_s:
+            s.stand(float(times[at]), angles[at])
+            at += 1
+        s.samples(low * data.dt_s, data.dtheta_rad[part], data.dv_mps[part])
+        seen.append(s.state().innovations)
+    return np.array(seen)
+
+
+# ---- the result
+
+
+def elements(s_rows: Mapping[str, slice], cfg: SinsConfig) -> list[tuple[str, str, int]]:
+    """Name, key of SCALES and place in the state of each parameter."""
+    found: list[tuple[str, str, int]] = []
+    for block in ("nu", "theta", "df", "gamma", "lever", "delta", "tau"):
+        rows = s_rows[block]
+        for k in range(rows.stop - rows.start):
+            found.append((*_named(block, k, cfg, rows.stop - rows.start), rows.start + k))
+    return found
+
+
+def _named(block: str, k: int, cfg: SinsConfig, size: int) -> tuple[str, str]:
+    """Of the k-th element of a block."""
+    if block == "tau":
+        return "tau", "tau"
+    if block in ("nu", "df", "delta"):
+        return f"{block}_{k + 1}", block
+    at = GAMMA_AT[cfg.gauge][k] if block == "gamma" else 4 * k if block == "lever" and size == 3 else k
+    i, j = divmod(at, 3)
+    key = block if block == "lever" else f"{block}_{'ii' if i == j else 'ij'}"
+    return f"{block}_{i + 1}{j + 1}", key
+
+
+def value_of(params: Params, name: str) -> float:
+    """In SI, by the name of a parameter."""
+    block, _, at = name.partition("_")
+    field = {"nu": "nu_radps", "df": "df_mps2", "delta": "delta_rad", "tau": "tau_s", "lever": "lever_m"}.get(
+        block, block
+    )
+    found = getattr(params, field)
+    return float(found if not at else found[tuple(int(c) - 1 for c in at)])
+
+
+def _result_of(cfg: SinsConfig, s: Sins, innovations: Floats) -> SinsResult:
+    from psabench.native.sins import prior
+
+    state, named = s.state(), elements(s.rows, cfg)
+    scale = np.array([SCALES[key].per_si for _, key, _ in named])
+    at = [k for *_, k in named]
+    covariance = s.covariance()[1][np.ix_(at, at)] * np.outer(scale, scale)
+    before = np.sqrt(np.diag(prior(cfg))[at]) * scale
+    parameters = tuple(
+        Parameter(
+            name=name,
+            symbol=SCALES[key].symbol.format(i=name[-2:-1] if "{j}" in SCALES[key].symbol else name[-1:], j=name[-1:]),
+            unit=SCALES[key].unit,
+            value=value_of(state.params, name) * SCALES[key].per_si,
+            sd=float(math.sqrt(covariance[i, i])),
+            prior_sd=float(before[i]),
+        )
+        for i, (name, key, _) in enumerate(named)
+    )
+    correlation = _neighbours(innovations)
+    p = state.params
+    return SinsResult(
+        cfg=cfg,
+        parameters=parameters,
+        covariance=covariance,
+        params=p,
+        correction=Correction(nu_radps=p.nu_radps, theta=p.theta, df_mps2=p.df_mps2, gamma=p.gamma, lever_m=p.lever_m),
+        nis_accel=state.nis_accel,
+        nis_stand=state.nis_stand,
+        correlation=correlation,
+        seconds=len(innovations),
+        doubts=tuple(_doubts(state.nis_accel, correlation, innovations, parameters, cfg)),
+    )
+
+
+def _neighbours(innovations: Floats) -> Floats:
+    """Correlation of each channel with itself a second later; NaN where there is none."""
+    found = np.full(innovations.shape[1], np.nan)
+    for k, x in enumerate(innovations.T):
+        x = x[np.isfinite(x)]
+        if len(x) > 2 and x.std() > 0.0:
+            found[k] = np.corrcoef(x[:-1], x[1:])[0, 1]
+    return found
+
+
+def _doubts(
+    nis: float, correlation: Floats, innovations: Floats, parameters: tuple[Parameter, ...], cfg: SinsConfig
+) -> list[str]:
+    said = []
+    steps = 3 * len(innovations) * round(1.0 / cfg.step_s)
+    span = NIS_SPAN * math.sqrt(2.0 / steps)
+    if abs(nis - 1.0) > max(span, 0.02):
+        said.append(
+            f"mean of innovation²/variance of the accelerometers: expected 1 ± {max(span, 0.02):.3f}, got {nis:.3f}"
+        )
+    limit = WHITE / math.sqrt(len(innovations))
+    for k in np.flatnonzero(np.abs(correlation[:3]) > limit):
+        got = f"{correlation[k]:.3f}"
+        said.append(
+            f"innovations of channel {k + 1} a second apart: expected a correlation within {limit:.3f}, got {got}"
+        )
+    loose = [p.symbol for p in parameters if not p.determined and p.name != "tau"]
+    if loose:
+        said.append(f"not determined by this run: {', '.join(loose)}")
+    return said

@@ -1,0 +1,122 @@
+"""`psabench run sins-calibration` through CAN and SCPI: short plans, recordings, refusals; the article's plan."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from psabench import cli
+
+pytestmark = pytest.mark.host
+
+SHORT = """axis_azimuth_deg: 0
+turns:
+  - {axis: z1, rate_degps: 20, for_s: 36}
+  - {axis: z1, rate_degps: -20, for_s: 36}
+  - {axis: z3, rate_degps: -10, for_s: 9}
+  - {axis: z2, rate_degps: 20, for_s: 36}
+  - {axis: z2, rate_degps: -20, for_s: 36}
+  - {axis: z1, rate_degps: -10, for_s: 9}
+  - {axis: z3, rate_degps: 20, for_s: 36}
+  - {axis: z3, rate_degps: -20, for_s: 36}
+"""
+G_MPS2 = 9.8152038  # of the ellipsoid there
+Lines = pytest.CaptureFixture[str]
+
+
+def plan(folder: Path) -> Path:
+    path = folder / "short.yaml"
+    path.write_text(SHORT)
+    return path
+
+
+def run(out: Path, *words: str | Path) -> int:
+    return cli.main(["run", "sins-calibration", "--out", str(out), *map(str, words)])
+
+
+def found(out: Path) -> dict[str, object]:
+    got: dict[str, object] = json.loads((out / "result.json").read_text())["sections"][0]
+    return got
+
+
+def test_a_short_plan_finds_the_unit_and_its_recording_gives_the_same_digits(tmp_path: Path, capsys: Lines) -> None:
+    """With the table's angles; then without, from the files of the same run; then the passport of the unit."""
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--seed", "4") == 0
+    said = capsys.readouterr().out
+    assert "25 parameters; 21 beside the truth: chi-square " in said
+    first = found(tmp_path / "a")
+    names = {e["name"]: e for e in first["estimates"]}  # type: ignore[attr-defined]
+    assert names["tau"]["value"] == pytest.approx(-50.0, abs=4 * names["tau"]["sd"])  # of the scenario's readout
+    assert abs(names["theta_11"]["error"]) < 4 * names["theta_11"]["sd"] < 20.0
+    data = ("--data", tmp_path / "a/increments.bin", "--layout", tmp_path / "a/increments.yaml")
+    assert run(tmp_path / "b", *data, "--angles", tmp_path / "a/table_angles.csv") == 0
+    again = found(tmp_path / "b")
+    values = [[e["value"] for e in x["estimates"]] for x in (first, again)]  # type: ignore[attr-defined]
+    assert values[0] == pytest.approx(values[1], rel=1e-6)  # angles are stored to 1e-9 deg
+    assert run(tmp_path / "c", *data, "--stand", "no") == 0
+    alone = {e["name"]: e for e in found(tmp_path / "c")["estimates"]}  # type: ignore[attr-defined]
+    assert "tau" not in alone
+    assert alone["nu_1"]["sd"] > names["nu_1"]["sd"]
+    assert "no truth to compare with" in capsys.readouterr().out
+    store = ("--store", str(tmp_path / "p.sqlite"))
+    assert cli.main(["passport", "add", str(tmp_path / "a"), "--serial", "S4", "--type", "sins", *store]) == 0
+    assert capsys.readouterr().out == "S4: run 1, sins-calibration short, 25 quantities\n"
+
+
+def test_a_correction_levels_the_unit(tmp_path: Path) -> None:
+    """Another motion of the same unit: corrected, the force is the local gravity in any attitude."""
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--seed", "4") == 0
+    other = tmp_path / "other.yaml"
+    other.write_text("turns:\n  - {axis: z1, rate_degps: 5, for_s: 72}\n  - {axis: z3, rate_degps: 10, for_s: 6}\n")
+    run(tmp_path / "b", "--plan", other, "--seed", "4")
+    apply = ["nav", "apply", str(tmp_path / "b/increments.bin"), "--layout", str(tmp_path / "b/increments.yaml")]
+    out = tmp_path / "corrected.csv"
+    assert cli.main([*apply, "--calibration", str(tmp_path / "a/result.json"), "--out", str(out)]) == 0
+    rows = np.loadtxt(out, delimiter=",", skiprows=1)
+    raw = np.fromfile(tmp_path / "b/increments.bin").reshape(-1, 7)
+    off = [
+        np.linalg.norm(x[:8000].reshape(-1, 20, 3).mean(axis=1), axis=1) / 0.01 - G_MPS2
+        for x in (raw[:, 4:], rows[:, 4:])
+    ]
+    rms = [np.sqrt(np.mean(x**2)) for x in off]
+    assert rms[0] > 7e-3
+    assert rms[1] < 3e-3  # the noise of 0.2 s is 2.2e-3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--plan", "none.yaml"), "--plan: expected article"),
+        (("--gauge", "upper"), "gauge: expected article, lower, free9, got upper"),
+        (("--scenario", "stream"), "expected a scenario with an inertial unit"),
+        (("--data", "no.csv"), "no.csv: no such file"),
+        (("--latitude-deg", "89"), "latitude_deg: expected -85 to 85 deg"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(
+    tmp_path: Path, capsys: Lines, words: tuple[str, str], said: str
+) -> None:
+    assert run(tmp_path, *words) == 2
+    error = capsys.readouterr().err.strip().splitlines()
+    assert error[-1].startswith("psabench: ")
+    assert said in error[-1]
+
+
+def test_a_unit_that_stands_still_or_saturates_is_no_calibration(tmp_path: Path, capsys: Lines) -> None:
+    still = tmp_path / "still.yaml"
+    still.write_text("turns:\n  - {axis: z1, rate_degps: 0, for_s: 70}\n")
+    assert run(tmp_path / "a", "--plan", still) == 2
+    assert "the unit does not turn" in capsys.readouterr().err
+    assert (tmp_path / "a/increments.bin").stat().st_size > 7000 * 56  # what was measured is kept
+
+
+def test_the_article_s_plan_is_consistent_over_units(tmp_path: Path) -> None:
+    """Four drawn units, 45 minutes each: errors of 21 parameters in standard deviations."""
+    sizes = []
+    for seed in ("31", "32", "33", "34"):
+        assert run(tmp_path / seed, "--seed", seed) == 0
+        sizes += [e["error"] / e["sd"] for e in found(tmp_path / seed)["estimates"] if "error" in e]  # type: ignore[attr-defined]
+        (tmp_path / seed / "increments.bin").unlink()
+    assert 0.75 < np.sqrt(np.mean(np.square(sizes))) < 1.25  # of 84, correlated: 1 +- 0.08
