@@ -23,7 +23,7 @@ from psabench.native.sins import SinsConfig
 from psabench.native.strapdown import radii_m
 from psabench.procedures.result import option
 from psabench.sins.alignment import aligned
-from psabench.sins.covariance import READINGS, Reading, predict, read_as
+from psabench.sins.covariance import READINGS, Reading, predict_accuracy, read_as
 from psabench.sins.flight import Flight, fly, read_flight, rest
 from psabench.sins.plan import RotationPlan, read_plan
 
@@ -121,7 +121,7 @@ def error_model(cfg: SinsConfig) -> ErrorsConfig:
 
 def sensors_left(plan: RotationPlan, cfg: SinsConfig) -> Floats:
     """Covariance of nu, Theta, df, Gamma after the calibration: the constants of both models are the same."""
-    found = predict(plan, cfg).covariance
+    found = predict_accuracy(plan, cfg).covariance
     return np.asarray(found[3:24, 3:24])
 
 
