@@ -96,7 +96,8 @@ def pair_words(pairs: Sequence[Pair], repeatability: float) -> str:
     """One line."""
     factors = [p.factor for p in pairs]
     share = sum(f >= 3.0 for f in factors)
+    median = np.median(factors)
     return (
-        f"{len(pairs)} pairs, {100.0 * repeatability:g} % of change between experiments: {np.median(factors):.1f} times "
-        f"less in the median, at least 3 times in {share} of {len(pairs)}"
+        f"{len(pairs)} pairs, {100.0 * repeatability:g} % of change between experiments: {median:.1f} times less in the "
+        f"median, at least 3 times in {share} of {len(pairs)}"
     )

@@ -22,6 +22,7 @@ from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import Gauge
 from psabench.native.strapdown import gravity_mps2, radii_m
 from psabench.sins.alignment import aligned
+from psabench.sins.correction import Correction
 from psabench.sins.covariance import GAMMA_AT
 from psabench.sins.outputs import Outputs, Point, check_axes
 
@@ -105,6 +106,17 @@ class Secondary:
     nis: float  # mean of value^2/variance of the measurements: 1 when model and noise are right
     errors: Errors
     warnings: tuple[str, ...] = field(default=())
+
+    def correction(self) -> Correction:
+        """For `psabench nav`."""
+        gamma = np.zeros(9)
+        gamma[list(GAMMA_AT[self.config.gauge])] = self.x[self.rows["gamma"]]
+        return Correction(
+            nu_radps=self.x[self.rows["nu"]],
+            theta=self.x[self.rows["theta"]].reshape(3, 3),
+            df_mps2=self.x[self.rows["df"]],
+            gamma=gamma.reshape(3, 3),
+        )
 
     def sd(self, block: str) -> Floats:
         """Standard deviations of a block."""

@@ -13,6 +13,7 @@ from psabench.report import plots as style
 from psabench.report.grading import aligned
 from psabench.report.page import bullets, figure, section, verdict_line, whole_page, write_report
 from psabench.report.page import table as html_table
+from psabench.sins.correction import correction_dict
 from psabench.sins.covariance import GAMMA_AT
 from psabench.sins.secondary import Compensated, Errors, Secondary
 from psabench.sins.secondary_run import SecondaryResult
@@ -22,7 +23,8 @@ TITLE = "Strapdown unit calibrated from its own navigation"
 ARCSEC = ARCMIN / 60.0
 PPM = 1e-6
 NOTES = (
-    "Apply: w = (I + Θ)⁻¹ (w′ − ν), f = (I + Γ)⁻¹ (f′ − Δf); errors are measured less true, Γ in the article's gauge.",
+    "Apply: w = (I + Θ)⁻¹ (w′ − ν), f = (I + Γ)⁻¹ (f′ − Δf); errors are measured less true, Γ in the article's gauge. "
+    "psabench nav apply does it with result.json.",
     "How much smaller the errors become is set by what changes in the unit between two experiments, not by the filter.",
     "Only differences of the accelerometers' scales are seen: the common one needs a vertical channel.",
     "The unit's attitudes and rates are coefficients; the table's angles are not used.",
@@ -87,7 +89,8 @@ def verdict_words(r: SecondaryResult) -> str:
     """One line."""
     c = r.compensated
     if c is None:
-        return f"errors up to {r.found.errors.radial_m / 1000.0:.1f} km explained by the sensors; no second run to compensate"
+        most = r.found.errors.radial_m / 1000.0
+        return f"errors up to {most:.1f} km explained by the sensors; no second run to compensate"
     left = f"{c.before.radial_m / 1000.0:.1f} km became {c.after.radial_m / 1000.0:.1f} km, {c.factor:.1f} times less"
     return f"{left}: {'at least' if r.within else 'NOT'} {r.least_factor:g} times"
 
@@ -132,6 +135,7 @@ def result_dict(r: SecondaryResult) -> dict[str, Any]:
         "warnings": list(r.found.warnings),
         "estimates": [dict(zip(("name", "value", "sd", "unit"), row, strict=True)) for row in estimate_rows(r.found)],
         "correlations": {"names": names, "rows": (p / np.outer(sd, sd)).tolist()},
+        "correction": correction_dict(r.found.correction()),
         "errors": _rows(error_table(r)),
         "factor": None if r.compensated is None else r.compensated.factor,
     }

@@ -17,8 +17,8 @@ from psabench.sins.snake import ARTICLE_M, BOUND, PAIRS, SHOWN_S, Snake
 FORMAT = 1  # of result.json
 TITLE = "Autonomous navigation after a calibration on the table"
 NOTES = (
-    "The article names the flight and gives no figure of it: speed, turns and the unit's mounting are E0. Mounted in the "
-    "other 23 ways the unit without the stand's angles is 1830 to 2040 m off, with them 1110 m.",
+    "The article names the flight and gives no figure of it: speed, turns and the unit's mounting are E0. Mounted in "
+    "the other 23 ways the unit without the stand's angles is 1830 to 2040 m off, with them 1110 m.",
     "The alignment's errors come from the same sensors. Taken as independent of them they make the flight worse: the "
     "columns show both.",
     "In the reading as printed the stand's angles bring next to nothing. Only the fourfold noise of the accelerometers "
