@@ -96,8 +96,8 @@ def pair_words(pairs: Sequence[Pair], repeatability: float) -> str:
     """One line."""
     factors = [p.factor for p in pairs]
     share = sum(f >= 3.0 for f in factors)
-    median = np.median(factors)
+    median, percent = np.median(factors), 100.0 * repeatability
     return (
-        f"{len(pairs)} pairs, {100.0 * repeatability:g} % of change between experiments: {median:.1f} times less in the "
+        f"{len(pairs)} pairs, {percent:g} % of change between experiments: {median:.1f} times less in the "
         f"median, at least 3 times in {share} of {len(pairs)}"
     )

@@ -127,10 +127,11 @@ def draw_pair(e: Experiment, pair: int) -> tuple[UnitErrors, UnitErrors]:
     deviation."""
     first = draw_source(e.seed, f"unit {pair}").normal(size=(4, 3, 3))
     change = draw_source(e.seed, f"change {pair}").normal(size=(4, 3, 3))
-    return _scaled(e, first), _scaled(e, first + e.repeatability * change)
+    return scaled(e, first), scaled(e, first + e.repeatability * change)
 
 
-def _scaled(e: Experiment, z: Floats) -> UnitErrors:
+def scaled(e: Experiment, z: Floats) -> UnitErrors:
+    """Errors of z standard deviations each: rows of z are nu, Theta, df, Gamma."""
     eye = np.eye(3) > 0
     gamma = z[3] * np.where(eye, e.gamma_scale_ppm * PPM, e.gamma_angle_arcsec * ARCSEC)
     kept = np.zeros((3, 3))

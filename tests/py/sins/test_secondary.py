@@ -14,9 +14,13 @@ import pytest
 from psabench.campaign import sins_pairs, sins_unit
 from psabench.campaign.sins_unit import Experiment, UnitErrors, draw_pair, read_experiment, run_unit
 from psabench.errors import BadInput
+from psabench.native import nav_errors
+from psabench.native.kalman import Kalman
+from psabench.native.nav_errors import ErrorsConfig
 from psabench.native.sins import Turn
 from psabench.quartz.draws import draw_source
 from psabench.sins import secondary, secondary_page
+from psabench.sins.alignment import aligned
 from psabench.sins.outputs import Outputs, read_outputs, write_outputs
 from psabench.sins.secondary import Secondary, calibrate, compensate, errors_of
 from psabench.sins.secondary_run import SecondaryParams, run_secondary
@@ -88,7 +92,7 @@ def test_a_unit_that_has_not_changed_is_compensated_to_its_noise() -> None:
 
 
 def test_raw_data_that_are_corrected_navigate_as_the_outputs_that_are_compensated() -> None:
-    """The correction goes to `psabench nav apply`; a unit that has it ends where the equations say, within 5 % of the errors before."""
+    """A unit with the correction ends where the equations say, within 5 % of the errors before."""
     e, c = article(), calibrated().correction()
     second = draw_pair(e, 0)[1]
     corrected = UnitErrors(
@@ -279,3 +283,38 @@ def test_what_is_left_is_what_has_changed_between_the_experiments() -> None:
     assert more_left / once == pytest.approx(2.0, rel=0.15)
     assert 3.0 < np.median(factors) < 14.0
     assert 0.3 < np.mean(nees) < 1.3
+
+
+# What each kind of error makes of the place, km: the largest standard deviation of the radial error in two hours.
+KM = {
+    "theta_scale_ppm": {"secondary": 12.6, "secondary_reversing": 4.4},
+    "nu_degph": {"secondary": 4.8, "secondary_reversing": 4.7},
+    "theta_angle_arcsec": {"secondary": 1.6, "secondary_reversing": 1.5},
+    "df_mps2": {"secondary": 2.2, "secondary_reversing": 2.1},
+}
+
+
+@pytest.mark.parametrize("name", list(KM))
+@pytest.mark.parametrize("plan", ["secondary", "secondary_reversing"])
+def test_a_dozen_kilometres_are_an_error_of_the_gyros_scale(name: str, plan: str) -> None:
+    """With the article.yaml deviations one kind at a time, alignment included: figures of the page."""
+    e = replace(article(), plan=plan)
+    still = dict.fromkeys(("nu_degph", "theta_scale_ppm", "theta_angle_arcsec", "df_mps2"), 0.0)
+    alone = replace(e, gamma_scale_ppm=0.0, gamma_angle_arcsec=0.0, **{**still, name: getattr(e, name)})
+    sd = np.abs(sins_unit.scaled(alone, np.ones((4, 3, 3))).constants())
+    way = ideal_way(plan)
+    model = ErrorsConfig()
+    kf = Kalman(*aligned(model, way.states[0], np.zeros(21), np.diag(sd**2), 600.0), 7)
+    most = 0.0
+    for first in range(0, len(way), 150):
+        nav_errors.predict(model, kf, way.part(first, first + 150))
+        most = max(most, float(np.sqrt(np.trace(kf.p[:2, :2]))))
+    assert most / 1000.0 == pytest.approx(KM[name][plan], rel=0.03)
+
+
+@cache
+def ideal_way(plan: str) -> nav_errors.Way:
+    """Of a unit without errors."""
+    zero = UnitErrors(nu_radps=np.zeros(3), theta=np.zeros((3, 3)), df_mps2=np.zeros(3), gamma=np.zeros((3, 3)))
+    e = replace(article(), plan=plan, gyro_noise_degph_rts=0.0, accel_noise_mps2_rts=0.0)
+    return secondary.way_of(run_unit(e, zero, np.random.default_rng(0)), e.point)
