@@ -606,6 +606,16 @@ def _commands() -> Iterator[Command]:
         load=_of_the_covariance,
         examples=_EXAMPLES[name],
     )
+    for (name, summary), handler, takes in ((SNAKE, _snake, ()), (SECONDARY, _secondary, tuple(FROM_OUTPUTS))):
+        yield Command(
+            name=name,
+            summary=summary,
+            handler=handler,
+            common=(*takes, "--out"),
+            load=partial(_of_outputs, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_OUTPUTS,
+        )
     name, summary = THERMAL
     yield Command(
         name=name,
@@ -626,16 +636,6 @@ def _commands() -> Iterator[Command]:
             load=partial(_of_the_platform, name),
             examples=_EXAMPLES[name],
             notes=NOTES_PLATFORM,
-        )
-    for (name, summary), handler, takes in ((SNAKE, _snake, ()), (SECONDARY, _secondary, tuple(FROM_OUTPUTS))):
-        yield Command(
-            name=name,
-            summary=summary,
-            handler=handler,
-            common=(*takes, "--out"),
-            load=partial(_of_outputs, name),
-            examples=_EXAMPLES[name],
-            notes=NOTES_OUTPUTS,
         )
 
 
