@@ -17,7 +17,7 @@ rate = C_nb.T @ [0.0, EARTH_RADPS * math.cos(LAT_RAD), EARTH_RADPS * math.sin(LA
 force = C_nb.T @ [0.0, 0.0, strapdown.gravity_mps2(LAT_RAD, 0.0)]
 for title, drift in (("after an hour with a gyro drift of 0.01 deg/h", DRIFT_RADPS), ("without", 0.0)):
     unit = strapdown.Strapdown(begin, height_fixed=True)
-    angle = np.tile((rate + [drift, 0.0, 0.0]) * DT_S, (N, 1))
+    angle = np.tile((rate + np.array([drift, 0.0, 0.0])) * DT_S, (N, 1))
     path = unit.advance(angle, np.tile(force * DT_S, (N, 1)), DT_S)
     north_m = (path[:, 0] - LAT_RAD) * strapdown.radii_m(LAT_RAD, 0.0)[0]
     print(f"{title}: {np.abs(north_m).max() / 1e3:.2f} km off, {np.abs(path[:, 4]).max():.2f} m/s")

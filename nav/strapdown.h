@@ -1,4 +1,4 @@
-/* Strapdown integration over the WGS 84 ellipsoid (docs/strapdown.md).
+/* Strapdown integration over the WGS 84 ellipsoid (docs/procedures/strapdown.md).
  *
  * Frames. n: local level, east, north, up, at the present place. b: the unit's axes. C_nb takes coordinates in b to coordinates
  * in n. Angles in rad, longitude without bounds. Increments are integrals over one interval of what the sensors measure: of the
@@ -50,8 +50,8 @@ NAV_API void nav_dcm_angles(const double C_nb[9], double *heading_rad, double *p
  * Returns NAV_OK; NAV_RANGE: n < 0, dt_s not in (0, 1], unknown vertical, latitude beyond 89.9 deg at the start or on the way;
  * NAV_NOT_FINITE: a number of the state or an increment. Then `s` is as it was, *done (not NULL) is the number of the interval,
  * and of `path` the rows before it are valid. */
-NAV_API int nav_integrate(struct nav_strapdown *s, const double *dtheta_rad, const double *dv_mps, int64_t n, double dt_s,
-                          struct nav_state *path, int64_t *done);
+NAV_API int nav_integrate(struct nav_strapdown *s, const double *dtheta_rad, const double *dv_mps, int64_t n,
+                          double dt_s, struct nav_state *path, int64_t *done);
 
 #ifdef __cplusplus
 }

@@ -28,6 +28,7 @@ MAY_INCLUDE = {
     "nav/filter": {"nav", "nav/common"},
     "nav/sins": {"nav", "nav/common", "nav/filter"},
     "nav/errors": {"nav", "nav/common", "nav/filter", "nav/sins"},
+    "nav/strapdown": {"nav", "nav/common"},
     "gen": {"base", "canopen"},
     "link": {"base"},
     "board": _MODELS,  # the contract of boards, and what boards share
@@ -60,6 +61,7 @@ _JSON = {"command", "fault", "control", "scenario", "bench", "app"}
 LIBRARIES = {
     "Eigen/Core": {"nav"},
     "Eigen/Dense": {"nav"},
+    "Eigen/Geometry": {"nav"},
     "cjson/cJSON.h": _JSON,
     "cJSON.h": _JSON,
     "immintrin.h": {"chip"},  # the compiler's, for the vectors of x86-64

@@ -72,7 +72,8 @@ struct fault_kind {
     /* False: the point is no longer there, or has no room. NULL: lift does it, which puts the sum of what is ACTIVE in effect. */
     bool (*apply)(struct fault *f, int64_t t_ns);
     void (*lift)(struct fault *f, int64_t t_ns); /* it is no longer ACTIVE; NULL for those that are over at once */
-    void (*reseed)(struct fault *f, uint64_t seed, int64_t t_ns); /* while it is ACTIVE: what hangs in the bench; NULL: nothing random */
+    void (*reseed)(struct fault *f, uint64_t seed,
+                   int64_t t_ns); /* while it is ACTIVE: what hangs in the bench; NULL: nothing random */
 };
 
 struct fault_table {

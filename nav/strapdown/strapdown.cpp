@@ -6,7 +6,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace {
+namespace
+{
 
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
@@ -53,7 +54,7 @@ Vec3 transport_rate(const Earth &e, const Vec3 &v)
 }
 
 /* exp([rv x]); a series for small angles, whose first term left out is 1e-17 of 1. */
-Mat3 rotation(const Vec3 &rv)
+Mat3 rotation_by(const Vec3 &rv)
 {
     const double z = rv.squaredNorm();
     double cos_minus_1 = -0.5 * z + z * z * (1.0 / 24.0 - z * (1.0 / 720.0));
@@ -83,7 +84,7 @@ struct Increment {
     Vec3 theta, dv;
 };
 
-Increment increment(const Vec3 &a, const Vec3 &v, const Vec3 &a_before, const Vec3 &v_before)
+Increment increment_of(const Vec3 &a, const Vec3 &v, const Vec3 &a_before, const Vec3 &v_before)
 {
     const Vec3 coning = a_before.cross(a) / 12.0;
     const Vec3 sculling = (a_before.cross(v) + v_before.cross(a)) / 12.0;
@@ -97,7 +98,7 @@ struct Motion {
 };
 
 /* One interval: velocity by rates at its beginning, place and attitude by the mean velocity. */
-void advance(Motion &m, const Increment &d, double dt_s, bool fixed)
+void advance_motion(Motion &m, const Increment &d, double dt_s, bool fixed)
 {
     const Earth e = earth_at(m.lat_rad, m.h_m);
     const Vec3 u = earth_rate(e);
@@ -112,7 +113,7 @@ void advance(Motion &m, const Increment &d, double dt_s, bool fixed)
     m.lon_rad += rho[1] / e.cos_lat * dt_s;
     m.h_m += mean[2] * dt_s;
     m.v = after;
-    m.C = rotation(-(u + rho) * dt_s) * (m.C * rotation(d.theta));
+    m.C = rotation_by(-(u + rho) * dt_s) * (m.C * rotation_by(d.theta));
 }
 
 Motion motion_of(const struct nav_state &s)
@@ -120,7 +121,7 @@ Motion motion_of(const struct nav_state &s)
     return {s.lat_rad, s.lon_rad, s.h_m, Vec3(s.v_n_mps), Rows3(s.C_nb)};
 }
 
-void store(const Motion &m, struct nav_state &s)
+void store_motion(const Motion &m, struct nav_state &s)
 {
     s.lat_rad = m.lat_rad;
     s.lon_rad = m.lon_rad;
@@ -159,9 +160,15 @@ void nav_dcm(double heading_rad, double pitch_rad, double roll_rad, double C_nb[
     const double sh = nav_sin(heading_rad), ch = nav_cos(heading_rad);
     const double sp = nav_sin(pitch_rad), cp = nav_cos(pitch_rad);
     const double sr = nav_sin(roll_rad), cr = nav_cos(roll_rad);
-    const double c[9] = {ch * cr + sh * sp * sr, sh * cp,  ch * sr - sh * sp * cr,
-                         ch * sp * sr - sh * cr, ch * cp,  -sh * sr - ch * sp * cr,
-                         -cp * sr,               sp,       cp * cr};
+    const double c[9] = {ch * cr + sh * sp * sr,
+                         sh * cp,
+                         ch * sr - sh * sp * cr,
+                         ch * sp * sr - sh * cr,
+                         ch * cp,
+                         -sh * sr - ch * sp * cr,
+                         -cp * sr,
+                         sp,
+                         cp * cr};
     for (int i = 0; i < 9; i++) C_nb[i] = c[i];
 }
 
@@ -184,16 +191,16 @@ int nav_integrate(struct nav_strapdown *s, const double *dtheta_rad, const doubl
     if (fixed) m.v[2] = 0.0;
     for (; i < n && status == NAV_OK; i++) {
         const Vec3 a(dtheta_rad + 3 * i), v(dv_mps + 3 * i);
-        advance(m, increment(a, v, a_before, v_before), dt_s, fixed);
+        advance_motion(m, increment_of(a, v, a_before, v_before), dt_s, fixed);
         status = fault_of(m);
         if (status != NAV_OK) break;
-        if (path) store(m, path[i]);
+        if (path) store_motion(m, path[i]);
         a_before = a;
         v_before = v;
     }
     if (done) *done = i;
     if (status != NAV_OK) return status;
-    store(m, s->at);
+    store_motion(m, s->at);
     Eigen::Map<Vec3>(s->dtheta_rad) = a_before;
     Eigen::Map<Vec3>(s->dv_mps) = v_before;
     return NAV_OK;

@@ -37,9 +37,9 @@ def one_unit(seed: int, plan_name: str) -> tuple[dict[str, tuple[Graded, np.ndar
         truth = sins_run.truth_of(bench)
     took_s = time.monotonic() - began_s
     start, found = attitudes(0.0, np.zeros((1, 3)))[0], {}
-    for name, stand in (("with angles", data.stand(p.azimuth_deg * DEG)), ("without", None)):
-        cfg = p.config(round(data.increments.dt_s, 6), stand is not None, sins_run.longest_cycle_s(plan))
-        result = calibrate_unit(cfg, start, data.increments, stand)
+    for name, angles in (("with angles", data.stand(p.azimuth_deg * DEG)), ("without", None)):
+        cfg = p.config(round(data.increments.dt_s, 6), angles is not None, sins_run.longest_cycle_s(plan))
+        result = calibrate_unit(cfg, start, data.increments, angles)
         graded = sins_run.grade(result, truth)
         found[name] = graded, graded.error / np.array([result.parameter(n).sd for n in graded.names])
     return found, took_s

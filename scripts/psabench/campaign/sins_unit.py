@@ -90,10 +90,10 @@ def read_experiment(name: str) -> Experiment:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError as e:
         raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--experiment")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
         raise BadInput(expected("an experiment in YAML", " ".join(str(e).split()), path)) from e
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"plan"}:
-        raise BadInput(expected(" ".join(["plan", *LIMITS]), " ".join(map(str, found or ())), path))
+        raise BadInput(expected(" ".join(["plan", *LIMITS]), str(found)[:80], path))
     plan = found.pop("plan", Experiment().plan)
     numbers: dict[str, Any] = {k: _number(v, k, path) for k, v in found.items()}
     return Experiment(plan=str(plan), **numbers)

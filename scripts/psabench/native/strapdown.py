@@ -1,4 +1,4 @@
-"""Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/strapdown.md), from Python.
+"""Strapdown integration over the ellipsoid: strapdown.h of libpsabench-nav (docs/procedures/strapdown.md), from Python.
 
 Frame n is east, north, up; b the unit's axes; `C_nb` takes coordinates in b to coordinates in n. SI units, rad.
 Increments are integrals over one interval of the rate in inertial space and of the specific force, in b.
@@ -68,15 +68,15 @@ class Strapdown:
         status = library().integrate(*at)
         if status:
             i = done.value
-            why = self._why(status, np.hstack([a[i : i + 1], v[i : i + 1]]))
-            raise BadInput(f"strapdown: interval {i} of {len(a)}: {why}")
+            what, got = self._why(status, np.hstack([a[i : i + 1], v[i : i + 1]]))
+            raise BadInput(expected(what, got, f"strapdown: interval {i} of {len(a)}"))
         return path
 
-    def _why(self, status: int, interval: Floats) -> str:
+    def _why(self, status: int, interval: Floats) -> tuple[str, object]:
         numbers = np.append(np.array(self._at.at), interval)
         if status == Status.NOT_FINITE:
-            return expected("finite numbers", numbers[~np.isfinite(numbers)][:1])
-        return expected("a latitude within 89.9 deg", "one beyond it")
+            return "finite numbers", numbers[~np.isfinite(numbers)][:1]
+        return "a latitude within 89.9 deg", "one beyond it"
 
 
 def gravity_mps2(lat_rad: float, h_m: float) -> float:

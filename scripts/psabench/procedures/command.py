@@ -131,7 +131,11 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
 ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
     "--table": {"metavar": "VISA-ADDRESS", "help": f"rate table, real or emulated: {EXAMPLES}"},
     "--data": {"type": Path, "metavar": "FILE", "help": "increments of a recording in place of a bench"},
-    "--layout": {"type": Path, "metavar": "FILE", "help": "what the recording's columns are (docs/sins_data.md)"},
+    "--layout": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "what the recording's columns are (docs/procedures/sins_data.md)",
+    },
     "--angles": {"type": Path, "metavar": "FILE", "help": "angles of the table, as table_angles.csv of a run"},
 }
 # Recordings of a unit that navigates.

@@ -98,7 +98,7 @@ def calibrate_unit(
     """Both passes. Raises BadInput for data that no estimate should be made from: what is wrong is named."""
     refused = [f.what for f in findings(data) if f.refuse]
     if refused:
-        raise BadInput(f"sins-calibration: {'; '.join(refused)}")
+        raise BadInput(expected("a recording without findings", "; ".join(refused), "sins-calibration"))
     if len(data) * data.dt_s < LEAST_S:
         raise BadInput(expected(f"{LEAST_S:g} s or more", f"{len(data) * data.dt_s:.2f} s", "sins-calibration"))
     try:
@@ -163,13 +163,13 @@ def value_of(params: Params, name: str) -> float:
 
 
 def _result_of(cfg: SinsConfig, s: Sins, innovations: Floats) -> SinsResult:
-    from psabench.native.sins import prior
+    from psabench.native.sins import prior_covariance
 
     state, named = s.state(), elements(s.rows, cfg)
     scale = np.array([SCALES[key].per_si for _, key, _ in named])
     at = [k for *_, k in named]
     covariance = s.covariance()[1][np.ix_(at, at)] * np.outer(scale, scale)
-    before = np.sqrt(np.diag(prior(cfg))[at]) * scale
+    before = np.sqrt(np.diag(prior_covariance(cfg))[at]) * scale
     parameters = tuple(
         Parameter(
             name=name,

@@ -211,12 +211,12 @@ def grade(r: SinsResult, truth: Params) -> Graded:
     from scipy import stats
 
     true, _ = sins.to_gauge(r.cfg.gauge, truth)
-    keys = {name: key for name, key, _ in elements(sins.layout(r.cfg), r.cfg)}
+    keys = {name: key for name, key, _ in elements(sins.state_layout(r.cfg), r.cfg)}
     at = [k for k, p in enumerate(r.parameters) if p.name.split("_")[0] in GRADED]
     names = tuple(r.parameters[k].name for k in at)
     right = np.array([value_of(true, n) * SCALES[keys[n]].per_si for n in names])
     error = np.array([r.parameters[k].value for k in at]) - right
-    chi_square = sins.nees(error, np.ascontiguousarray(r.covariance[np.ix_(at, at)]))
+    chi_square = sins.error_nees(error, np.ascontiguousarray(r.covariance[np.ix_(at, at)]))
     p = float(stats.chi2.sf(chi_square, len(at)))
     return Graded(names=names, truth=right, error=error, chi_square=chi_square, p=min(p, 1.0))
 
@@ -298,7 +298,7 @@ def _estimate(run: SinsRun, k: int) -> dict[str, Any]:
 
 
 NOTES = (
-    "Error = measured less true: w′ = w + ν + Θw, f′ = f + Δf + Γf. A correction takes it out (docs/sins_data.md).",
+    "Error = measured less true: w′ = w + ν + Θw, f′ = f + Δf + Γf. A correction takes it out.",
     "Three turns of the instrument's axes are not observable: the gauge makes three elements of Γ zero, and the truth "
     "is turned into the same axes before it is compared.",
     "The interval is 1.96 standard deviations of the filter's covariance: it holds the noise and the priors, and no "

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 EPILOG = """\
 CALIBRATION is a report's result.json with a correction in it, or the correction alone. RECORDING is a file of
-increments or rates: .csv, .mcap, .mf4, or raw numbers; LAYOUT says in YAML what its columns are (docs/sins_data.md).
+increments or rates: .csv, .mcap, .mf4, or raw numbers; LAYOUT says in YAML what its columns are
+(docs/procedures/sins_data.md).
 
 examples:
   psabench nav apply run.csv --calibration build/run/result.json --out corrected.csv

@@ -1,8 +1,8 @@
 """What a calibration of an inertial unit is used for: corrected rates and specific forces, in Python, as C, as a file.
 
-Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w; f' = f + df + Gamma f + q f^2 + L(w) r,
-and the accelerometers are later than the gyros by `delay_s`. Applied backwards, in this order: delay, bias and
-quadratic term, matrix, lever arms.
+Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w;
+f' = f + df + Gamma f + q f^2 + L(w) r, and the accelerometers are later than the gyros by `delay_s`. Applied backwards,
+in this order: delay, bias and quadratic term, matrix, lever arms.
 """
 
 from __future__ import annotations
@@ -143,6 +143,8 @@ def _array(given: object, shape: tuple[int, ...], name: str) -> Floats | float:
         raise ValueError(expected(f"finite numbers of shape {shape}", given, name))
     if name in ("theta", "gamma") and np.abs(x).max() > MOST:
         raise ValueError(expected(f"elements within {MOST:g}", f"{np.abs(x).max():g}", name))
+    if name in ("theta", "gamma") and np.linalg.matrix_rank(np.eye(3) + x) < 3:
+        raise ValueError(expected("a matrix that, added to the unit matrix, has an inverse", given, name))
     return x if shape else float(x)
 
 

@@ -86,10 +86,10 @@ def read_flight(name: str) -> Flight:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError as e:
         raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--flight")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
         raise BadInput(expected("a flight in YAML", " ".join(str(e).split()), path)) from e
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"axes"}:
-        raise BadInput(expected(" ".join([*LIMITS, "axes"]), " ".join(map(str, found or ())), path))
+        raise BadInput(expected(" ".join([*LIMITS, "axes"]), str(found)[:80], path))
     axes = _axes(found.pop("axes", "forward left up"), f"{path}: axes")
     numbers = {key: _number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
     return Flight(axes=axes, **numbers)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from psabench.conform.sources import mf4
+from psabench.errors import expected
 
 asammdf: Any = __import__("asammdf")  # before the bounds: how long it takes to load is not the file's doing
 
@@ -24,10 +25,11 @@ def columns_of(path: str, names: list[str]) -> np.ndarray:
         signals = {name: file.get(name) for name in names if name in file}
         master = {name for name in names if name not in signals}
         if master - {"time", "t_s"} or not signals:
-            raise ValueError(f"no channel {sorted(master)[0] if master else names[0]}")
+            missing = sorted(master)[0] if master else names[0]
+            raise ValueError(expected(f"a channel {missing}", "none"))
         lengths = {name: len(s.samples) for name, s in signals.items()}
         if len(set(lengths.values())) != 1:
-            raise ValueError(f"channels of different length: {lengths}")
+            raise ValueError(expected("channels of one length", lengths))
         first = next(iter(signals.values()))
         found = [np.asarray(signals[n].samples if n in signals else first.timestamps, np.float64) for n in names]
         return np.column_stack(found)

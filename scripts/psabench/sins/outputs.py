@@ -64,6 +64,9 @@ def read_outputs(path: Path) -> Outputs:
     names, numbers = _read_table(path)
     columns = {name: numbers[:, k] for k, name in enumerate(names)}
     attitude = QUATERNION if set(QUATERNION) <= set(names) else ANGLES
+    bad = [name for name, column in columns.items() if not np.isfinite(column).all()]
+    if bad:
+        raise BadInput(expected("finite numbers", f"others in column {bad[0]}", path))
     missing = [n for n in (*PLAIN, *attitude, *RATES) if n not in columns]
     if missing:
         raise BadInput(expected(f"columns {', '.join(COLUMNS)}", f"no {missing[0]}", path))
@@ -78,14 +81,14 @@ def read_outputs(path: Path) -> Outputs:
         lat_rad=np.radians(columns["lat_deg"]),
         lon_rad=np.radians(columns["lon_deg"]),
         v_mps=v,
-        c_nb=_of_quaternions(turned, path) if attitude == QUATERNION else _of_angles(np.radians(turned), path),
+        c_nb=_of_quaternions(turned, path) if attitude == QUATERNION else _of_angles(np.radians(turned)),
         w_b_radps=rates,
     )
 
 
 def _read_table(path: Path) -> tuple[list[str], Floats]:
     try:
-        with path.open(encoding="utf-8") as file:
+        with path.open(encoding="utf-8-sig") as file:
             names = [n.strip() for n in file.readline().split(",")]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of an empty file, which is refused below
@@ -140,9 +143,7 @@ def _of_quaternions(q: Floats, path: Path) -> Floats:
     return np.stack([np.stack(r, -1) for r in rows], -2)
 
 
-def _of_angles(angles: Floats, path: Path) -> Floats:
-    if not np.isfinite(angles).all():
-        raise BadInput(expected("finite angles", "others", path))
+def _of_angles(angles: Floats) -> Floats:
     h, p, r = angles.T
     sh, ch, sp, cp, sr, cr = np.sin(h), np.cos(h), np.sin(p), np.cos(p), np.sin(r), np.cos(r)
     rows = [

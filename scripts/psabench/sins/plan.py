@@ -64,7 +64,7 @@ def read_plan(name: str) -> RotationPlan:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError as e:
         raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--plan")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
         raise BadInput(expected("a plan of rotations in YAML", " ".join(str(e).split()), path)) from e
     return plan_of_dict(found, str(path), path.stem)
 
@@ -88,8 +88,8 @@ def plan_of_dict(found: object, where: str, name: str = "") -> RotationPlan:
 
 def _turn_of_dict(found: Any, where: str) -> Turn:
     if not isinstance(found, dict) or set(found) - KEYS or not {"axis", "rate_degps", "for_s"} <= set(found):
-        raise BadInput(expected("axis, rate_degps, for_s and, if wanted, remount", found, where))
-    if found["axis"] not in AXES:
+        raise BadInput(expected("axis, rate_degps, for_s and optionally remount", found, where))
+    if not isinstance(found["axis"], str) or found["axis"] not in AXES:
         raise BadInput(expected(", ".join(AXES), found["axis"], f"{where}: axis"))
     if not isinstance(found.get("remount", False), bool):
         raise BadInput(expected("true or false", found["remount"], f"{where}: remount"))

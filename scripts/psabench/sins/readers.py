@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,8 @@ def read_increments(path: Path, layout: Layout | None = None) -> Increments:
     """Raises BadInput with the file, and the row or the column."""
     given = layout or Layout()
     if not path.is_file():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+        got = "a folder" if path.is_dir() else "a device or a pipe"
+        raise BadInput(expected("a file", got, path) if path.exists() else f"{path}: no such file")
     read = _read_raw if given.format else READERS.get(path.suffix.lower())
     if read is None:
         raise BadInput(
@@ -83,12 +84,21 @@ def _places(names: Sequence[str | int], there: Sequence[str], path: Path) -> lis
     return [there.index(str(n)) for n in names]
 
 
+def _csv_rows(file: Iterable[str], path: Path) -> Iterator[list[str]]:
+    """Raises BadInput for what is no CSV, such as a field longer than 128 KiB."""
+    reader = csv.reader(file)
+    try:
+        yield from reader
+    except csv.Error as e:
+        raise BadInput(expected("CSV", e, f"{path}: line {reader.line_num}")) from e
+
+
 def _read_csv(path: Path, layout: Layout) -> Floats:
     """A head of names, then numbers; what begins with # is passed over."""
     found: list[list[float]] = []
     places: list[int] | None = None
-    with path.open(encoding="utf-8", errors="replace", newline="") as file:
-        for number, row in enumerate(csv.reader(file), start=1):
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        for number, row in enumerate(_csv_rows(file, path), start=1):
             if not row or row[0].startswith("#"):
                 continue
             if places is None:
@@ -109,10 +119,8 @@ def _read_mcap(path: Path, layout: Layout) -> Floats:
     for number, message in enumerate(json_messages(path, layout.topic), start=1):
         try:
             found.append([_member(message, str(name)) for name in layout.names()])
-        except (KeyError, TypeError, ValueError) as e:
-            raise BadInput(
-                expected(f"numbers {', '.join(map(str, layout.names()))}", e, f"{path}: message {number}")
-            ) from e
+        except ValueError as e:
+            raise BadInput(f"{path}: message {number}: {e}") from e
     if not found:
         raise BadInput(expected(f"messages of topic {layout.topic} in JSON", "none", path))
     return np.array(found, np.float64)
@@ -121,10 +129,10 @@ def _read_mcap(path: Path, layout: Layout) -> Floats:
 def _member(message: object, name: str) -> float:
     for key in name.split("."):
         if not isinstance(message, Mapping) or key not in message:
-            raise KeyError(f"no {name}")
+            raise ValueError(expected(f"a member {name}", "none"))
         message = message[key]
     if isinstance(message, bool) or not isinstance(message, int | float):
-        raise ValueError(f"{message!r} for {name}")
+        raise ValueError(expected(f"a number for {name}", repr(message)))
     return float(message)
 
 

@@ -1,4 +1,4 @@
-"""What a table run recorded, as files that `sins-calibration --data` and others' programs read (docs/sins_data.md)."""
+"""What a table run recorded, as files that `sins-calibration --data` reads (docs/procedures/sins_calibration.md)."""
 
 from __future__ import annotations
 

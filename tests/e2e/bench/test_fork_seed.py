@@ -134,7 +134,7 @@ def test_a_batch_of_children_has_the_law_of_a_batch_of_starts(tmp_path: Path, ch
 
 
 # What is drawn in faults that are active at the fork: noise, which frames are lost, when pulses come.
-DRAWN = {
+DRAWN: dict[str, tuple[str, dict[str, float]]] = {
     "sensor.noise": ("a.sensor.x", {"rms_v": 1e-3}),
     "link.drop": ("a.can", {"probability": 0.3, "can_id": 0x185}),
     "line.noise": ("a.line.Res", {"rate_hz": 2000, "width_ns": 100}),

@@ -50,7 +50,14 @@ def test_a_short_plan_finds_the_unit_and_its_recording_gives_the_same_digits(tmp
     names = {e["name"]: e for e in first["estimates"]}  # type: ignore[attr-defined]
     assert names["tau"]["value"] == pytest.approx(-50.0, abs=4 * names["tau"]["sd"])  # of the scenario's readout
     assert abs(names["theta_11"]["error"]) < 4 * names["theta_11"]["sd"] < 20.0
-    data = ("--data", tmp_path / "a/increments.bin", "--layout", tmp_path / "a/increments.yaml")
+    data = (
+        "--data",
+        tmp_path / "a/increments.bin",
+        "--layout",
+        tmp_path / "a/increments.yaml",
+        "--plan",
+        plan(tmp_path),
+    )
     assert run(tmp_path / "b", *data, "--angles", tmp_path / "a/table_angles.csv") == 0
     again = found(tmp_path / "b")
     values = [[e["value"] for e in x["estimates"]] for x in (first, again)]  # type: ignore[attr-defined]

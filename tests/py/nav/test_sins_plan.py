@@ -157,6 +157,7 @@ TURN = {"axis": "z1", "rate_degps": 10, "for_s": 5}
         ([], r"^plan.yaml: expected axis_azimuth_deg and turns, got \[\]$"),
         ({"turns": []}, r"^plan.yaml: turns: expected a list of 1 to 1000, got \[\]$"),
         ({"turns": [{**TURN, "axis": "x"}]}, r"turns\[0\]: axis: expected z1, z2, z3, got x$"),
+        ({"turns": [{**TURN, "axis": ["z1"]}]}, r"turns\[0\]: axis: expected z1, z2, z3, got \['z1'\]$"),
         (
             {"turns": [TURN, {**TURN, "rate_degps": "fast"}]},
             r"turns\[1\]: rate_degps: expected -1000 to 1000, got fast$",

@@ -48,7 +48,7 @@ def matrix(heading: Floats, pitch: Floats, roll: Floats) -> Floats:
     yaw = stack([[c(heading), s(heading), o], [-s(heading), c(heading), o], [o, o, i]])
     nose = stack([[i, o, o], [o, c(pitch), -s(pitch)], [o, s(pitch), c(pitch)]])
     bank = stack([[c(roll), o, s(roll)], [o, i, o], [-s(roll), o, c(roll)]])
-    return yaw @ nose @ bank
+    return np.asarray(yaw @ nose @ bank)
 
 
 def slope(f: Callable[[Floats], Floats], t: Floats) -> Floats:
@@ -70,7 +70,7 @@ def velocity(flight: Flight, t: Floats) -> Floats:
 
 def gravity(lat: Floats, h: Floats) -> Floats:
     s2 = np.sin(lat) ** 2
-    return 9.7803253359 * (1 + 1.931852652458e-3 * s2) / np.sqrt(1 - E2 * s2) * (1 - 2 * h / A_M)
+    return np.asarray(9.7803253359 * (1 + 1.931852652458e-3 * s2) / np.sqrt(1 - E2 * s2) * (1 - 2 * h / A_M))
 
 
 def felt(flight: Flight, t: Floats) -> tuple[Floats, Floats]:
@@ -140,7 +140,7 @@ def test_python_ins_goes_the_same_way_for_an_hour(height_fixed: bool) -> None:
     With the free vertical channel, both differ by the digits of the ellipsoid's constants, which it makes grow.
     """
     import pandas as pd
-    from pyins import strapdown as other
+    from pyins import strapdown as other  # type: ignore[import-untyped]
 
     n = 360_000
     t = DT_S * np.arange(n + 1)

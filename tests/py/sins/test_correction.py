@@ -53,7 +53,7 @@ def measured(c: Correction) -> tuple[Increments, Increments]:
     felt = late + lever_mps2(w, DT_S, c.lever_m)
     raw_f = felt + c.df_mps2 + felt @ c.gamma.T + c.quadratic_s2pm * felt**2
     raw_w = w + c.nu_radps + w @ c.theta.T
-    end_s = DT_S * np.arange(1, len(w) + 1)
+    end_s = np.asarray(DT_S * np.arange(1, len(w) + 1), np.float64)
     made = (
         Increments(end_s=end_s, dt_s=DT_S, dtheta_rad=a * DT_S, dv_mps=b * DT_S) for a, b in ((raw_w, raw_f), (w, f))
     )
@@ -63,7 +63,7 @@ def measured(c: Correction) -> tuple[Increments, Increments]:
 
 def motion_at(shift_s: float) -> np.ndarray:
     t = DT_S * (np.arange(400) + 0.5)[:, None] + shift_s
-    return 9.8 * np.cos(np.array([0.5, 0.7, 0.3]) * t + np.array([0.0, 1.0, 2.0]))
+    return np.asarray(9.8 * np.cos(np.array([0.5, 0.7, 0.3]) * t + np.array([0.0, 1.0, 2.0])))
 
 
 @pytest.mark.parametrize("only", [None, *SHAPES])
@@ -106,6 +106,10 @@ def test_a_file_gives_back_the_same_correction(tmp_path: Path) -> None:
         ({"nu_radps": [1, 2, "x"]}, "nu_radps: expected numbers of shape"),
         ({"nu_radps": [1, 2, None]}, "nu_radps: expected finite numbers of shape"),
         ({"theta": [[1, 0, 0], [0, 0, 0], [0, 0, 0]]}, "theta: expected elements within 0.5, got 1"),
+        (
+            {"gamma": [[-0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0, 0, 0]]},
+            "gamma: expected a matrix that, added to the unit",
+        ),
         ({"thetas": 1}, "correction: expected nu_radps.* got thetas"),
     ],
 )

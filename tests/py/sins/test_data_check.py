@@ -21,7 +21,7 @@ def recording(noise: float = 1.0, turn_dps: float = 10.0) -> Increments:
     turned = Rotation.from_rotvec(np.cumsum(rate * DT_S, axis=0))
     force = (turned.inv() * Rotation.from_euler("y", 5, degrees=True)).apply([0.0, 0.0, G_MPS2])
     return Increments(
-        end_s=DT_S * np.arange(1, n + 1),
+        end_s=np.asarray(DT_S * np.arange(1, n + 1), np.float64),
         dt_s=DT_S,
         dtheta_rad=(rate + noise * rng.normal(0, 1e-6, (n, 3))) * DT_S,
         dv_mps=(force + noise * rng.normal(0, 1e-3, (n, 3))) * DT_S,

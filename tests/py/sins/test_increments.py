@@ -23,10 +23,9 @@ DT_S, N = 0.01, 50
 RNG = np.random.default_rng(3)
 RATE, FORCE = RNG.normal(0, 10, (N, 3)), RNG.normal(0, 1, (N, 3))  # deg/s, g
 TIME_S = 100.0 + DT_S * np.arange(N)
-NAMES = {"gyro": ("wx", "wy", "wz"), "accel": ("ax", "ay", "az"), "time": "t"}
-UNITS = {"gyro_unit": "deg/s", "accel_unit": "g"}
-BY_NAME = Layout(**NAMES, **UNITS)
-BY_PLACE = Layout(format="float64", gyro=(2, 3, 4), accel=(5, 6, 7), time=1, **UNITS)
+UNITS = Layout(gyro_unit="deg/s", accel_unit="g")
+BY_NAME = replace(UNITS, gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="t")
+BY_PLACE = replace(UNITS, format="float64", gyro=(2, 3, 4), accel=(5, 6, 7), time=1)
 COLUMNS = ["t", "wx", "wy", "wz", "ax", "ay", "az"]
 
 
@@ -48,7 +47,7 @@ def write_mcap(path: Path, rows: np.ndarray) -> Path:
         for i, (t, *w) in enumerate(rows.tolist()):
             message = {"t": t, "w": dict(zip("xyz", w[:3], strict=True)), "a": dict(zip("xyz", w[3:], strict=True))}
             writer.add_message(channel, log_time=i, publish_time=i, data=json.dumps(message).encode())
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 
@@ -80,8 +79,8 @@ def write_raw(path: Path, rows: np.ndarray, kind: str = "<f8") -> Path:
 
 FORMS = {
     "csv": (write_csv, BY_NAME),
-    "mcap": (write_mcap, Layout(gyro=("w.x", "w.y", "w.z"), accel=("a.x", "a.y", "a.z"), time="t", **UNITS)),
-    "mf4": (write_mf4, Layout(gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="time", **UNITS)),
+    "mcap": (write_mcap, replace(UNITS, gyro=("w.x", "w.y", "w.z"), accel=("a.x", "a.y", "a.z"), time="t")),
+    "mf4": (write_mf4, replace(UNITS, gyro=("wx", "wy", "wz"), accel=("ax", "ay", "az"), time="time")),
     "bin": (write_raw, BY_PLACE),
 }
 
@@ -112,7 +111,7 @@ def test_float32_of_a_toolbox_with_a_rounded_clock(tmp_path: Path) -> None:
 
 def test_axes_are_turned_into_right_forward_up(tmp_path: Path) -> None:
     """From forward, right, down."""
-    layout = Layout(**NAMES, **UNITS, axes="+y +x -z")
+    layout = replace(BY_NAME, axes="+y +x -z")
     found = read_increments(write_csv(tmp_path / "frd.csv", table()), layout)
     assert found.dv_mps == pytest.approx(FORCE[:, [1, 0, 2]] * [1, 1, -1] * 9.80665 * DT_S, rel=1e-9)
     assert np.array_equal(turn("+y +x -z"), [[0, 1, 0], [1, 0, 0], [0, 0, -1]])
@@ -160,7 +159,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     mcap = write_mcap(tmp_path / "x.mcap", table())
     with pytest.raises(BadInput, match="expected messages of topic /other in JSON, got none"):
         read_increments(mcap, replace(FORMS["mcap"][1], topic="/other"))
-    with pytest.raises(BadInput, match=r"message 1: expected numbers .*, got .*no wx"):
+    with pytest.raises(BadInput, match=r"message 1: expected a member wx, got none"):
         read_increments(tmp_path / "x.mcap", BY_NAME)
     (tmp_path / "x.mf4").write_bytes(b"no MDF")
     with pytest.raises(BadInput, match="expected an MF4 file"):
@@ -183,6 +182,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
         ({"format": "float16"}, "format: expected float32 or float64"),
         ({"format": "float32"}, "expected places of columns, 1 to 7, got dtheta_x_rad"),
         ({"columns": "7"}, "columns: expected a number"),
+        ({"gyro_unit": ["rad"]}, r"gyro_unit: expected rad, deg.* got \['rad'\]"),
     ],
 )
 def test_a_layout_that_is_none_is_refused(tmp_path: Path, found: object, said: str) -> None:
@@ -192,6 +192,22 @@ def test_a_layout_that_is_none_is_refused(tmp_path: Path, found: object, said: s
     path.write_text(json.dumps(found))
     with pytest.raises(BadInput, match=f"^{path}: .*{said}"):
         read_layout(path)
+
+
+def test_a_csv_of_a_spreadsheet_is_read_and_one_field_without_end_is_refused(tmp_path: Path) -> None:
+    """The first begins with a byte order mark."""
+    path = write_csv(tmp_path / "bom.csv", table())
+    text = path.read_text().removeprefix("# a unit\n")
+    path.write_text(text, encoding="utf-8-sig")
+    assert len(read_increments(path, BY_NAME)) == N
+    path.write_text(text + "9" * 200_000)
+    with pytest.raises(BadInput, match=f"^{path}: line {N + 2}: expected CSV, got field larger"):
+        read_increments(path, BY_NAME)
+
+
+def test_a_device_is_no_folder() -> None:
+    with pytest.raises(BadInput, match=r"^/dev/null: expected a file, got a device or a pipe"):
+        read_increments(Path("/dev/null"), BY_NAME)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -214,11 +214,12 @@ def test_heading_pitch_and_roll_are_an_attitude_too(recording: Path) -> None:
         (lambda lines: [*lines[:50], lines[50], *lines[50:]], "a repeated row"),
         (lambda lines: lines[:1], "2 rows or more"),
         (lambda lines: [lines[0], "a,b"], "rows of numbers"),
+        (lambda lines: put(lines, 2, "nan"), "others in column lon_deg"),
         (lambda lines: put(lines, 5, "0,0,0,0"), "length 1"),
         (lambda lines: put(lines, 9, "0,0,0"), "a unit that turns"),
         (lambda lines: put(lines, 9, "0,0,200"), "of a turn apart"),
     ],
-    ids=["attitude", "rates", "gap", "back", "twice", "empty", "words", "quaternion", "still", "fast"],
+    ids=["attitude", "rates", "gap", "back", "twice", "empty", "words", "number", "quaternion", "still", "fast"],
 )  # fmt: skip
 def test_a_recording_that_is_none_is_refused(
     recording: Path, change: Callable[[list[str]], list[str]], says: str
@@ -253,7 +254,7 @@ def test_the_procedure_takes_recordings_and_reports(
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("seed: 1.5", "seed"), ("repeatability: -1", "repeatability"), ("nu: 3", "nu_degph"), ("[1]", "plan")],
+    [("seed: 1.5", "seed"), ("repeatability: -1", "repeatability"), ("nu: 3", "nu_degph"), ("[1]", "plan"), ("7", "plan")],
 )
 def test_an_experiment_that_is_none_is_refused(tmp_path: Path, text: str, says: str) -> None:
     path = tmp_path / "e.yaml"

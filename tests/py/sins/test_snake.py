@@ -90,6 +90,8 @@ def test_a_flight_is_read_and_refused(tmp_path: Path) -> None:
         ("axes: forward right up", "right-handed"),
         ("velocity: 3", "speed_mps"),
         ("[1]", "speed_mps"),
+        ("7", "speed_mps"),
+        ("[" * 5000, "a flight in YAML"),
     ):
         path = tmp_path / "f.yaml"
         path.write_text(text, encoding="utf-8")

@@ -50,7 +50,7 @@ def test_a_turn_that_no_axis_can_make_is_refused_with_its_number() -> None:
 def recorded() -> TableData:
     rng = np.random.default_rng(2)
     data = Increments(
-        end_s=0.01 * np.arange(1, 101),
+        end_s=np.asarray(0.01 * np.arange(1, 101), np.float64),
         dt_s=0.01,
         dtheta_rad=rng.normal(0, 1, (100, 3)),
         dv_mps=rng.normal(0, 1, (100, 3)),
