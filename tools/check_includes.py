@@ -27,6 +27,7 @@ MAY_INCLUDE = {
     "nav/north": {"nav", "nav/common"},
     "nav/filter": {"nav", "nav/common"},
     "nav/sins": {"nav", "nav/common", "nav/filter"},
+    "nav/errors": {"nav", "nav/common", "nav/filter", "nav/sins"},
     "nav/strapdown": {"nav", "nav/common"},
     "gen": {"base", "canopen"},
     "link": {"base"},

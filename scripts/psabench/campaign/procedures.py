@@ -17,6 +17,10 @@ CAMPAIGNS: Mapping[str, tuple[str, str]] = {
     ),
     "sins-plan": ("sins.plan_search_command", "plan of rotations that calibrates a strapdown unit best"),
     "run-in": ("quartz.run_in_command", "thermal run-in of a production batch of quartz accelerometers"),
+    "sins-secondary": (
+        "campaign.sins_command",
+        "strapdown units that navigate on a rate table, calibrated from their own outputs",
+    ),
 }
 FIRST = "gyrocompass"  # was the only one: its options may precede its name
 

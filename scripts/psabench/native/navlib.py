@@ -1,4 +1,5 @@
-"""libpsabench-nav as ctypes sees it: declared here and in `sinslib`, used by `nav`, `nav_mc`, `sins`. Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here, in `sinslib` and `errorslib`, used by `nav`, `nav_mc`, `sins`.
+Manual: nav.h."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import ctypes as c
 from functools import cache
 from typing import Any, TypeVar
 
+from psabench.native.errorslib import PROTOTYPES as ERRORS_PROTOTYPES
 from psabench.native.shared_library import SharedLibrary
 from psabench.native.sinslib import PROTOTYPES as SINS_PROTOTYPES
 
@@ -210,9 +212,14 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 
 
 class NavLibrary(SharedLibrary):
-    """The functions of nav.h, nav_mc.h, kf.h and sins.h."""
+    """The functions of nav.h, nav_mc.h, kf.h, sins.h, strapdown.h and errors.h."""
 
-    abi, prefix, variable, prototypes = ABI, "nav_", "PSABENCH_NAV_LIB", PROTOTYPES | SINS_PROTOTYPES
+    abi, prefix, variable, prototypes = (
+        ABI,
+        "nav_",
+        "PSABENCH_NAV_LIB",
+        PROTOTYPES | SINS_PROTOTYPES | ERRORS_PROTOTYPES,
+    )
 
 
 @cache

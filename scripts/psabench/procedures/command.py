@@ -25,7 +25,9 @@ from psabench.procedures.run_table import (
     G_MPS2,
     ON_THE_HEAD,
     ON_THE_PLATFORM,
+    SECONDARY,
     SINS,
+    SNAKE,
     THERMAL,
 )
 from psabench.progress import Bar
@@ -56,6 +58,10 @@ NOTES_CHAMBER = """
 Without --head, --chamber or --control an emulator is started, with the scenario quartz_run_in, whose chain and head
 are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit status 1: a compensation is off the true
 outputs by more than its limits.
+"""
+
+NOTES_OUTPUTS = """
+Exit status 1: a figure is out of its limits. docs/procedures/sins_secondary.md derives the method.
 """
 
 ALL = "all"
@@ -131,6 +137,19 @@ ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
         "help": "what the recording's columns are (docs/procedures/sins_data.md)",
     },
     "--angles": {"type": Path, "metavar": "FILE", "help": "angles of the table, as table_angles.csv of a run"},
+}
+# Recordings of a unit that navigates.
+FROM_OUTPUTS: Mapping[str, Mapping[str, Any]] = {
+    "--first": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "recording of the experiment that calibrates: what the unit gave out, CSV",
+    },
+    "--second": {
+        "type": Path,
+        "metavar": "FILE",
+        "help": "recording of the experiment that is compensated; none: calibrate alone",
+    },
 }
 # Of the thermal run alone.
 IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
@@ -228,7 +247,7 @@ def _parser_of(command: Command) -> Parser:
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option in command.common:
-        how = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE}[option]
+        how = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE, **FROM_OUTPUTS}[option]
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **how)
     return p
 
@@ -415,6 +434,29 @@ def _predict_sins(args: argparse.Namespace) -> int:
     return 0
 
 
+def _snake(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import snake, snake_page
+
+    found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, _params(args)))
+    print("\n".join(snake_page.console_lines(found)))
+    print(snake_page.verdict_words(found))
+    print(f"report: {snake_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0
+
+
+def _secondary(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import secondary_page, secondary_run
+
+    params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
+    found = secondary_run.run_secondary(params, args.first, args.second)
+    print("\n".join(secondary_page.console_lines(found)))
+    print(secondary_page.verdict_words(found))
+    print(f"report: {secondary_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0
+
+
 # What each takes of COMMON.
 _STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
 _PLATFORM = (
@@ -468,6 +510,14 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run sins-calibration --data build/run/increments.bin --layout build/run/increments.yaml --stand no
   psabench nav apply run.csv --calibration build/run/result.json --out corrected.csv
 """,
+    SECONDARY[0]: """\
+  psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
+  psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+""",
+    SNAKE[0]: """\
+  psabench run sins-snake
+  psabench run sins-snake --flight my_flight.yaml --plan two_rates
+""",
     COVARIANCE[0]: """\
   psabench run sins-covariance                                the article's two tables in every reading of its noise
   psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
@@ -520,6 +570,13 @@ def _of_the_covariance() -> Parameters:
     return Parameters(fields=CovarianceParams.__dataclass_fields__)
 
 
+def _of_outputs(name: str) -> Parameters:
+    from psabench.sins import secondary_run, snake
+
+    kind = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
+    return Parameters(fields=kind.__dataclass_fields__)
+
+
 def _commands() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
@@ -554,6 +611,16 @@ def _commands() -> Iterator[Command]:
         load=_of_the_covariance,
         examples=_EXAMPLES[name],
     )
+    for (name, summary), handler, takes in ((SNAKE, _snake, ()), (SECONDARY, _secondary, tuple(FROM_OUTPUTS))):
+        yield Command(
+            name=name,
+            summary=summary,
+            handler=handler,
+            common=(*takes, "--out"),
+            load=partial(_of_outputs, name),
+            examples=_EXAMPLES[name],
+            notes=NOTES_OUTPUTS,
+        )
     name, summary = THERMAL
     yield Command(
         name=name,

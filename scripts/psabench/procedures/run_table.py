@@ -31,6 +31,14 @@ COVARIANCE = (
     "sins-covariance",
     "accuracy of a strapdown unit's calibration on a rate table, predicted from the plan of rotations; no bench",
 )
+SNAKE = (
+    "sins-snake",
+    "covariance of an hour's flight after a calibration on the table: the article's 1900 and 1100 m; no bench",
+)
+SECONDARY = (
+    "sins-calibration-secondary",
+    "a strapdown unit on a rate table from its own navigation: one experiment calibrates, the next one is compensated",
+)
 
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory

@@ -15,7 +15,7 @@ from psabench.native.nav import Floats
 from psabench.native.sins import DEG, Turn
 from psabench.places import proto_file
 
-NAMED = ("article", "two_rates")  # of proto/rotation_plans
+NAMED = ("article", "two_rates", "secondary", "secondary_reversing")  # of proto/rotation_plans
 AXES: Mapping[str, tuple[float, float, float]] = {
     "z1": (1.0, 0.0, 0.0),
     "z2": (0.0, 1.0, 0.0),

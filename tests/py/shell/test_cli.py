@@ -25,10 +25,11 @@ from tests.py.link.test_lineport import lines
 MISTAKES: list[tuple[str, str]] = [
     (
         "run",
-        "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, heading-hold or script",
+        "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, sins-covariance, "
+        "sins-snake, sins-calibration-secondary, thermal, gyrocompass, heading-hold or script",
     ),
     ("run --out turns", "run: expected turns"),
-    ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, thermal, gyrocompass, "),
+    ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, "),
     ("run spin --positions 80", "heading-hold or script, got 'spin'"),
     (
         "run turns --positions 80",
@@ -38,6 +39,11 @@ MISTAKES: list[tuple[str, str]] = [
     ("run turns fourier", "turns: expected no more arguments, got 'fourier'"),
     ("run gyrocompass --node 5", "gyrocompass: expected an option that --help lists, got --node"),
     ("run gyrocompass --hours 4", "gyrocompass: expected an option that --help lists, got --hours"),
+    ("run sins-snake --flight loop", "--flight: expected snake, straight, or a file, got no file loop"),
+    ("run sins-calibration-secondary", "--first: expected a recording"),
+    ("run sins-calibration-secondary --first x.csv", "x.csv: No such file"),
+    ("campaign sins-secondary --pairs 0", "--pairs: expected 1 to 100000, got 0"),
+    ("campaign sins-secondary --experiment x.yaml", "--experiment: expected article, or a file, got no file x.yaml"),
     ("run heading-hold --average 16", "heading-hold: expected an option that --help lists, got --average"),
     (
         "run compare-converters --real-time",
