@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Draw docs/img/sins_fig1.svg and sins_snake.svg of docs/procedures/sins_secondary.md. Same bytes each time.
 
-    tools/plots/sins.py [docs/img]
+tools/plots/sins.py [docs/img]
 """
 
 from __future__ import annotations

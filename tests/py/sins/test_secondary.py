@@ -254,7 +254,13 @@ def test_the_procedure_takes_recordings_and_reports(
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("seed: 1.5", "seed"), ("repeatability: -1", "repeatability"), ("nu: 3", "nu_degph"), ("[1]", "plan"), ("7", "plan")],
+    [
+        ("seed: 1.5", "seed"),
+        ("repeatability: -1", "repeatability"),
+        ("nu: 3", "nu_degph"),
+        ("[1]", "plan"),
+        ("7", "plan"),
+    ],
 )
 def test_an_experiment_that_is_none_is_refused(tmp_path: Path, text: str, says: str) -> None:
     path = tmp_path / "e.yaml"
