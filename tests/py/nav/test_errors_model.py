@@ -17,8 +17,7 @@ from psabench.native.sins import Gauge
 from psabench.native.strapdown import State, Strapdown, radii_m
 from psabench.sins.flight import Flight, Flown, fly
 from scipy.spatial.transform import Rotation
-
-from tests.py.support.sins_truth import ARCMIN, DEGPH
+from sins_truth import ARCMIN, DEGPH
 
 Floats = np.ndarray
 DT_S, MODEL_S = 0.5, 0.5  # of the integration; steps of the model

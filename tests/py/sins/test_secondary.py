@@ -329,7 +329,7 @@ def ideal_way(plan: str) -> nav_errors.Way:
 
 @pytest.mark.parametrize(("times", "km", "percent"), [(1.0, 15.6, 0.4), (4.0, 62.6, 1.7)])
 def test_the_equations_miss_this_much_of_large_errors(times: float, km: float, percent: float) -> None:
-    """Figures of the page: unit 0 of seed 1 without noise, its true constants through the equations along an ideal unit's way."""
+    """Figures of the page: unit 0 of seed 1 without noise, its constants through the equations along an ideal unit's way."""
     e = replace(article(), seed=1, gyro_noise_degph_rts=0.0, accel_noise_mps2_rts=0.0)
     e = replace(e, **{name: getattr(e, name) * times for name in (*KM, "gamma_scale_ppm", "gamma_angle_arcsec")})
     unit, way, model = draw_pair(e, 0)[0], ideal_way("secondary"), ErrorsConfig()
