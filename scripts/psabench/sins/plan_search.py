@@ -16,7 +16,7 @@ import numpy as np
 from psabench.campaign.workers import Workers
 from psabench.native.nav import Floats
 from psabench.native.sins import SinsConfig
-from psabench.sins.covariance import predict
+from psabench.sins.covariance import predict_accuracy
 from psabench.sins.plan import RotationPlan
 from psabench.sins.plan_draft import Draft, Limits, article_draft, changed_draft, plan_of, random_draft
 
@@ -44,7 +44,7 @@ class Task:
 
 def sigmas(plan: RotationPlan, cfg: SinsConfig) -> Floats:
     """Standard deviations of the 21 parameters. Raises Refused."""
-    sd = predict(plan, cfg).sd
+    sd = predict_accuracy(plan, cfg).sd
     return np.concatenate([sd[block] for block in BLOCKS])
 
 

@@ -13,7 +13,16 @@ from psabench.errors import BadInput, expected
 from psabench.link.own import replace_file
 from psabench.report.grading import aligned
 from psabench.report.page import bullets, section, table, whole_page, write_report
-from psabench.sins.covariance import QUANTITIES, READINGS, Prediction, Quantity, Reading, predict, read_as, warnings_of
+from psabench.sins.covariance import (
+    QUANTITIES,
+    READINGS,
+    Prediction,
+    Quantity,
+    Reading,
+    predict_accuracy,
+    read_as,
+    warnings_of,
+)
 from psabench.sins.plan import RotationPlan, plan_of_dict
 from psabench.sins.plan_draft import PlanDict, article_draft, plan_dict, plan_text, time_of
 from psabench.sins.plan_search import BLOCKS, Search, score_of
@@ -78,7 +87,9 @@ def gather(search: Search, reading: str, ended_early: bool, took_s: float) -> Fo
         search=search,
         reading=reading_of(reading).name,
         plan=dicts[1],
-        compared={n: Compared(article=predict(article, c), best=predict(best, c)) for n, c in cfgs.items()},
+        compared={
+            n: Compared(article=predict_accuracy(article, c), best=predict_accuracy(best, c)) for n, c in cfgs.items()
+        },
         ended_early=ended_early,
         took_s=took_s,
     )

@@ -17,7 +17,7 @@ import pytest
 from psabench.campaign.workers import ThisProcess
 from psabench.cli import main
 from psabench.native.sins import SinsConfig
-from psabench.sins.covariance import READINGS, predict, read_as
+from psabench.sins.covariance import READINGS, predict_accuracy, read_as
 from psabench.sins.plan import plan_of_dict, read_plan
 from psabench.sins.plan_draft import (
     Draft,
@@ -138,7 +138,7 @@ def test_the_file_is_read_as_the_same_plan(found: Search, tmp_path: Path) -> Non
         assert plan.axis_azimuth_deg == written["axis_azimuth_deg"]
         direct = plan_of(draft, limits)
         assert direct is not None
-        assert np.array_equal(predict(plan, CFG).covariance, predict(direct, CFG).covariance)
+        assert np.array_equal(predict_accuracy(plan, CFG).covariance, predict_accuracy(direct, CFG).covariance)
 
 
 # ---- the command

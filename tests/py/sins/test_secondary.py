@@ -22,6 +22,7 @@ from psabench.quartz.draws import draw_source
 from psabench.sins import secondary, secondary_page
 from psabench.sins.alignment import aligned
 from psabench.sins.outputs import Outputs, read_outputs, write_outputs
+from psabench.sins.plan import read_plan
 from psabench.sins.secondary import Secondary, calibrate, compensate, errors_of
 from psabench.sins.secondary_run import SecondaryParams, run_secondary
 
@@ -52,7 +53,7 @@ def calibrated() -> Secondary:
 
 def short(e: Experiment, monkeypatch: pytest.MonkeyPatch, scale: float = 1.0) -> Outputs:
     """A short run of a unit with errors of `scale` of the experiment's."""
-    plan = sins_unit.read_plan("secondary")
+    plan = read_plan("secondary")
     monkeypatch.setattr(sins_unit, "read_plan", lambda _: replace(plan, turns=tuple(SHORT)))
     first, _ = draw_pair(replace(e, theta_scale_ppm=10.0 * scale), 0)
     return run_unit(e, first, np.random.default_rng(1))
@@ -111,7 +112,7 @@ def test_raw_data_that_are_corrected_navigate_as_the_outputs_that_are_compensate
 def test_the_alignment_of_the_second_run_is_compensated_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Otherwise the heading by the east drift stays."""
     full = compensate(calibrated(), ran()[1]).after.radial_m
-    real = secondary.aligned
+    real = aligned
 
     def without(*a: object) -> tuple[Floats, Floats]:
         x, p = real(*a)  # type: ignore[arg-type]
@@ -329,7 +330,7 @@ def ideal_way(plan: str) -> nav_errors.Way:
 
 @pytest.mark.parametrize(("times", "km", "percent"), [(1.0, 15.6, 0.4), (4.0, 62.6, 1.7)])
 def test_the_equations_miss_this_much_of_large_errors(times: float, km: float, percent: float) -> None:
-    """Figures of the page: unit 0 of seed 1 without noise, its constants through the equations along an ideal unit's way."""
+    """Figures of the page: unit 0 of seed 1 without noise, its constants through the equations along its way."""
     e = replace(article(), seed=1, gyro_noise_degph_rts=0.0, accel_noise_mps2_rts=0.0)
     e = replace(e, **{name: getattr(e, name) * times for name in (*KM, "gamma_scale_ppm", "gamma_angle_arcsec")})
     unit, way, model = draw_pair(e, 0)[0], ideal_way("secondary"), ErrorsConfig()
