@@ -573,7 +573,7 @@ def _of_the_covariance() -> Parameters:
 def _of_outputs(name: str) -> Parameters:
     from psabench.sins import secondary_run, snake
 
-    kind = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
+    kind: Any = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
     return Parameters(fields=kind.__dataclass_fields__)
 
 
