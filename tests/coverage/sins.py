@@ -10,7 +10,6 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from psabench.bench import Bench
-from psabench.native.sins import DEG
 from psabench.sins import calibration_run as sins_run
 from psabench.sins.calibration import T95, calibrate_unit
 from psabench.sins.calibration_run import CalibrationParams, Graded
@@ -37,8 +36,8 @@ def one_unit(seed: int, plan_name: str) -> tuple[dict[str, tuple[Graded, np.ndar
         truth = sins_run.truth_of(bench)
     took_s = time.monotonic() - began_s
     start, found = attitudes(0.0, np.zeros((1, 3)))[0], {}
-    for name, angles in (("with angles", data.stand(p.azimuth_deg * DEG)), ("without", None)):
-        cfg = p.config(round(data.increments.dt_s, 6), angles is not None, sins_run.longest_cycle_s(plan))
+    for name, angles in (("with angles", data.stand(0.0)), ("without", None)):
+        cfg = p.config(data.increments.dt_s, angles is not None, sins_run.longest_cycle_s(plan))
         result = calibrate_unit(cfg, start, data.increments, angles)
         graded = sins_run.grade(result, truth)
         found[name] = graded, graded.error / np.array([result.parameter(n).sd for n in graded.names])

@@ -573,7 +573,7 @@ def _of_the_covariance() -> Parameters:
 def _of_outputs(name: str) -> Parameters:
     from psabench.sins import secondary_run, snake
 
-    kind: Any = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
+    kind: type[Any] = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
     return Parameters(fields=kind.__dataclass_fields__)
 
 
@@ -598,6 +598,7 @@ def _commands() -> Iterator[Command]:
         summary=summary,
         handler=_calibrate_sins,
         common=("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose"),
+        kept="what was measured is in OUT",
         load=_of_the_sins,
         examples=_EXAMPLES[name],
     )

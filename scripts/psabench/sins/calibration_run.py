@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ import numpy as np
 
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, BenchError, expected
 from psabench.native import sins
-from psabench.native.nav import Floats
+from psabench.native.nav import Floats, Refused
 from psabench.native.sins import DEG, Params, SinsConfig
 from psabench.native.strapdown import gravity_mps2
 from psabench.procedures.head_bench import Progress
@@ -30,6 +31,7 @@ from psabench.sins.table_store import read_angles, write_data
 
 NAME = "sins-calibration"
 SCENARIO, COARSE = "sins_table", "sins_coarse"
+STEP_S, MOST_SAMPLES = 0.1, 64  # of the filter; samples that a step may have
 P_LIMIT = 0.001  # of the chi-square of all errors
 
 
@@ -37,8 +39,8 @@ P_LIMIT = 0.001  # of the chi-square of all errors
 class CalibrationParams:
     """Parameters of `sins-calibration`; the defaults are the article's."""
 
-    plan: str = option("article", "", "plan of rotations: article, two_rates or a YAML file")
-    azimuth_deg: float = option(0.0, "deg", "azimuth of the table's first axis from north")
+    plan: str = option("", "", "plan of rotations: article, two_rates or a YAML file (article)")
+    azimuth_deg: float | None = option(None, "deg", "azimuth of the table's first axis from north (the plan's)")
     latitude_deg: float = option(55.7, "deg", "latitude of the table")
     height_m: float = option(150.0, "m", "height of the table above the ellipsoid")
     gravity: float | None = option(None, "m/s2", "local gravity (of the ellipsoid there)")
@@ -56,6 +58,8 @@ class CalibrationParams:
             raise ValueError(expected(", ".join(GAUGES), self.gauge, "gauge"))
         if not -85.0 <= self.latitude_deg <= 85.0:
             raise ValueError(expected("-85 to 85 deg", self.latitude_deg, "latitude_deg"))
+        if not 0.0 <= self.wobble_arcsec <= 3600.0:
+            raise ValueError(expected("0 to 3600 arcsec", self.wobble_arcsec, "wobble_arcsec"))
         if self.lever not in (0, 3, 9):
             raise ValueError(expected("0, 3 or 9", self.lever, "lever"))
 
@@ -73,6 +77,7 @@ class CalibrationParams:
             latitude_rad=self.latitude_deg * DEG,
             gravity_mps2=self.g_mps2,
             sample_s=sample_s,
+            step_s=sample_s * min(max(round(STEP_S / sample_s), 1), MOST_SAMPLES),
             gauge=GAUGES[self.gauge],
             lever=self.lever,
             stand=stand,
@@ -132,7 +137,9 @@ class SinsRun:
 def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
     """Measure, or read; estimate; grade. What was measured is in OUT. Raises BadInput, BenchError."""
     p = made_params(CalibrationParams, NAME, options.params)
-    plan = read_plan(p.plan)
+    _check_options(options, p)
+    plan = read_plan(p.plan or "article")
+    azimuth_rad = (plan.axis_azimuth_deg if p.azimuth_deg is None else p.azimuth_deg) * DEG
     options.out.mkdir(parents=True, exist_ok=True)
     if options.data:
         data, truth, facts = _recorded(options), None, {"data": str(options.data)}
@@ -140,9 +147,9 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
         data, truth = _measured(options, p, plan, progress)
         write_data(options.out, data)
         facts = {"bench": str(options.can or options.control or options.scenario or _scenario(p)), "plan": plan.name}
-    start = attitudes(p.azimuth_deg * DEG, np.radians(data.start_deg)[None])[0]
-    stand = data.stand(p.azimuth_deg * DEG) if p.stand else None
-    cfg = p.config(round(data.increments.dt_s, 6), stand is not None, longest_cycle_s(plan))
+    start = attitudes(azimuth_rad, np.radians(data.start_deg)[None])[0]
+    stand = data.stand(azimuth_rad) if p.stand else None
+    cfg = p.config(data.increments.dt_s, stand is not None, longest_cycle_s(plan))
     with progress.step("estimate, two passes", 1) as advance:
         result = calibrate_unit(cfg, start, data.increments, stand)
         advance()
@@ -151,6 +158,21 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
     return SinsRun(
         params=p, result=result, plan=plan.name, facts=facts, graded=None if truth is None else grade(result, truth)
     )
+
+
+def _check_options(options: SinsOptions, p: CalibrationParams) -> None:
+    """Before minutes are measured. Raises BadInput."""
+    try:
+        sins.state_layout(p.config(0.01, p.stand, 1.0))
+    except Refused as e:
+        raise BadInput(f"{NAME}: {e}") from e
+    given = [n for n in ("can", "table", "control", "scenario", "seed") if getattr(options, n) is not None]
+    if options.data and given:
+        raise BadInput(expected("--data without a bench", f"--{given[0]}", NAME))
+    if options.data and options.angles and not p.plan:
+        raise BadInput(expected("--plan of the recording: its cycles are in the intervals", "none", "--angles"))
+    if not options.data and (options.angles or options.layout):
+        raise BadInput(expected("--data", "none", "--angles" if options.angles else "--layout"))
 
 
 def longest_cycle_s(plan: RotationPlan) -> float:
@@ -183,7 +205,13 @@ def _measured(
             raise BadInput(expected(f"a scenario with an inertial unit, as {SCENARIO}", "none", "--scenario"))
         moves = list(moves_of(plan.turns, table_axes(bench)))
         with progress.step(f"plan {plan.name}", len(moves)) as advance:
-            data = TableRun(bench, moves, advance).measure(p.stand)
+            run = TableRun(bench, moves, advance)
+            try:
+                data = run.measure(p.stand)
+            except BaseException:  # Ctrl-C, too: what was measured is kept
+                with suppress(BenchError):
+                    write_data(options.out, run.data(np.empty(0)))
+                raise
         return data, truth_of(bench) if bench.emulator else None
 
 

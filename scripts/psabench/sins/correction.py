@@ -2,7 +2,7 @@
 
 Model, error = measured less true (docs/procedures/sins.md): w' = w + nu + Theta w;
 f' = f + df + Gamma f + q f^2 + L(w) r, and the accelerometers are later than the gyros by `delay_s`. Applied backwards,
-in this order: delay, bias and quadratic term, matrix, lever arms.
+in this order: delay, bias, lever arms and quadratic term, matrix.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ class Correction:
     def apply(self, raw: Increments) -> Increments:
         """Increments without the unit's errors, as many and at the same instants."""
         dtheta = (raw.dtheta_rad - self.nu_radps * raw.dt_s) @ self.gyro_matrix.T
-        force = _earlier(raw.dv_mps / raw.dt_s, self.delay_s / raw.dt_s) - self.df_mps2
+        force = rows_later(raw.dv_mps / raw.dt_s, self.delay_s / raw.dt_s) - self.df_mps2
+        force -= lever_mps2(dtheta / raw.dt_s, raw.dt_s, self.lever_m)
         true = force @ self.accel_matrix.T
         for _ in range(2):  # what is left is of the order of q^3 f^4
             true = (force - self.quadratic_s2pm * true**2) @ self.accel_matrix.T
-        true -= lever_mps2(dtheta / raw.dt_s, raw.dt_s, self.lever_m)
         return replace(raw, dtheta_rad=dtheta, dv_mps=true * raw.dt_s)
 
 
-def _earlier(x: Floats, intervals: float) -> Floats:
+def rows_later(x: Floats, intervals: float) -> Floats:
     """Rows as they were `intervals` later, by the line between neighbours: x(t + delay)."""
     if intervals == 0.0:
         return x
@@ -154,7 +154,7 @@ _HEADER = """\
 /* Errors of an inertial unit, to be taken out of what it measures. Made by psabench {version}.
  * Frame: right-handed axes of the unit; C_nb of the navigation takes them to the local level. SI units, rad.
  *   gyros:          w = K_G (w' - B_G)
- *   accelerometers: f = K_A (f' - B_A - Q f^2), then less the lever arms: [w x (w x r_i) + dw/dt x r_i]_i
+ *   accelerometers: f = K_A (f' - B_A - Q f^2 - L), lever arms L_i = [w x (w x r_i) + dw/dt x r_i]_i
  * Of increments over T: subtract B_G T and B_A T. Accelerometers are {delay:.9g} s later than gyros. */
 #ifndef {guard}
 #define {guard}
@@ -177,7 +177,7 @@ static inline void {name}_gyros(const double measured[3], double dt_s, double ou
     }}
 }}
 
-/* Corrected specific force or increment of velocity; without delay and lever arms. */
+/* Corrected specific force or increment of velocity; subtract L dt_s before, delay it yourself. */
 static inline void {name}_accelerometers(const double measured[3], double dt_s, double out[3])
 {{
     double first[3];

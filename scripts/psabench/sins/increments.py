@@ -16,6 +16,7 @@ from psabench.errors import BadInput, expected
 Floats = npt.NDArray[np.float64]
 
 JITTER = 0.3  # of an interval that stamps may stray from the grid: what CAN and a scheduler do
+STRAY = 1.0  # of an interval, from an even grid between the first and the last
 LEAST, MOST_S = 2, 1.0  # intervals; an interval
 
 
@@ -83,3 +84,9 @@ def _check_gaps(end_s: Floats, step: Floats, grid_s: float, where: object) -> No
         i = int(bad[0]) + 1
         got = f"{step[i - 1]:.6f} s before row {i + 1}, {end_s[i]:.6f} s ({len(bad)} such steps)"
         raise BadInput(expected(f"intervals of {grid_s:.6f} s", got, where))
+    even_s = np.linspace(end_s[0], end_s[-1], len(end_s))
+    off = np.abs(end_s - even_s)
+    if off.max() > STRAY * grid_s:
+        i = int(off.argmax())
+        got = f"row {i + 1} {off[i]:.6f} s off an even grid of {len(end_s)} rows"
+        raise BadInput(expected(f"stamps within {STRAY * grid_s:.6f} s of their grid", got, where))

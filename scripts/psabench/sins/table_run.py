@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, Weights, increments_of
 from psabench.errors import BenchError, DeviceError, InstrumentError, expected
 from psabench.native.nav import Floats
+from psabench.sins.correction import rows_later
 from psabench.sins.increments import Increments
 from psabench.sins.table import AXES, Move, attitudes
 
@@ -49,6 +51,7 @@ class TableRun:
         self._taken: list[tuple[Floats, Floats, Floats]] = []
         self._stand: list[tuple[Floats, Floats]] = []
         self._axes = 0
+        self._set_deg = [0.0] * AXES  # as commanded: a coarse table shows no angles
         self._logged_s = 0.0
 
     def measure(self, stand: bool) -> TableData:
@@ -65,6 +68,7 @@ class TableRun:
         ends = []
         for number, move in enumerate(self._moves, start=1):
             self._make(move, self._following(number))
+            self._set_deg[move.axis - 1] += move.angle_deg
             ends.append(self._bench.time_s)
             self._take()
             if stand:
@@ -73,7 +77,7 @@ class TableRun:
         self._bench.run_for(REST_S)
         self._take()
         self._unit.stop()
-        return self._gathered(np.array(ends))
+        return self.data(np.array(ends))
 
     def _following(self, number: int) -> Move | None:
         return self._moves[number] if number < len(self._moves) else None
@@ -84,7 +88,7 @@ class TableRun:
         if move.rate_dps == 0.0:
             self._pass(move.duration_s)
         elif abs(angle) <= STEP_DEG:
-            table.position(table.angle_deg(axis=move.axis) + angle, abs(move.rate_dps), axis=move.axis)
+            table.position(self._set_deg[move.axis - 1] + angle, abs(move.rate_dps), axis=move.axis)
         else:
             table.rate(move.rate_dps, axis=move.axis)
             self._pass(move.duration_s)
@@ -98,7 +102,8 @@ class TableRun:
             self._take()
 
     def _take(self) -> None:
-        assert self._weights is not None
+        if self._weights is None:
+            return
         got = increments_of(self._unit.frames.take(), self._weights)
         if not len(got.seq):
             return
@@ -124,11 +129,13 @@ class TableRun:
         self._stand.append((at_s, angles))
         self._logged_s = float(at_s[-1]) + STAND_S / 2
 
-    def _gathered(self, ends_s: Floats) -> TableData:
-        if not self._taken:
+    def data(self, ends_s: Floats) -> TableData:
+        """What has been recorded so far. Raises BenchError where there is nothing."""
+        self._take()
+        if not self._taken or self._weights is None:
             raise BenchError(expected("readings of the unit", "none", "sins-calibration"))
         end_s, dtheta, dv = (np.concatenate([part[k] for part in self._taken]) for k in range(3))
-        increments = Increments.of(end_s, dtheta, dv, where="increments of the unit")
+        increments = self._of_one_interval(Increments.of(end_s, dtheta, dv, where="increments of the unit"))
         zero_s = increments.end_s[0] - increments.dt_s
         at_s = np.concatenate([s for s, _ in self._stand]) if self._stand else np.empty(0)
         angles = np.concatenate([a for _, a in self._stand]) if self._stand else np.empty((0, AXES))
@@ -139,6 +146,15 @@ class TableRun:
             start_deg=np.zeros(AXES),
             end_of_moves_s=ends_s - zero_s,
         )
+
+    def _of_one_interval(self, i: Increments) -> Increments:
+        """A unit that latches its gyros late says how old the velocity is (object 2221h:4): it is taken later."""
+        assert self._weights is not None
+        if self._weights.age_s == 0.0:
+            return i
+        lost = math.ceil(self._weights.age_s / i.dt_s)
+        later = replace(i, dv_mps=rows_later(i.dv_mps, self._weights.age_s / i.dt_s))
+        return later.part(0, len(i) - lost)
 
 
 def table_axes(bench: Bench) -> int:

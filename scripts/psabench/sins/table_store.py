@@ -30,12 +30,12 @@ def write_data(out: Path, data: TableData) -> None:
     i = data.increments
     end_s = i.dt_s * np.arange(1, len(i) + 1)
     try:
-        np.column_stack([end_s, i.dtheta_rad, i.dv_mps]).astype("<f8").tofile(out / INCREMENTS)
+        (out / INCREMENTS).write_bytes(np.column_stack([end_s, i.dtheta_rad, i.dv_mps]).astype("<f8").tobytes())
     except OSError as e:
         raise output_error(out / INCREMENTS, e) from e
     replace_file(out / LAYOUT, LAYOUT_TEXT.format(dt_s=i.dt_s))
     with output_text(out / ANGLES) as file:
-        file.write(f"# set at the start: {','.join(f'{x:g}' for x in data.start_deg)}\n{HEAD}\n")
+        file.write(f"{HEAD}\n")
         for t_s, *angles in np.column_stack([data.stand_s, data.stand_deg]).tolist():
             file.write(",".join([f"{t_s:.9f}", *(f"{a:.9f}" for a in angles)]) + "\n")
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from psabench import cli
+from psabench.sins import calibration_run as sins_run
 
 pytestmark = pytest.mark.host
 
@@ -22,6 +26,7 @@ turns:
   - {axis: z3, rate_degps: 20, for_s: 36}
   - {axis: z3, rate_degps: -20, for_s: 36}
 """
+ROOT = Path(__file__).parents[3]
 G_MPS2 = 9.8152038  # of the ellipsoid there
 Lines = pytest.CaptureFixture[str]
 
@@ -100,6 +105,9 @@ def test_a_correction_levels_the_unit(tmp_path: Path) -> None:
         (("--scenario", "stream"), "expected a scenario with an inertial unit"),
         (("--data", "no.csv"), "no.csv: no such file"),
         (("--latitude-deg", "89"), "latitude_deg: expected -85 to 85 deg"),
+        (("--wobble-arcsec", "-1"), "wobble_arcsec: expected 0 to 3600 arcsec"),
+        (("--accel-noise-mps2", "0"), "sins-calibration: "),
+        (("--angles", "a.csv"), "--angles: expected --data, got none"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(
@@ -111,12 +119,69 @@ def test_what_cannot_be_is_refused_in_one_line(
     assert said in error[-1]
 
 
-def test_a_unit_that_stands_still_or_saturates_is_no_calibration(tmp_path: Path, capsys: Lines) -> None:
+def test_a_unit_that_stands_still_is_no_calibration(tmp_path: Path, capsys: Lines) -> None:
     still = tmp_path / "still.yaml"
     still.write_text("turns:\n  - {axis: z1, rate_degps: 0, for_s: 70}\n")
     assert run(tmp_path / "a", "--plan", still) == 2
     assert "the unit does not turn" in capsys.readouterr().err
     assert (tmp_path / "a/increments.bin").stat().st_size > 7000 * 56  # what was measured is kept
+
+
+def test_a_coarse_table_and_its_plan_s_azimuth(tmp_path: Path) -> None:
+    """The scenario whose table shows no angles; where a plan says that its axis points is believed, here wrongly."""
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--stand", "no", "--seed", "57") == 0
+    assert len(found(tmp_path / "a")["estimates"]) == 21  # type: ignore[arg-type]
+    east = tmp_path / "east.yaml"
+    east.write_text(SHORT.replace("azimuth_deg: 0", "azimuth_deg: 60"))
+    assert run(tmp_path / "b", "--plan", east, "--stand", "no", "--seed", "57") == 1
+
+
+def test_a_unit_that_latches_its_gyros_late_is_found_as_well(tmp_path: Path) -> None:
+    scenario = tmp_path / "late.yaml"
+    text = (ROOT / "proto/scenarios/sins_table.yaml").read_text()
+    scenario.write_text(text.replace("    board: bins\n", "    board: bins\n    profile_set: {aligned: false}\n"))
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--scenario", scenario, "--seed", "4") == 0
+
+
+class Interrupted:
+    """A progress whose second step is Ctrl-C."""
+
+    @contextmanager
+    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        del name, total
+        steps = itertools.count()
+
+        def advance() -> None:
+            if next(steps) == 1:
+                raise KeyboardInterrupt
+
+        yield advance
+
+
+def test_an_interrupted_run_keeps_what_it_measured(tmp_path: Path) -> None:
+    options = sins_run.SinsOptions(out=tmp_path / "a", params={"plan": str(plan(tmp_path))})
+    with pytest.raises(KeyboardInterrupt):
+        sins_run.run_calibration(options, Interrupted())
+    assert (tmp_path / "a/increments.bin").stat().st_size > 7000 * 56  # two turns of 36 s
+    assert run(tmp_path / "b", "--data", tmp_path / "a/increments.bin", "--layout", tmp_path / "a/increments.yaml") == 1
+
+
+def test_angles_that_jump_are_a_doubt(tmp_path: Path, capsys: Lines) -> None:
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--seed", "4") == 0
+    angles = tmp_path / "a/table_angles.csv"
+    rows = np.loadtxt(angles, delimiter=",", skiprows=1)
+    rows[1000:1200, 1] += 1.0
+    np.savetxt(angles, rows, delimiter=",", header=angles.read_text().splitlines()[0], comments="")
+    data = (
+        "--data",
+        tmp_path / "a/increments.bin",
+        "--layout",
+        tmp_path / "a/increments.yaml",
+        "--plan",
+        plan(tmp_path),
+    )
+    assert run(tmp_path / "b", *data, "--angles", angles) == 1
+    assert "DOUBT: the same of the table's angles: expected 1" in capsys.readouterr().out
 
 
 def test_the_article_s_plan_is_consistent_over_units(tmp_path: Path) -> None:

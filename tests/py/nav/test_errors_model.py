@@ -4,7 +4,7 @@ turns."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -170,7 +170,7 @@ def test_white_noise_walks() -> None:
 @pytest.mark.parametrize("field", ["damping_per_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts"])
 def test_a_configuration_out_of_range_is_refused_with_its_field(field: str) -> None:
     with pytest.raises(Refused, match=field):
-        nav_errors.error_layout(ErrorsConfig(**{field: -1.0}))  # type: ignore[arg-type]
+        nav_errors.error_layout(replace(ErrorsConfig(), **{field: -1.0}))  # type: ignore[arg-type]
 
 
 def test_a_way_that_is_no_way_is_refused_with_its_step() -> None:

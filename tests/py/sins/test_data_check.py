@@ -41,6 +41,38 @@ def test_a_stuck_and_a_saturated_channel_are_named() -> None:
     limited = np.clip(good.dv_mps, -0.5 * G_MPS2 * DT_S, 0.5 * G_MPS2 * DT_S)
     said = [f.what for f in findings(replace(good, dv_mps=limited))]
     assert any(s.startswith("accelerometer z is at its limit for ") and s.endswith("saturated") for s in said)
+    gyros = np.clip(good.dtheta_rad, -np.radians(9.0) * DT_S, np.radians(9.0) * DT_S)
+    said = [f.what for f in findings(replace(good, dtheta_rad=gyros))]
+    assert said[0] == "gyro x is at its limit for 900 intervals, the first at 2.01 s: saturated"
+    assert [f.what for f in findings(replace(good, dv_mps=0.0 * good.dv_mps))] == [
+        "the accelerometers show less than 1 m/s^2: no gravity"
+    ]
+
+
+def long_recording(theta: np.ndarray) -> Increments:
+    """Half a cycle of 4500 deg about x and a turn about y, of a unit with errors of scale and misalignment."""
+    n, rng = 46_800, np.random.default_rng(6)
+    rate = np.zeros((n, 3))
+    rate[200:45_200, 0], rate[45_400:46_300, 1] = np.radians(10.0), np.radians(10.0)
+    steps = Rotation.from_rotvec(rate * DT_S)
+    force, at = np.empty((n, 3)), Rotation.identity()
+    for k, step in enumerate(steps):
+        at = at * step
+        force[k] = at.inv().apply([0.0, 0.0, G_MPS2])
+    noise = rng.normal(0, 1e-6, (n, 3)), rng.normal(0, 1e-3, (n, 3))
+    return Increments(
+        end_s=np.asarray(DT_S * np.arange(1, n + 1), np.float64),
+        dt_s=DT_S,
+        dtheta_rad=(rate @ (np.eye(3) + theta).T + noise[0]) * DT_S,
+        dv_mps=(force + noise[1]) * DT_S,
+    )
+
+
+def test_a_unit_with_three_times_the_usual_errors_is_no_fault_and_swapped_axes_are() -> None:
+    data = long_recording(np.full((3, 3), 3e-3))
+    assert findings(data) == []
+    (said,) = findings(replace(data, dv_mps=data.dv_mps[:, [1, 0, 2]]))
+    assert "axes in another order; as " in said.what
 
 
 def test_a_unit_that_does_not_turn() -> None:

@@ -124,6 +124,10 @@ def test_axes_are_turned_into_right_forward_up(tmp_path: Path) -> None:
         (lambda r: r[[0, 1, 2, 5, 4, 3, 6, 7, 8, 9]], "ascend, got time that goes back in row 5"),
         (lambda r: np.delete(r, 9, axis=0), "expected intervals of 0.010000 s, got 0.020000 s before row 10"),
         (lambda r: np.where(r == r[4, 2], np.nan, r), "expected finite numbers, got nan in row 5 of 50"),
+        (
+            lambda r: np.column_stack([np.cumsum(np.repeat([0.01, 0.015], 25)), r[:, 1:]]),
+            "expected stamps within 0.015000 s of their grid, got row 25 0.06",
+        ),
         (lambda r: r[:1], "expected 2 intervals or more, got 1"),
         (lambda r: r[:0], "expected rows of numbers, got none"),
         (lambda r: r * [1e6, 1, 1, 1, 1, 1, 1], "expected an interval above 0, up to 1 s, got 10000"),

@@ -81,7 +81,7 @@ static void upload_name(char name[32])
     name[n] = '\0';
 }
 
-/* Names and product codes of the requirements: PSA2-CAN-09, PSD1-CAN-07, PMKA-CAN-05, PIK-CAN-06, GYRO-CAN-05. */
+/* Names and product codes of the requirements: PSA2-CAN-09, PSD1-CAN-07, PMKA-CAN-05, PIK-CAN-06, GYRO-CAN-05, BINS-CAN-05. */
 static void each_board_says_what_it_is(void **state)
 {
     (void)state;
@@ -90,7 +90,7 @@ static void each_board_says_what_it_is(void **state)
         uint32_t product;
     } row[] = {
         {"psa2", "PSA-2", 0x50534132}, {"psd1", "PSD-1", 0x50534431}, {"pmka", "PMKA", 0x504D4B41},
-        {"pik", "PIK", 0x50494B30},    {"gyro", "GYRO", 0x4759524F},
+        {"pik", "PIK", 0x50494B30},    {"gyro", "GYRO", 0x4759524F},  {"bins", "BINS", 0x42494E53},
     };
     for (size_t i = 0; i < COUNT(row); i++) {
         char name[32];
