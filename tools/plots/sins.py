@@ -13,7 +13,7 @@ from psabench.campaign.sins_pairs import params_of, run_pair
 from psabench.campaign.sins_unit import read_experiment
 from psabench.report import plots
 from psabench.sins import secondary_page, snake, snake_page
-from psabench.sins.secondary import calibrate, compensate
+from psabench.sins.secondary import calibrate_outputs, compensate_outputs
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,7 +22,7 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/img"
     e = read_experiment("article")
     first, second, _ = run_pair(e, 0)
-    done = compensate(calibrate(first, e.point, params_of(e).config()), second)
+    done = compensate_outputs(calibrate_outputs(first, e.point, params_of(e).config()), second)
     for name, text in (
         ("sins_fig1", secondary_page.draw_fig1(done)),
         ("sins_snake", snake_page.draw_curves(snake.run_snake(snake.SnakeParams()))),

@@ -51,16 +51,16 @@ def _run_command(args: argparse.Namespace) -> int:
     from psabench.progress import Bar
     from psabench.report.grading import aligned
 
-    e = _experiment(args)
+    e = _chosen_experiment(args)
     pairs = sins_pairs.run_pairs(e, args.pairs, Bar())
-    for path in _write(args.out, e):
+    for path in _write_recordings(args.out, e):
         print(f"recording: {path}")
     print("\n".join(aligned(sins_pairs.pair_table(pairs))))
     print(sins_pairs.pair_words(pairs, e.repeatability))
     return 0
 
 
-def _experiment(args: argparse.Namespace) -> Experiment:
+def _chosen_experiment(args: argparse.Namespace) -> Experiment:
     from psabench.campaign.sins_unit import LIMITS, read_experiment
 
     if not 1 <= args.pairs <= MOST:
@@ -77,7 +77,7 @@ def _experiment(args: argparse.Namespace) -> Experiment:
     return e
 
 
-def _write(folder: Path, e: Experiment) -> list[Path]:
+def _write_recordings(folder: Path, e: Experiment) -> list[Path]:
     """Recordings of the first unit."""
     from psabench.campaign.sins_pairs import run_pair
     from psabench.sins.outputs import write_outputs

@@ -12,7 +12,7 @@ from psabench.campaign.sins_unit import Experiment, UnitErrors, draw_pair, run_u
 from psabench.procedures.head_bench import Progress
 from psabench.quartz.draws import draw_source
 from psabench.sins.outputs import Outputs
-from psabench.sins.secondary import Secondary, calibrate, compensate
+from psabench.sins.secondary import Secondary, calibrate_outputs, compensate_outputs
 from psabench.sins.secondary_run import SecondaryParams
 
 
@@ -44,8 +44,8 @@ def run_pair(e: Experiment, pair: int) -> tuple[Outputs, Outputs, UnitErrors]:
 def estimate_pair(e: Experiment, pair: int) -> Pair:
     """As the procedure does it from files."""
     first, second, truth = run_pair(e, pair)
-    found = calibrate(first, e.point, params_of(e).config(), where=f"pair {pair}")
-    done = compensate(found, second, where=f"pair {pair}")
+    found = calibrate_outputs(first, e.point, params_of(e).config(), where=f"pair {pair}")
+    done = compensate_outputs(found, second, where=f"pair {pair}")
     return Pair(
         first_m=found.errors.radial_m,
         second_m=done.before.radial_m,

@@ -95,11 +95,11 @@ def read_experiment(name: str) -> Experiment:
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"plan"}:
         raise BadInput(expected(" ".join(["plan", *LIMITS]), str(found)[:80], path))
     plan = found.pop("plan", Experiment().plan)
-    numbers: dict[str, Any] = {k: _number(v, k, path) for k, v in found.items()}
+    numbers: dict[str, Any] = {k: _checked_number(v, k, path) for k, v in found.items()}
     return Experiment(plan=str(plan), **numbers)
 
 
-def _number(value: object, key: str, path: Path) -> float:
+def _checked_number(value: object, key: str, path: Path) -> float:
     low, high = LIMITS[key]
     whole = key == "seed"
     if isinstance(value, bool) or not isinstance(value, int if whole else int | float) or not low <= value <= high:
@@ -127,10 +127,10 @@ def draw_pair(e: Experiment, pair: int) -> tuple[UnitErrors, UnitErrors]:
     deviation."""
     first = draw_source(e.seed, f"unit {pair}").normal(size=(4, 3, 3))
     change = draw_source(e.seed, f"change {pair}").normal(size=(4, 3, 3))
-    return scaled(e, first), scaled(e, first + e.repeatability * change)
+    return scaled_errors(e, first), scaled_errors(e, first + e.repeatability * change)
 
 
-def scaled(e: Experiment, z: Floats) -> UnitErrors:
+def scaled_errors(e: Experiment, z: Floats) -> UnitErrors:
     """Errors of z standard deviations each: rows of z are nu, Theta, df, Gamma."""
     eye = np.eye(3) > 0
     gamma = z[3] * np.where(eye, e.gamma_scale_ppm * PPM, e.gamma_angle_arcsec * ARCSEC)
@@ -147,18 +147,18 @@ def scaled(e: Experiment, z: Floats) -> UnitErrors:
 def run_unit(e: Experiment, errors: UnitErrors, rng: np.random.Generator) -> Outputs:
     """What the unit gives out from the end of its alignment on."""
     plan = read_plan(e.plan)
-    c_nb = align(e, plan, errors, rng)
+    c_nb = align_unit(e, plan, errors, rng)
     start = State(lat_rad=e.point.lat_rad, lon_rad=e.point.lon_rad, h_m=e.height_m, v_n_mps=np.zeros(3), C_nb=c_nb)
     unit, each = Strapdown(start, height_fixed=True), round(e.output_s / e.sample_s)
     rows, rates = [start.row()[None]], [np.zeros((1, 3))]
-    for angle, speed in _raw(e, plan, errors, rng):
+    for angle, speed in raw_increments(e, plan, errors, rng):
         whole = len(angle) - len(angle) % each
         rows.append(unit.advance(angle, speed, e.sample_s)[each - 1 :: each])
         rates.append(angle[:whole].reshape(-1, each, 3).sum(axis=1) / e.output_s)
-    return _outputs(e, np.vstack(rows), np.vstack(rates))
+    return _outputs_of(e, np.vstack(rows), np.vstack(rates))
 
 
-def _outputs(e: Experiment, rows: Floats, rates: Floats) -> Outputs:
+def _outputs_of(e: Experiment, rows: Floats, rates: Floats) -> Outputs:
     assert rows.shape == (len(rates), ROW)
     return Outputs(
         t_s=e.output_s * np.arange(len(rows), dtype=np.float64),
@@ -171,12 +171,12 @@ def _outputs(e: Experiment, rows: Floats, rates: Floats) -> Outputs:
     )
 
 
-def align(e: Experiment, plan: RotationPlan, errors: UnitErrors, rng: np.random.Generator) -> Floats:
+def align_unit(e: Experiment, plan: RotationPlan, errors: UnitErrors, rng: np.random.Generator) -> Floats:
     """C_nb of a unit that takes its mean force for up, and what is across its mean rate and that for east."""
     to_b = plan.start_c_nb.T
     root = math.sqrt(e.alignment_s)
     w = (np.eye(3) + errors.theta) @ to_b @ earth_rate(e) + errors.nu_radps
-    f = (np.eye(3) + errors.gamma) @ to_b @ gravity(e) + errors.df_mps2
+    f = (np.eye(3) + errors.gamma) @ to_b @ gravity_force(e) + errors.df_mps2
     w += rng.normal(size=3) * e.gyro_noise_degph_rts * DEGPH / root
     f += rng.normal(size=3) * e.accel_noise_mps2_rts / root
     up = f / np.linalg.norm(f)
@@ -191,20 +191,20 @@ def earth_rate(e: Experiment) -> Floats:
     return EARTH_RADPS * np.array([0.0, math.cos(lat), math.sin(lat)])
 
 
-def gravity(e: Experiment) -> Floats:
+def gravity_force(e: Experiment) -> Floats:
     """Specific force at rest: Somigliana on WGS 84, free air."""
     s2 = math.sin(math.radians(e.latitude_deg)) ** 2
     g = 9.7803253359 * (1.0 + 1.931852652458e-3 * s2) / math.sqrt(1.0 - 6.69437999014e-3 * s2)
     return np.array([0.0, 0.0, g * (1.0 - 2.0 * e.height_m / 6378137.0)])
 
 
-def _raw(
+def raw_increments(
     e: Experiment, plan: RotationPlan, errors: UnitErrors, rng: np.random.Generator
 ) -> Iterator[tuple[Floats, Floats]]:
     """Increments that the unit measures, turn by turn."""
     scale_w, scale_f = np.eye(3) + errors.theta.T, np.eye(3) + errors.gamma.T
     root = math.sqrt(e.sample_s)
-    for angle, speed in ideal(e, plan.start_c_nb, plan.turns):
+    for angle, speed in ideal_increments(e, plan.start_c_nb, plan.turns):
         noise = rng.standard_normal((2, *angle.shape))
         yield (
             angle @ scale_w + errors.nu_radps * e.sample_s + noise[0] * (e.gyro_noise_degph_rts * DEGPH * root),
@@ -212,15 +212,15 @@ def _raw(
         )
 
 
-def ideal(e: Experiment, c_nb: Floats, turns: Sequence[Turn]) -> Iterator[tuple[Floats, Floats]]:
+def ideal_increments(e: Experiment, c_nb: Floats, turns: Sequence[Turn]) -> Iterator[tuple[Floats, Floats]]:
     """Exact increments of a unit without errors: b turns at a constant rate, so a vector of n goes round in b."""
     for turn in turns:
         axis, count = np.array(turn.axis_b), round(turn.duration_s / e.sample_s)
         angles: Floats = turn.rate_radps * e.sample_s * np.arange(count + 1, dtype=np.float64)
-        u_b, g_b = c_nb.T @ earth_rate(e), c_nb.T @ gravity(e)
+        u_b, g_b = c_nb.T @ earth_rate(e), c_nb.T @ gravity_force(e)
         step: Floats = axis * turn.rate_radps * e.sample_s
         yield step + _round_mean(axis, angles, u_b) * e.sample_s, _round_mean(axis, angles, g_b) * e.sample_s
-        c_nb = c_nb @ _turned(axis, turn.rate_radps * count * e.sample_s)
+        c_nb = c_nb @ _rotation_about(axis, turn.rate_radps * count * e.sample_s)
 
 
 def _round_mean(axis: Floats, angles: Floats, v: Floats) -> Floats:
@@ -233,7 +233,7 @@ def _round_mean(axis: Floats, angles: Floats, v: Floats) -> Floats:
     return np.asarray(along + np.outer(cosine, v - along) - np.outer(sine, np.cross(axis, v)))
 
 
-def _turned(axis: Floats, angle: float) -> Floats:
+def _rotation_about(axis: Floats, angle: float) -> Floats:
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k))

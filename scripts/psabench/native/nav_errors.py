@@ -33,7 +33,7 @@ class ErrorsConfig:
     gyro_noise_radps_rts: float = 0.0
     accel_noise_mps2_rts: float = 0.0
 
-    def struct(self) -> ErrorsConfigStruct:
+    def as_struct(self) -> ErrorsConfigStruct:
         """What the library takes."""
         return ErrorsConfigStruct(
             int(self.height_fixed),
@@ -60,53 +60,55 @@ class Way:
         return Way(dt_s=self.dt_s, states=self.states[s], w_b_radps=self.w_b_radps[s], f_b_mps2=self.f_b_mps2[s])
 
 
-def layout(cfg: ErrorsConfig) -> dict[str, slice]:
+def error_layout(cfg: ErrorsConfig) -> dict[str, slice]:
     """Where each block is in the state. Raises Refused."""
-    rows, why, struct = (RowsStruct * len(BLOCKS))(), RefusalStruct(), cfg.struct()
+    rows, why, struct = (RowsStruct * len(BLOCKS))(), RefusalStruct(), cfg.as_struct()
     if (status := library().errors_check(struct, c.byref(why))) < 0:
         raise Refused("error model", status, why)
     library().errors_layout(struct, rows)
     return {name: slice(r.offset, r.offset + r.size) for name, r in zip(BLOCKS, rows, strict=True)}
 
 
-def step(cfg: ErrorsConfig, way: Way, k: int) -> tuple[Floats, Floats]:
+def error_step(cfg: ErrorsConfig, way: Way, k: int) -> tuple[Floats, Floats]:
     """phi (moving, n) and q of step k. Raises Refused."""
-    rows = layout(cfg)
+    rows = error_layout(cfg)
     moving, n = rows["nu"].start, rows["gamma"].stop
     phi, q = np.empty((moving, n)), np.empty((moving, moving))
-    at = (_rows(a, size)[k : k + 1].ctypes.data for a, size in _parts(way))
-    _check(library().errors_step(cfg.struct(), *at, way.dt_s, phi.ctypes.data, q.ctypes.data), "step", k)
+    at = (_double_rows(a, size)[k : k + 1].ctypes.data for a, size in _way_arrays(way))
+    _check_status(library().errors_step(cfg.as_struct(), *at, way.dt_s, phi.ctypes.data, q.ctypes.data), "step", k)
     return phi, q
 
 
-def predict(cfg: ErrorsConfig, kf: Kalman, way: Way) -> None:
+def predict_errors(cfg: ErrorsConfig, kf: Kalman, way: Way) -> None:
     """All steps of a way through a filter. Raises Refused, with the step."""
-    done, arrays = c.c_int64(), [_rows(a, size) for a, size in _parts(way)]
+    done, arrays = c.c_int64(), [_double_rows(a, size) for a, size in _way_arrays(way)]
     at = (a.ctypes.data for a in arrays)
-    status = library().errors_predict(cfg.struct(), kf.handle, *at, len(way), way.dt_s, c.byref(done))
-    _check(status, "step", done.value)
+    status = library().errors_predict(cfg.as_struct(), kf.handle, *at, len(way), way.dt_s, c.byref(done))
+    _check_status(status, "step", done.value)
 
 
-def alignment(cfg: ErrorsConfig, state: Floats) -> Floats:
+def alignment_rows(cfg: ErrorsConfig, state: Floats) -> Floats:
     """beta (3, n) by the constants after levelling and gyrocompassing at rest in this state. Raises Refused."""
-    out = np.empty((3, layout(cfg)["gamma"].stop))
-    _check(
-        library().errors_alignment(cfg.struct(), _rows(state[None], ROW).ctypes.data, out.ctypes.data), "alignment", 0
+    out = np.empty((3, error_layout(cfg)["gamma"].stop))
+    _check_status(
+        library().errors_alignment(cfg.as_struct(), _double_rows(state[None], ROW).ctypes.data, out.ctypes.data),
+        "alignment",
+        0,
     )
     return out
 
 
-def _parts(way: Way) -> tuple[tuple[Floats, int], ...]:
+def _way_arrays(way: Way) -> tuple[tuple[Floats, int], ...]:
     return (way.states, ROW), (way.w_b_radps, 3), (way.f_b_mps2, 3)
 
 
-def _rows(a: Floats, size: int) -> Floats:
+def _double_rows(a: Floats, size: int) -> Floats:
     a = np.ascontiguousarray(a, np.float64)
     if a.ndim != 2 or a.shape[1] != size:
         raise ValueError(expected(f"rows of {size}", a.shape, "error model"))
     return a
 
 
-def _check(status: int, what: str, k: int) -> None:
+def _check_status(status: int, what: str, k: int) -> None:
     if status < 0:
         raise Refused(f"error model, {what} {k}", status)

@@ -14,15 +14,15 @@ from psabench.native.strapdown import gravity_mps2
 EARTH_RADPS = 7.292115e-5
 
 
-def aligned(model: ErrorsConfig, at: Floats, x: Floats, p: Floats, alignment_s: float) -> tuple[Floats, Floats]:
+def aligned_state(model: ErrorsConfig, at: Floats, x: Floats, p: Floats, alignment_s: float) -> tuple[Floats, Floats]:
     """x and P of all states after an alignment in the state `at`, from those of the constants; place and velocity are
     known.
 
     The attitude's errors are correlated with the constants that made them."""
-    moving = nav_errors.layout(model)["nu"].start
+    moving = nav_errors.error_layout(model)["nu"].start
     n = moving + len(x)
     into = np.zeros((n, len(x)))
-    into[moving - 3 : moving] = nav_errors.alignment(model, at)[:, moving:]
+    into[moving - 3 : moving] = nav_errors.alignment_rows(model, at)[:, moving:]
     into[moving:] = np.eye(len(x))
     full = into @ p @ into.T
     full[moving - 3 : moving, moving - 3 : moving] += alignment_noise(model, at, alignment_s)

@@ -90,12 +90,12 @@ def read_flight(name: str) -> Flight:
         raise BadInput(expected("a flight in YAML", " ".join(str(e).split()), path)) from e
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"axes"}:
         raise BadInput(expected(" ".join([*LIMITS, "axes"]), str(found)[:80], path))
-    axes = _axes(found.pop("axes", "forward left up"), f"{path}: axes")
-    numbers = {key: _number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
+    axes = _read_axes(found.pop("axes", "forward left up"), f"{path}: axes")
+    numbers = {key: _checked_number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
     return Flight(axes=axes, **numbers)
 
 
-def _axes(value: object, where: str) -> tuple[str, str, str]:
+def _read_axes(value: object, where: str) -> tuple[str, str, str]:
     words = str(value).split()
     want = f"three of {', '.join(ALONG)}, right-handed"
     if len(words) != 3 or set(words) - set(ALONG):
@@ -106,7 +106,7 @@ def _axes(value: object, where: str) -> tuple[str, str, str]:
     return axes
 
 
-def _number(value: object, low: float, high: float, where: str) -> float:
+def _checked_number(value: object, low: float, high: float, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise BadInput(expected(f"{low:g} to {high:g}", value, where))
     return float(value)
@@ -131,29 +131,29 @@ class Flown:
         )
 
 
-def fly(flight: Flight, dt_s: float) -> Flown:
+def fly_steps(flight: Flight, dt_s: float) -> Flown:
     """The flight in steps of dt_s."""
     n = round(flight.duration_s / dt_s)
     t_s: Floats = 0.5 * dt_s * np.arange(2 * n + 1, dtype=np.float64)
-    place = _places(flight, t_s)
-    w_a, f_a, c_na, v_n = _felt(flight, t_s, place[:, 0])
+    place = _place_rows(flight, t_s)
+    w_a, f_a, c_na, v_n = _felt_by_unit(flight, t_s, place[:, 0])
     w_b, f_b, c_nb = w_a @ flight.mounting, f_a @ flight.mounting, c_na @ flight.mounting
     rows = np.hstack([place, v_n, c_nb.reshape(-1, 9)])
-    return Flown(dt_s=dt_s, states=rows[::2], dtheta_rad=_simpson(w_b, dt_s), dv_mps=_simpson(f_b, dt_s))
+    return Flown(dt_s=dt_s, states=rows[::2], dtheta_rad=_simpson_rule(w_b, dt_s), dv_mps=_simpson_rule(f_b, dt_s))
 
 
-def rest(flight: Flight) -> Floats:
+def rest_state(flight: Flight) -> Floats:
     """State on the ground at the start, level, with the heading of the start: where the unit is aligned."""
     c_nb = dcm(float(flight.heading_rad(np.zeros(1))[0]), 0.0, 0.0) @ flight.mounting
     place = [math.radians(flight.latitude_deg), math.radians(flight.longitude_deg), 0.0]
     return np.concatenate([place, np.zeros(3), c_nb.ravel()])
 
 
-def _simpson(values: Floats, dt_s: float) -> Floats:
+def _simpson_rule(values: Floats, dt_s: float) -> Floats:
     return np.asarray((values[:-2:2] + 4.0 * values[1::2] + values[2::2]) * (dt_s / 6.0))
 
 
-def _places(flight: Flight, t_s: Floats) -> Floats:
+def _place_rows(flight: Flight, t_s: Floats) -> Floats:
     """Latitude, longitude, height; Runge and Kutta's fourth order on the grid of t_s."""
     step = float(t_s[1] - t_s[0])
     speed = flight.speed_mps
@@ -175,7 +175,7 @@ def _places(flight: Flight, t_s: Floats) -> Floats:
     return out
 
 
-def _felt(flight: Flight, t_s: Floats, lat: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _felt_by_unit(flight: Flight, t_s: Floats, lat: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Rate, force and C_n of right, forward, up, and v_n at each instant."""
     radii = np.array([radii_m(x, flight.height_m) for x in lat])
     g = np.array([gravity_mps2(x, flight.height_m) for x in lat])
@@ -189,13 +189,13 @@ def _felt(flight: Flight, t_s: Floats, lat: Floats) -> tuple[Floats, Floats, Flo
     f_n[:, 2] += g
     bank = np.arctan(flight.speed_mps * psi1 / g[0])
     bank1 = flight.speed_mps * psi2 / g[0] * np.cos(bank) ** 2
-    c_nb = _attitude(psi, bank)
+    c_nb = _banked_attitude(psi, bank)
     to_b = np.swapaxes(c_nb, 1, 2)
     w_nb = np.stack([psi1 * np.sin(bank), bank1, -psi1 * np.cos(bank)], -1)
     return np.einsum("nij,nj->ni", to_b, u + rho) + w_nb, np.einsum("nij,nj->ni", to_b, f_n), c_nb, v
 
 
-def _attitude(psi: Floats, bank: Floats) -> Floats:
+def _banked_attitude(psi: Floats, bank: Floats) -> Floats:
     """Right, forward, up of a unit with its nose level."""
     s, c, sr, cr, z = np.sin(psi), np.cos(psi), np.sin(bank), np.cos(bank), np.zeros_like(psi)
     rows = [[c * cr, s, c * sr], [-s * cr, c, -s * sr], [-sr, z, cr]]

@@ -21,7 +21,7 @@ from psabench.native.nav import ARCMIN, DEGPH, Floats
 from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import Gauge
 from psabench.native.strapdown import gravity_mps2, radii_m
-from psabench.sins.alignment import aligned
+from psabench.sins.alignment import aligned_state
 from psabench.sins.correction import Correction
 from psabench.sins.covariance import GAMMA_AT
 from psabench.sins.outputs import Outputs, Point, check_axes
@@ -54,7 +54,7 @@ class SecondaryConfig:
     gyro_noise_radps_rts: float = 0.1 * DEGPH
     accel_noise_mps2_rts: float = 1e-3
 
-    def model(self) -> ErrorsConfig:
+    def error_model(self) -> ErrorsConfig:
         """The error model with a fixed vertical: a table does not rise."""
         return ErrorsConfig(
             gauge=self.gauge,
@@ -181,7 +181,7 @@ def check_fit(nis: float, where: object) -> None:
         raise BadInput(expected(f"innovations of a mean square of {NIS_MOST:g} variances at most", got, where))
 
 
-def calibrate(
+def calibrate_outputs(
     outputs: Outputs, point: Point, cfg: SecondaryConfig | None = None, *, where: object = "outputs"
 ) -> Secondary:
     """The sensors' errors from one run. Raises BadInput for errors that are not linear."""
@@ -189,8 +189,8 @@ def calibrate(
     check_axes(outputs, where)
     errors = errors_of(outputs, point)
     check_linear(errors, where)
-    model, way, sd = cfg.model(), way_of(outputs, point), cfg.prior_sd()
-    rows = nav_errors.layout(model)
+    model, way, sd = cfg.error_model(), way_of(outputs, point), cfg.prior_sd()
+    rows = nav_errors.error_layout(model)
     kf = Kalman(np.zeros(len(sd)), np.diag(sd**2), rows["nu"].start)
     each = max(round(UPDATE_S / way.dt_s), 1)
     h = np.eye(4, len(sd))
@@ -198,7 +198,7 @@ def calibrate(
     z = np.hstack([errors.place_m, errors.velocity_mps])
     squares = []
     for first in range(0, len(way) - each + 1, each):
-        nav_errors.predict(model, kf, way.part(first, first + each))
+        nav_errors.predict_errors(model, kf, way.part(first, first + each))
         squares.append(kf.update(h, z[first + each], variance))
     nis = float(np.mean([s[:, 0] ** 2 / s[:, 1] for s in squares]))
     check_fit(nis, where)
@@ -211,11 +211,11 @@ def calibrate(
         covariance=p,
         nis=nis,
         errors=errors,
-        warnings=tuple(_warnings(rows, np.sqrt(np.diag(p)) / sd)),
+        warnings=tuple(_warnings_of(rows, np.sqrt(np.diag(p)) / sd)),
     )
 
 
-def _warnings(rows: Mapping[str, slice], left: Floats) -> list[str]:
+def _warnings_of(rows: Mapping[str, slice], left: Floats) -> list[str]:
     """Blocks that keep most of their prior; the common scale of the accelerometers needs a vertical channel."""
     said = []
     for name in ("nu", "theta", "df"):
@@ -225,22 +225,22 @@ def _warnings(rows: Mapping[str, slice], left: Floats) -> list[str]:
     return said
 
 
-def compensate(found: Secondary, outputs: Outputs, *, where: object = "outputs") -> Compensated:
+def compensate_outputs(found: Secondary, outputs: Outputs, *, where: object = "outputs") -> Compensated:
     """Errors that the constants predict are taken off another run's. Raises BadInput for errors that are not linear.
 
     The run starts at the table's point after an alignment at rest, whose error follows from the same constants."""
     check_axes(outputs, where)
     before = errors_of(outputs, found.point)
     check_linear(before, where)
-    model, way = found.config.model(), way_of(outputs, found.point)
+    model, way = found.config.error_model(), way_of(outputs, found.point)
     constants = slice(found.rows["nu"].start, len(found.x))
     x, p = found.x[constants], found.covariance[constants, constants]
-    kf = Kalman(*aligned(model, way.states[0], x, p, found.config.alignment_s), constants.start)
+    kf = Kalman(*aligned_state(model, way.states[0], x, p, found.config.alignment_s), constants.start)
     each = max(round(SHOWN_S / way.dt_s), 1)
     at = list(range(0, len(way) + 1, each))
     predicted, sd = [kf.x[:4]], [np.sqrt(np.diag(kf.p)[:2])]
     for first in at[:-1]:
-        nav_errors.predict(model, kf, way.part(first, first + each))
+        nav_errors.predict_errors(model, kf, way.part(first, first + each))
         predicted.append(kf.x[:4])
         sd.append(np.sqrt(np.diag(kf.p)[:2]))
     off = np.array(predicted)

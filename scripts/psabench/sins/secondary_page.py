@@ -34,25 +34,25 @@ NOTES = (
 def estimate_rows(found: Secondary) -> list[tuple[str, float, float, str]]:
     """Name, value, standard deviation, unit of every constant."""
     rows: list[tuple[str, float, float, str]] = []
-    for name, scale, unit in _constants(found):
+    for name, scale, unit in _constant_rows(found):
         k = found.rows["nu"].start + len(rows)
         rows.append((name, float(found.x[k] / scale), float(np.sqrt(found.covariance[k, k]) / scale), unit))
     return rows
 
 
-def _constants(found: Secondary) -> Iterator[tuple[str, float, str]]:
+def _constant_rows(found: Secondary) -> Iterator[tuple[str, float, str]]:
     """Name, unit in SI and its name, in the order of the state."""
     for i in range(3):
         yield f"ν{i + 1}", DEGPH, "°/h"
     for k in range(9):
-        yield _element("Θ", k)
+        yield _element_row("Θ", k)
     for i in range(3):
         yield f"Δf{i + 1}", 1.0, "m/s²"
     for k in GAMMA_AT[found.config.gauge]:
-        yield _element("Γ", k)
+        yield _element_row("Γ", k)
 
 
-def _element(name: str, k: int) -> tuple[str, float, str]:
+def _element_row(name: str, k: int) -> tuple[str, float, str]:
     i, j = divmod(k, 3)
     return (f"{name}{i + 1}{j + 1}", PPM, "ppm") if i == j else (f"{name}{i + 1}{j + 1}", ARCSEC, "″")
 
@@ -65,14 +65,14 @@ def estimate_table(found: Secondary) -> list[list[str]]:
 
 def error_table(r: SecondaryResult) -> list[list[str]]:
     """Largest errors of both runs."""
-    rows = [["calibrates", *_largest(r.found.errors)]]
+    rows = [["calibrates", *_largest_km(r.found.errors)]]
     if r.compensated is not None:
-        rows.append(["compensated, before", *_largest(r.compensated.before)])
-        rows.append(["compensated, after", *_largest(r.compensated.after)])
+        rows.append(["compensated, before", *_largest_km(r.compensated.before)])
+        rows.append(["compensated, after", *_largest_km(r.compensated.after)])
     return [["run", "latitude, km", "longitude, km", "radial, km"], *rows]
 
 
-def _largest(e: Errors) -> list[str]:
+def _largest_km(e: Errors) -> list[str]:
     east, north = np.abs(e.place_m).max(axis=0) / 1000.0
     return [f"{north:.2f}", f"{east:.2f}", f"{e.radial_m / 1000.0:.2f}"]
 
@@ -136,12 +136,12 @@ def result_dict(r: SecondaryResult) -> dict[str, Any]:
         "estimates": [dict(zip(("name", "value", "sd", "unit"), row, strict=True)) for row in estimate_rows(r.found)],
         "correlations": {"names": names, "rows": (p / np.outer(sd, sd)).tolist()},
         "correction": correction_dict(r.found.correction()),
-        "errors": _rows(error_table(r)),
+        "errors": _row_dicts(error_table(r)),
         "factor": None if r.compensated is None else r.compensated.factor,
     }
 
 
-def _rows(table: Sequence[Sequence[str]]) -> list[dict[str, str]]:
+def _row_dicts(table: Sequence[Sequence[str]]) -> list[dict[str, str]]:
     head, *rows = table
     return [dict(zip(head, row, strict=True)) for row in rows]
 

@@ -11,7 +11,7 @@ from psabench.errors import BadInput, expected
 from psabench.native.nav import DEGPH
 from psabench.procedures.result import option
 from psabench.sins.outputs import Outputs, Point, read_outputs
-from psabench.sins.secondary import Compensated, Secondary, SecondaryConfig, calibrate, compensate
+from psabench.sins.secondary import Compensated, Secondary, SecondaryConfig, calibrate_outputs, compensate_outputs
 
 NAME = "sins-calibration-secondary"
 
@@ -81,10 +81,10 @@ def run_secondary(params: SecondaryParams, first: Path | None, second: Path | No
     if first is None:
         raise BadInput(expected("a recording (psabench campaign sins-secondary draws two)", "none", "--first"))
     outputs = read_outputs(first)
-    found = calibrate(outputs, params.point(outputs), params.config(), where=first)
+    found = calibrate_outputs(outputs, params.point(outputs), params.config(), where=first)
     return SecondaryResult(
         found=found,
-        compensated=None if second is None else compensate(found, read_outputs(second), where=second),
+        compensated=None if second is None else compensate_outputs(found, read_outputs(second), where=second),
         first=first.name,
         second="" if second is None else second.name,
         least_factor=params.least_factor,

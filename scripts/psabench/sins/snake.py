@@ -22,9 +22,9 @@ from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import SinsConfig
 from psabench.native.strapdown import radii_m
 from psabench.procedures.result import option
-from psabench.sins.alignment import aligned
+from psabench.sins.alignment import aligned_state
 from psabench.sins.covariance import READINGS, Reading, predict_accuracy, read_as
-from psabench.sins.flight import Flight, fly, read_flight, rest
+from psabench.sins.flight import Flight, fly_steps, read_flight, rest_state
 from psabench.sins.plan import RotationPlan, read_plan
 
 NAME = "sins-snake"
@@ -86,12 +86,12 @@ def run_snake(params: SnakeParams, cfg: SinsConfig | None = None) -> Snake:
     flight, plan, cfg = read_flight(params.flight), read_plan(params.plan), cfg or SinsConfig()
     if flight.duration_s < SHOWN_S:
         raise BadInput(expected(f"{SHOWN_S:g} s or more", flight.duration_s, f"{params.flight}: duration_s"))
-    both = [(f, fly(f, STEP_S).way()) for f in (flight, replace(flight, amplitude_deg=0.0))]
-    outcomes = {name: _outcome(r, both, plan, cfg, params.alignment_s) for name, r in READINGS.items()}
+    both = [(f, fly_steps(f, STEP_S).way()) for f in (flight, replace(flight, amplitude_deg=0.0))]
+    outcomes = {name: _outcome_of(r, both, plan, cfg, params.alignment_s) for name, r in READINGS.items()}
     return Snake(flight=flight, plan=plan, outcomes=outcomes)
 
 
-def _outcome(
+def _outcome_of(
     reading: Reading, both: Sequence[tuple[Flight, Way]], plan: RotationPlan, cfg: SinsConfig, alignment_s: float
 ) -> Outcome:
     """both: the flight, and the same without turns."""
@@ -127,27 +127,27 @@ def sensors_left(plan: RotationPlan, cfg: SinsConfig) -> Floats:
 
 def start_of(model: ErrorsConfig, flight: Flight, sensors: Floats, alignment_s: float) -> Floats:
     """Covariance at the start of a flight, after an alignment by the same sensors."""
-    return aligned(model, rest(flight), np.zeros(len(sensors)), sensors, alignment_s)[1]
+    return aligned_state(model, rest_state(flight), np.zeros(len(sensors)), sensors, alignment_s)[1]
 
 
 def rho_at_end(model: ErrorsConfig, way: Way, start: Floats) -> float:
     """rho after the whole way."""
     kf = Kalman(np.zeros(len(start)), start, 7)
-    nav_errors.predict(model, kf, way)
-    return _rho(kf.p, way.states[-1])
+    nav_errors.predict_errors(model, kf, way)
+    return _rho_of(kf.p, way.states[-1])
 
 
 def rho_along(model: ErrorsConfig, way: Way, start: Floats) -> Iterator[float]:
     """rho each SHOWN_S, from the start to the end."""
     kf = Kalman(np.zeros(len(start)), start, 7)
     each = round(SHOWN_S / way.dt_s)
-    yield _rho(kf.p, way.states[0])
+    yield _rho_of(kf.p, way.states[0])
     for first in range(0, len(way), each):
         part = way.part(first, first + each)
-        nav_errors.predict(model, kf, part)
-        yield _rho(kf.p, part.states[-1])
+        nav_errors.predict_errors(model, kf, part)
+        yield _rho_of(kf.p, part.states[-1])
 
 
-def _rho(p: Floats, row: Floats) -> float:
+def _rho_of(p: Floats, row: Floats) -> float:
     meridian, vertical = radii_m(row[0], row[2])
     return A_M * math.sqrt(p[0, 0] / vertical**2 + p[1, 1] / meridian**2)

@@ -15,7 +15,7 @@ from psabench.native.nav import Refused
 from psabench.native.nav_errors import ErrorsConfig, Way
 from psabench.native.sins import Gauge
 from psabench.native.strapdown import State, Strapdown, radii_m
-from psabench.sins.flight import Flight, Flown, fly
+from psabench.sins.flight import Flight, Flown, fly_steps
 from scipy.spatial.transform import Rotation
 from sins_truth import ARCMIN, DEGPH
 
@@ -51,7 +51,7 @@ CASES = {"fixed": Case(FIXED, 1800.0), "free": Case(FREE, 600.0), "damped": Case
 
 @cache
 def flown(duration_s: float, dt_s: float = DT_S) -> Flown:
-    return fly(Flight(duration_s=duration_s), dt_s)
+    return fly_steps(Flight(duration_s=duration_s), dt_s)
 
 
 def start(x: Floats, row: Floats) -> State:
@@ -101,12 +101,12 @@ def errors(s: State, row: Floats) -> Floats:
 
 def transition(cfg: ErrorsConfig, way: Way) -> Floats:
     """Rows of the moving states of the whole way, by the filter's own prediction of unit vectors."""
-    rows = nav_errors.layout(cfg)
+    rows = nav_errors.error_layout(cfg)
     n, moving = rows["gamma"].stop, rows["nu"].start
     found = np.empty((moving, n))
     for j in range(n):
         kf = Kalman(np.eye(n)[j], np.zeros((n, n)), moving)
-        nav_errors.predict(cfg, kf, way)
+        nav_errors.predict_errors(cfg, kf, way)
         found[:, j] = kf.x[:moving]
     return found
 
@@ -141,7 +141,7 @@ def test_the_alignment_is_that_of_a_unit_that_levels_and_finds_north() -> None:
     """Exact triads of the specific force and the Earth's rate, as the unit measures them, against the model's
     rows."""
     rng = np.random.default_rng(4)
-    row = fly(Flight(duration_s=1.0), DT_S).states[0].copy()
+    row = fly_steps(Flight(duration_s=1.0), DT_S).states[0].copy()
     row[3:6] = 0.0
     c = row[6:].reshape(3, 3)
     u = 7.292115e-5 * np.array([0.0, math.cos(row[0]), math.sin(row[0])])
@@ -156,13 +156,13 @@ def test_the_alignment_is_that_of_a_unit_that_levels_and_finds_north() -> None:
     east = np.cross(w, up) / np.linalg.norm(np.cross(w, up))
     found = np.stack([east, np.cross(up, east), up])
     beta = Rotation.from_matrix(found @ c.T).as_rotvec()
-    assert nav_errors.alignment(FIXED, row) @ x == pytest.approx(beta, rel=2e-3, abs=1e-8)
+    assert nav_errors.alignment_rows(FIXED, row) @ x == pytest.approx(beta, rel=2e-3, abs=1e-8)
 
 
 def test_white_noise_walks() -> None:
     """q of a step: density squared times its length in beta and dv; twice half a step is a step."""
     cfg = ErrorsConfig(gyro_noise_radps_rts=2e-7, accel_noise_mps2_rts=3e-3)
-    _, q = nav_errors.step(cfg, flown(600.0).way(), 7)
+    _, q = nav_errors.error_step(cfg, flown(600.0).way(), 7)
     want = np.array([0.0, 0.0, 9e-6, 9e-6, 4e-14, 4e-14, 4e-14]) * DT_S
     assert q == pytest.approx(np.diag(want))
 
@@ -170,7 +170,7 @@ def test_white_noise_walks() -> None:
 @pytest.mark.parametrize("field", ["damping_per_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts"])
 def test_a_configuration_out_of_range_is_refused_with_its_field(field: str) -> None:
     with pytest.raises(Refused, match=field):
-        nav_errors.layout(replace(ErrorsConfig(), **{field: -1.0}))  # type: ignore[arg-type]
+        nav_errors.error_layout(replace(ErrorsConfig(), **{field: -1.0}))  # type: ignore[arg-type]
 
 
 def test_a_way_that_is_no_way_is_refused_with_its_step() -> None:
@@ -179,7 +179,7 @@ def test_a_way_that_is_no_way_is_refused_with_its_step() -> None:
     kf = Kalman(np.zeros(28), np.zeros((28, 28)), 7)
     way.w_b_radps[3, 1] = np.nan
     with pytest.raises(Refused, match=r"step 3: .*finite"):
-        nav_errors.predict(cfg, kf, way)
+        nav_errors.predict_errors(cfg, kf, way)
     way.w_b_radps[3, 1] = 3.0  # 0.75 rad in a step
     with pytest.raises(Refused, match="step 3"):
-        nav_errors.predict(cfg, kf, way)
+        nav_errors.predict_errors(cfg, kf, way)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +21,10 @@ from psabench.native.nav_errors import ErrorsConfig
 from psabench.native.sins import Turn
 from psabench.quartz.draws import draw_source
 from psabench.sins import secondary, secondary_page
-from psabench.sins.alignment import aligned
+from psabench.sins.alignment import aligned_state
 from psabench.sins.outputs import Outputs, read_outputs, write_outputs
 from psabench.sins.plan import read_plan
-from psabench.sins.secondary import Secondary, calibrate, compensate, errors_of
+from psabench.sins.secondary import Secondary, calibrate_outputs, compensate_outputs, errors_of
 from psabench.sins.secondary_run import SecondaryParams, run_secondary
 
 Floats = np.ndarray
@@ -48,7 +49,7 @@ def ran() -> tuple[Outputs, Outputs, UnitErrors]:
 
 @cache
 def calibrated() -> Secondary:
-    return calibrate(ran()[0], article().point, sins_pairs.params_of(article()).config())
+    return calibrate_outputs(ran()[0], article().point, sins_pairs.params_of(article()).config())
 
 
 def short(e: Experiment, monkeypatch: pytest.MonkeyPatch, scale: float = 1.0) -> Outputs:
@@ -61,7 +62,7 @@ def short(e: Experiment, monkeypatch: pytest.MonkeyPatch, scale: float = 1.0) ->
 
 def test_the_articles_two_experiments() -> None:
     """About 15 and 12 km; at least three times less after the compensation of the second."""
-    done = compensate(calibrated(), ran()[1])
+    done = compensate_outputs(calibrated(), ran()[1])
     assert calibrated().errors.radial_m == pytest.approx(15000.0, rel=0.05)
     assert done.before.radial_m == pytest.approx(12000.0, rel=0.05)
     assert done.factor > 3.0
@@ -86,7 +87,7 @@ def test_a_unit_that_has_not_changed_is_compensated_to_its_noise() -> None:
     leave."""
     e = replace(article(), repeatability=0.0)
     _, second = draw_pair(e, 0)
-    done = compensate(calibrated(), run_unit(e, second, np.random.default_rng(5)))
+    done = compensate_outputs(calibrated(), run_unit(e, second, np.random.default_rng(5)))
     assert done.factor > 10.0
     left = np.hypot(*done.after.place_m.T)
     assert left[-1] < 4.0 * np.hypot(*done.predicted_sd_m[-1])
@@ -103,7 +104,7 @@ def test_raw_data_that_are_corrected_navigate_as_the_outputs_that_are_compensate
         gamma=c.accel_matrix @ (np.eye(3) + second.gamma) - np.eye(3),
     )
     again = run_unit(e, corrected, draw_source(e.seed, "noise 0 2"))
-    done = compensate(calibrated(), ran()[1])
+    done = compensate_outputs(calibrated(), ran()[1])
     kept = errors_of(again, e.point).place_m[:: round(secondary.SHOWN_S / e.output_s)]
     apart = np.hypot(*(kept - done.after.place_m).T).max()
     assert apart < 0.05 * done.before.radial_m
@@ -111,16 +112,16 @@ def test_raw_data_that_are_corrected_navigate_as_the_outputs_that_are_compensate
 
 def test_the_alignment_of_the_second_run_is_compensated_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Otherwise the heading by the east drift stays."""
-    full = compensate(calibrated(), ran()[1]).after.radial_m
-    real = aligned
+    full = compensate_outputs(calibrated(), ran()[1]).after.radial_m
+    real = aligned_state
 
-    def without(*a: object) -> tuple[Floats, Floats]:
-        x, p = real(*a)  # type: ignore[arg-type]
+    def without(*a: Any) -> tuple[Floats, Floats]:
+        x, p = real(*a)
         x[:7] = 0.0
         return x, p
 
-    monkeypatch.setattr(secondary, "aligned", without)
-    assert compensate(calibrated(), ran()[1]).after.radial_m > 2.0 * full
+    monkeypatch.setattr(secondary, "aligned_state", without)
+    assert compensate_outputs(calibrated(), ran()[1]).after.radial_m > 2.0 * full
 
 
 def test_an_ideal_unit_stays_at_its_place() -> None:
@@ -134,9 +135,9 @@ def test_errors_beyond_the_linear_range_are_refused(monkeypatch: pytest.MonkeyPa
     """The method presupposes a coarse calibration; the line says so."""
     outputs = short(article(), monkeypatch, 10_000.0)
     with pytest.raises(BadInput, match=r"60 km.*calibrate the unit coarsely first"):
-        calibrate(outputs, article().point, where="first.csv")
+        calibrate_outputs(outputs, article().point, where="first.csv")
     with pytest.raises(BadInput, match=r"second.csv: .*60 km"):
-        compensate(calibrated(), outputs, where="second.csv")
+        compensate_outputs(calibrated(), outputs, where="second.csv")
 
 
 @pytest.mark.parametrize(
@@ -153,16 +154,16 @@ def test_outputs_that_do_not_follow_the_equations_are_refused(
     spoil: Callable[[Outputs], Outputs], says: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good = short(article(), monkeypatch)
-    calibrate(good, article().point)
+    calibrate_outputs(good, article().point)
     with pytest.raises(BadInput, match=says):
-        calibrate(spoil(good), article().point)
+        calibrate_outputs(spoil(good), article().point)
     if says != "innovations":  # a second run has no fit to judge
         with pytest.raises(BadInput, match=says):
-            compensate(calibrated(), spoil(good))
+            compensate_outputs(calibrated(), spoil(good))
 
 
 def test_a_short_run_says_what_it_does_not_determine(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert any("theta keeps" in w for w in calibrate(short(article(), monkeypatch), article().point).warnings)
+    assert any("theta keeps" in w for w in calibrate_outputs(short(article(), monkeypatch), article().point).warnings)
 
 
 # ---- files
@@ -220,8 +221,8 @@ def test_heading_pitch_and_roll_are_an_attitude_too(recording: Path) -> None:
         (lambda lines: put(lines, 9, "0,0,0"), "a unit that turns"),
         (lambda lines: put(lines, 9, "0,0,200"), "of a turn apart"),
     ],
-    ids=["attitude", "rates", "gap", "back", "twice", "empty", "words", "number", "quaternion", "still", "fast"],
-)  # fmt: skip
+    ids="attitude rates gap back twice empty words number quaternion still fast".split(),
+)
 def test_a_recording_that_is_none_is_refused(
     recording: Path, change: Callable[[list[str]], list[str]], says: str
 ) -> None:
@@ -238,7 +239,7 @@ def test_the_procedure_takes_recordings_and_reports(
     """The same run calibrates and is compensated: it becomes better by as much as the short run tells."""
     result = run_secondary(SecondaryParams(height_m=150.0, least_factor=2.0), recording, recording)
     outputs = short(article(), monkeypatch)
-    direct = compensate(calibrate(outputs, article().point), outputs)
+    direct = compensate_outputs(calibrate_outputs(outputs, article().point), outputs)
     assert result.compensated is not None
     assert result.compensated.factor == pytest.approx(direct.factor, rel=0.02)
     assert result.within
@@ -281,10 +282,10 @@ def test_what_is_left_is_what_has_changed_between_the_experiments() -> None:
     left, factors, nees = [], [], []
     for k in range(5):
         first, second, truth = sins_pairs.run_pair(e, k)
-        found = calibrate(first, e.point, params.config())
+        found = calibrate_outputs(first, e.point, params.config())
         nees.append(sins_pairs.nees_of(found, truth))
         twice = sins_pairs.run_pair(replace(e, repeatability=0.2), k)[1]
-        done, more = compensate(found, second), compensate(found, twice)
+        done, more = compensate_outputs(found, second), compensate_outputs(found, twice)
         left.append((done.after.radial_m, more.after.radial_m))
         factors.append(done.factor)
     once, more_left = np.sqrt(np.mean(np.array(left) ** 2, axis=0))
@@ -309,13 +310,13 @@ def test_a_dozen_kilometres_are_an_error_of_the_gyros_scale(name: str, plan: str
     e = replace(article(), plan=plan)
     still = dict.fromkeys(("nu_degph", "theta_scale_ppm", "theta_angle_arcsec", "df_mps2"), 0.0)
     alone = replace(e, gamma_scale_ppm=0.0, gamma_angle_arcsec=0.0, **{**still, name: getattr(e, name)})
-    sd = np.abs(sins_unit.scaled(alone, np.ones((4, 3, 3))).constants())
+    sd = np.abs(sins_unit.scaled_errors(alone, np.ones((4, 3, 3))).constants())
     way = ideal_way(plan)
     model = ErrorsConfig()
-    kf = Kalman(*aligned(model, way.states[0], np.zeros(21), np.diag(sd**2), 600.0), 7)
+    kf = Kalman(*aligned_state(model, way.states[0], np.zeros(21), np.diag(sd**2), 600.0), 7)
     most = 0.0
     for first in range(0, len(way), 150):
-        nav_errors.predict(model, kf, way.part(first, first + 150))
+        nav_errors.predict_errors(model, kf, way.part(first, first + 150))
         most = max(most, float(np.sqrt(np.trace(kf.p[:2, :2]))))
     assert most / 1000.0 == pytest.approx(KM[name][plan], rel=0.03)
 
@@ -330,15 +331,15 @@ def ideal_way(plan: str) -> nav_errors.Way:
 
 @pytest.mark.parametrize(("times", "km", "percent"), [(1.0, 15.6, 0.4), (4.0, 62.6, 1.7)])
 def test_the_equations_miss_this_much_of_large_errors(times: float, km: float, percent: float) -> None:
-    """Figures of the page: unit 0 of seed 1 without noise, its constants through the equations along its way."""
+    """Figures of the page: unit 0 of seed 1 without noise, its true constants through the equations."""
     e = replace(article(), seed=1, gyro_noise_degph_rts=0.0, accel_noise_mps2_rts=0.0)
     e = replace(e, **{name: getattr(e, name) * times for name in (*KM, "gamma_scale_ppm", "gamma_angle_arcsec")})
     unit, way, model = draw_pair(e, 0)[0], ideal_way("secondary"), ErrorsConfig()
     errors = errors_of(run_unit(e, unit, np.random.default_rng(0)), e.point)
-    kf = Kalman(*aligned(model, way.states[0], unit.constants(), np.zeros((21, 21)), 600.0), 7)
+    kf = Kalman(*aligned_state(model, way.states[0], unit.constants(), np.zeros((21, 21)), 600.0), 7)
     off = []
     for first in range(0, len(way) - 149, 150):
-        nav_errors.predict(model, kf, way.part(first, first + 150))
+        nav_errors.predict_errors(model, kf, way.part(first, first + 150))
         off.append(np.hypot(*(errors.place_m[first + 150] - kf.x[:2])))
     assert errors.radial_m / 1000.0 == pytest.approx(km, rel=0.01)
     assert 100.0 * max(off) / errors.radial_m == pytest.approx(percent, abs=0.1)

@@ -16,7 +16,7 @@ from psabench.native.sins import SinsConfig
 from psabench.native.strapdown import State, Strapdown, gravity_mps2, radii_m
 from psabench.sins import snake, snake_page
 from psabench.sins.covariance import READINGS, read_as
-from psabench.sins.flight import Flight, Flown, fly, read_flight, rest
+from psabench.sins.flight import Flight, Flown, fly_steps, read_flight, rest_state
 from psabench.sins.plan import read_plan
 from psabench.sins.snake import PAIRS, Snake, SnakeParams
 
@@ -60,7 +60,7 @@ def test_the_dominant_term_is_the_drift_of_schuler() -> None:
     p[7:10, 7:10] = np.eye(3) * nu**2
     r_m, ws = 6.39e6, math.sqrt(9.81 / 6.39e6)
     want = math.sqrt(2.0) * r_m * nu * (3600.0 - math.sin(ws * 3600.0) / ws)
-    assert snake.rho_at_end(model, fly(flight, MC_S).way(), p) == pytest.approx(want, rel=0.03)
+    assert snake.rho_at_end(model, fly_steps(flight, MC_S).way(), p) == pytest.approx(want, rel=0.03)
 
 
 def test_steep_banks_rectify_misalignments() -> None:
@@ -70,13 +70,13 @@ def test_steep_banks_rectify_misalignments() -> None:
     assert Flight().bank_deg < 10.0
     p = np.zeros((28, 28))
     p[10:19, 10:19] = np.diag(np.where(np.eye(3) > 0, 0.0, math.radians(0.1 / 60.0) ** 2).ravel())
-    far, near = (snake.rho_at_end(ErrorsConfig(), fly(f, 1.0).way(), p) for f in (steep, Flight()))
+    far, near = (snake.rho_at_end(ErrorsConfig(), fly_steps(f, 1.0).way(), p) for f in (steep, Flight()))
     assert far > 3000.0
     assert near < 0.5 * far
 
 
 def test_the_increments_of_a_flight_bring_an_ideal_unit_home() -> None:
-    flown = fly(read_flight("snake"), 0.2)
+    flown = fly_steps(read_flight("snake"), 0.2)
     unit = Strapdown(State.of(flown.states[0]), height_fixed=True)
     unit.advance(flown.dtheta_rad, flown.dv_mps, flown.dt_s)
     assert math.hypot(*end_error(unit.state, flown)) < 10.0
@@ -128,7 +128,7 @@ def fly_unit(flown: Flown, c: Floats, rng: np.random.Generator | None, cfg: Erro
     gamma = np.eye(3)
     for value, (i, j) in zip(c[15:], [(0, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 2)], strict=True):
         gamma[i, j] += value
-    ground = rest(Flight())
+    ground = rest_state(Flight())
     c_bn = ground[6:].reshape(3, 3).T
     u = U_RADPS * np.array([0.0, math.cos(ground[0]), math.sin(ground[0])])
     w = theta @ c_bn @ u + nu + draw(3) * gyro / math.sqrt(600.0)
@@ -159,7 +159,7 @@ def test_drawn_units_fly_as_far_off_as_the_covariance_says(reading: str) -> None
         gyro_noise_radps_rts=1e-10, accel_noise_mps2_rts=1e-6
     )  # hardly any: the sample's covariance is singular
     sensors = snake.sensors_left(read_plan("article"), read_as(READINGS[reading], cfg))
-    flown = fly(Flight(), MC_S)
+    flown = fly_steps(Flight(), MC_S)
     ideal = np.array(fly_unit(flown, np.zeros(21), None, model))
     drawn = rng.multivariate_normal(np.zeros(21), sensors, size=count)
     ends = np.array([fly_unit(flown, c, None, model) for c in drawn]) - ideal
