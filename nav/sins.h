@@ -2,13 +2,14 @@
  *
  * Frames: n east, north, up at the table; b of the instrument; C (C_nb) takes coordinates in b to n. Convention: error = measured
  * less true. w absolute rate, f specific force, both in b; g_n = (0, 0, g), u the Earth's rate in n.
- *   w' = w + nu + Theta w + noise              f' = f + df + Gamma f + L r + noise                        (1)
+ *   w' = w + nu + Theta w + noise              f' = f + df + Gamma f + q f^2 + L r + delay (w x f) + noise (1)
  *   Chat = (I + [beta x]) C, integrated from w':  d beta/dt = -u x beta + C (nu + Theta w + noise)         (2)
- *   z_a = mean over a step of Chat f', less g_n = beta x g_n + C (df + Gamma f + L r) + noise             (3)
+ *   z_a = mean over a step of Chat f', less g_n = beta x g_n + C (f' - f of (1))                          (3)
  *   stand: C_st(t) = exp(eps) C(t + tau) exp(delta);  z_s = beta - eps - C (delta + w_rel tau) + noise      (4)
- * L r: accelerometer i at r_i also sees [w x (w x r_i) + dw/dt x r_i]_i. Only three of a turn of the instrument frame and nine
+ * L r: accelerometer i at r_i also sees [w x (w x r_i) + dw/dt x r_i]_i. q f^2: element by element. delay: the accelerometers are
+ * later than the gyros by it, f'(t) = f(t - delay), for a force constant in n and w relative to n. Only three of a turn of the instrument frame and nine
  * Gamma, nine Theta are not observable by (1) to (3): the gauge says which Gamma are zero.
- * Apply a result: w = (I + Theta)^-1 (w' - nu), f = (I + Gamma)^-1 (f' - df), by columns as printed, Theta row-major.
+ * Apply a result: w = (I + Theta)^-1 (w' - nu), f = (I + Gamma)^-1 (f' - df - q f^2), by columns as printed, Theta row-major.
  * Units: rad, s, m, rad/s, m/s^2. Noise is a spectral density: standard deviation of a mean over one second.
  * No allocation: the caller owns the memory of an estimator, which one thread uses. Rejections as in nav.h. */
 #ifndef PSABENCH_NAV_SINS_H
@@ -34,6 +35,8 @@ enum nav_sins_block { /* in the order of the state; the first two move */
                       NAV_SINS_DF,
                       NAV_SINS_GAMMA,
                       NAV_SINS_LEVER,
+                      NAV_SINS_QUAD,
+                      NAV_SINS_DELAY,
                       NAV_SINS_DELTA,
                       NAV_SINS_TAU,
                       NAV_SINS_EPS,
@@ -57,6 +60,7 @@ struct nav_sins_cfg {
     double df_sd_mps2;
     double gamma_scale_sd, gamma_angle_sd_rad;
     double lever_sd_m;
+    double quad_sd_s2pm, delay_sd_s; /* 0: known, and not in the state */
     double delta_sd_rad, tau_sd_s, eps_sd_rad;
     double walk_sd_radps, walk_tau_s; /* stationary */
     double gyro_noise_radps_rts;      /* 1 s means */
@@ -79,18 +83,20 @@ NAV_API const char *nav_sins_block_name(int block);
 /* Prior covariance (n x n), clone included. */
 NAV_API int nav_sins_prior(const struct nav_sins_cfg *cfg, double *p);
 
-struct nav_sins_params { /* what the model holds; in this order in memory: 39 doubles */
+struct nav_sins_params { /* what the model holds; in this order in memory: 43 doubles */
     double nu_radps[3];
     double theta[9]; /* row-major */
     double df_mps2[3];
     double gamma[9];
     double lever_m[9]; /* r of accelerometer 1, 2, 3 */
+    double quadratic_s2pm[3];
+    double delay_s;
     double delta_rad[3];
     double tau_s;
     double eps_rad[3];
 };
 /* The same instrument in the frame in which the gauge's elements are zero: I + Gamma -> (I + Gamma) R',
- * I + Theta -> (I + Theta) R', C -> C R', exp(delta) -> R exp(delta); lever arms are left. r_out: R, or NULL. Compare estimates with a truth only so. */
+ * I + Theta -> (I + Theta) R', C -> C R', exp(delta) -> R exp(delta); lever arms, q and delay are left. r_out: R, or NULL. Compare estimates with a truth only so. */
 NAV_API int nav_sins_to_gauge(int gauge, struct nav_sins_params *p, double r_out[9]);
 
 typedef struct nav_sins nav_sins;

@@ -58,6 +58,8 @@ static const struct check_rule rules[] = {
     REAL(gamma_scale_sd, 0.0, 0.1, SD),
     REAL(gamma_angle_sd_rad, 0.0, 0.1, SD),
     REAL(lever_sd_m, 0.0, 10.0, SD),
+    REAL(quad_sd_s2pm, 0.0, 1e-2, SD),
+    REAL(delay_sd_s, 0.0, 0.1, SD),
     REAL(delta_sd_rad, 0.0, 0.2, SD),
     REAL(tau_sd_s, 0.0, 0.2, "from 0 to 0.2 s"),
     REAL(eps_sd_rad, 0.0, 0.2, SD),
@@ -94,8 +96,8 @@ int nav_sins_check(const struct nav_sins_cfg *cfg, struct nav_refusal *why)
 
 const char *nav_sins_block_name(int block)
 {
-    static const char *const names[] = {"beta",  "walk",  "nu",  "theta", "df",   "gamma",
-                                        "lever", "delta", "tau", "eps",   "beta0"};
+    static const char *const names[] = {"beta", "walk",  "nu",    "theta", "df",  "gamma", "lever",
+                                        "quad", "delay", "delta", "tau",   "eps", "beta0"};
     return block < 0 || block >= NAV_SINS_BLOCKS ? "" : names[block];
 }
 
@@ -110,6 +112,8 @@ int nav_sins_layout(const struct nav_sins_cfg *cfg, struct nav_sins_rows rows[NA
                                         3,
                                         sins_gauges[cfg->gauge].count,
                                         cfg->lever,
+                                        cfg->quad_sd_s2pm > 0.0 ? 3 : 0,
+                                        cfg->delay_sd_s > 0.0 ? 1 : 0,
                                         cfg->stand ? 3 : 0,
                                         cfg->stand,
                                         cfg->base ? 3 : 0,
@@ -142,6 +146,10 @@ static double prior_sd(const struct nav_sins_cfg *cfg, int block, int k)
         return gamma % 4 == 0 ? cfg->gamma_scale_sd : cfg->gamma_angle_sd_rad;
     case NAV_SINS_LEVER:
         return cfg->lever_sd_m;
+    case NAV_SINS_QUAD:
+        return cfg->quad_sd_s2pm;
+    case NAV_SINS_DELAY:
+        return cfg->delay_sd_s;
     case NAV_SINS_DELTA:
         return cfg->delta_sd_rad;
     case NAV_SINS_TAU:

@@ -11,7 +11,9 @@ using vec3 = Eigen::Vector3d;
 using mat3 = Eigen::Matrix3d;
 using mat3_rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using sens_drift = Eigen::Matrix<double, 3, 12>; /* of beta to nu and Theta, row-major */
-using sens_accel = Eigen::Matrix<double, 3, 21>; /* of z_a to df, Gamma, lever */
+using sens_accel = Eigen::Matrix<double, 3, 25>; /* of z_a to df, Gamma, lever, q, delay */
+
+constexpr int SINS_AT_QUAD = 21, SINS_AT_DELAY = 24; /* columns of sens_accel */
 
 constexpr int SINS_RING = 256;    /* samples of attitude that the stand's angles are compared with */
 constexpr int SINS_PENDING = 256; /* angles of the stand that wait for the motion after them */

@@ -27,12 +27,14 @@ static void add_drift(struct nav_sins *s, const mat3 &middle, const vec3 &dtheta
 }
 
 /* Sensitivity of z_a: f is C' g, free of the accelerometers' noise. */
-static void add_accel(struct nav_sins *s, const mat3 &middle, const mat3 &lever)
+static void add_accel(struct nav_sins *s, const mat3 &middle, const mat3 &lever, const vec3 &w_rel)
 {
     const double dt = s->cfg.sample_s;
     const mat3 m = middle * s->accel_back * dt;
     const vec3 f = middle.transpose() * s->gravity_n;
     s->accel.leftCols<3>() += m;
+    for (int i = 0; i < 3; i++) s->accel.col(SINS_AT_QUAD + i) += m.col(i) * (f(i) * f(i));
+    s->accel.col(SINS_AT_DELAY) += m * w_rel.cross(f);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             s->accel.col(3 + 3 * i + j) += m.col(i) * f(j);
@@ -56,6 +58,21 @@ static vec3 without_lever(const struct nav_sins *s, const vec3 &dv, const mat3 &
     return left;
 }
 
+/* The square is of a force that still has the term in it: what is left is of the order of q^2 f^3, under 1e-9 m/s^2 of 100 ug/g^2. */
+static vec3 without_quad(const struct nav_sins *s, const vec3 &dv)
+{
+    const Eigen::Map<const vec3> q(s->model.quadratic_s2pm);
+    if (q.isZero(0.0)) return dv;
+    return dv - s->accel_back * (q.cwiseProduct(dv).cwiseProduct(dv) / s->cfg.sample_s);
+}
+
+/* f(t) of f'(t) = f(t - delay): exp(-w delay) f', w relative to n. */
+static vec3 without_delay(const struct nav_sins *s, const vec3 &dv, const vec3 &turn_rel)
+{
+    if (s->model.delay_s == 0.0) return dv;
+    return sins_exp(-turn_rel * (s->model.delay_s / s->cfg.sample_s)) * dv;
+}
+
 void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv_raw)
 {
     const double dt = s->cfg.sample_s;
@@ -65,15 +82,15 @@ void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv
         s->cfg.lever ? lever_rows(w, s->samples ? vec3((w - s->w_before) / dt) : vec3::Zero()) : mat3::Zero();
     vec3 dv = dv_raw - Eigen::Map<const vec3>(s->model.df_mps2) * dt;
     if (s->cfg.lever) dv = without_lever(s, dv, lever);
-    dv = s->accel_back * dv;
+    dv = without_quad(s, s->accel_back * dv);
 
     const vec3 turn = dtheta + s->dtheta_before.cross(dtheta) / 12.0; /* coning of two samples */
     const mat3 after = s->earth_turn * (s->c * sins_exp(turn));
     const mat3 middle = 0.5 * (s->c + after);
-    add_drift(s, middle, dtheta);
-    add_accel(s, middle, lever);
     const vec3 turn_rel = dtheta - middle.transpose() * s->earth_n * dt;
-    s->z_sum += s->c * undo_turn(turn_rel, dv);
+    add_drift(s, middle, dtheta);
+    add_accel(s, middle, lever, turn_rel / dt);
+    s->z_sum += s->c * undo_turn(turn_rel, without_delay(s, dv, turn_rel));
 
     s->c = after;
     s->dtheta_before = dtheta;

@@ -17,6 +17,10 @@ static double *param_at(const struct nav_sins *s, struct nav_sins_params *p, int
         return p->gamma + sins_gauges[s->cfg.gauge].at[k];
     case NAV_SINS_LEVER:
         return p->lever_m + (s->cfg.lever == 3 ? 4 * k : k);
+    case NAV_SINS_QUAD:
+        return p->quadratic_s2pm + k;
+    case NAV_SINS_DELAY:
+        return &p->delay_s;
     case NAV_SINS_DELTA:
         return p->delta_rad + k;
     case NAV_SINS_TAU:

@@ -43,7 +43,7 @@ static void set_q(struct nav_sins *s, double time_s)
             i < 3 ? density * density * time_s : walk * walk * nav_rise(2.0 * time_s / s->cfg.walk_tau_s);
 }
 
-/* beta x g_n + C (df + Gamma f + L r), means over the step. */
+/* (3): means over the step. */
 static void set_h(struct nav_sins *s)
 {
     const int n = s->n;
@@ -60,6 +60,9 @@ static void set_h(struct nav_sins *s)
             row[offset_of(s, NAV_SINS_GAMMA) + j] = s->accel(i, 3 + gauge->at[j]) * share;
         for (int j = 0; j < s->cfg.lever; j++) /* 3: r_11, r_22, r_33 */
             row[offset_of(s, NAV_SINS_LEVER) + j] = s->accel(i, 12 + (s->cfg.lever == 3 ? 4 * j : j)) * share;
+        for (int j = 0; j < s->at[NAV_SINS_QUAD].size; j++)
+            row[offset_of(s, NAV_SINS_QUAD) + j] = s->accel(i, SINS_AT_QUAD + j) * share;
+        if (has_block(s, NAV_SINS_DELAY)) row[offset_of(s, NAV_SINS_DELAY)] = s->accel(i, SINS_AT_DELAY) * share;
     }
 }
 

@@ -28,6 +28,7 @@ from psabench.native.sinslib import (
 )
 
 DEG = math.radians(1.0)
+SCALARS = ("tau_s", "delay_s")  # of Params
 CHUNK_S = 1.0  # of data handed over at once, between the stand's angles
 
 
@@ -69,6 +70,8 @@ class SinsConfig:
     gamma_scale_sd: float = 1e-3
     gamma_angle_sd_rad: float = 3.0 * ARCMIN
     lever_sd_m: float = 0.1
+    quad_sd_s2pm: float = 0.0  # 0: known, not in the state
+    delay_sd_s: float = 0.0
     delta_sd_rad: float = DEG
     tau_sd_s: float = 0.05
     eps_sd_rad: float = ARCMIN
@@ -92,6 +95,8 @@ class Params:
     df_mps2: Floats = field(default_factory=lambda: np.zeros(3))
     gamma: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     lever_m: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    quadratic_s2pm: Floats = field(default_factory=lambda: np.zeros(3))
+    delay_s: float = 0.0  # accelerometers later than gyros
     delta_rad: Floats = field(default_factory=lambda: np.zeros(3))
     tau_s: float = 0.0
     eps_rad: Floats = field(default_factory=lambda: np.zeros(3))
@@ -101,8 +106,10 @@ class Params:
         return np.asarray((w_measured - self.nu_radps) @ np.linalg.inv(np.eye(3) + self.theta).T)
 
     def accelerometers(self, f_measured: Floats) -> Floats:
-        """Specific forces f of rows of measured ones: f = (I + Gamma)^-1 (f' - df)."""
-        return np.asarray((f_measured - self.df_mps2) @ np.linalg.inv(np.eye(3) + self.gamma).T)
+        """Specific forces f of rows of measured ones: f = (I + Gamma)^-1 (f' - df - q f^2); lever arms, delay stay."""
+        back = np.linalg.inv(np.eye(3) + self.gamma).T
+        found = (f_measured - self.df_mps2) @ back
+        return np.asarray(found - (self.quadratic_s2pm * found**2) @ back)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -298,15 +305,15 @@ def config_struct(cfg: SinsConfig) -> SinsConfigStruct:
 
 
 def _params_of(struct: ParamsStruct) -> Params:
-    got = {name: np.array(getattr(struct, name)) for name, *_ in ParamsStruct._fields_ if name != "tau_s"}
+    got = {name: np.array(getattr(struct, name)) for name, *_ in ParamsStruct._fields_ if name not in SCALARS}
     matrices = {name: got[name].reshape(3, 3) for name in ("theta", "gamma", "lever_m")}
-    return Params(tau_s=struct.tau_s, **(got | matrices))
+    return Params(tau_s=struct.tau_s, delay_s=struct.delay_s, **(got | matrices))
 
 
 def _params_struct(params: Params) -> ParamsStruct:
-    struct = ParamsStruct(tau_s=params.tau_s)
+    struct = ParamsStruct(tau_s=params.tau_s, delay_s=params.delay_s)
     for name, kind, *_ in ParamsStruct._fields_:
-        if name != "tau_s":
+        if name not in SCALARS:
             setattr(struct, name, kind(*np.ravel(getattr(params, name))))
     return struct
 

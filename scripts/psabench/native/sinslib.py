@@ -7,7 +7,7 @@ from typing import Any
 
 _D, _I, _P = c.c_double, c.c_int, c.POINTER
 _DOUBLES = _P(_D)
-BLOCKS = ("beta", "walk", "nu", "theta", "df", "gamma", "lever", "delta", "tau", "eps", "beta0")
+BLOCKS = ("beta", "walk", "nu", "theta", "df", "gamma", "lever", "quad", "delay", "delta", "tau", "eps", "beta0")
 
 
 def _named_doubles(*names: str) -> list[tuple[str, Any]]:
@@ -22,7 +22,7 @@ class SinsConfigStruct(c.Structure):
         *[(name, _I) for name in ("form", "gauge", "lever", "stand", "base", "walk", "clone")],
         ("beta_sd_rad", _D * 3),
         *_named_doubles("nu_sd_radps", "theta_scale_sd", "theta_angle_sd_rad", "df_sd_mps2", "gamma_scale_sd"),
-        *_named_doubles("gamma_angle_sd_rad", "lever_sd_m", "delta_sd_rad", "tau_sd_s", "eps_sd_rad", "walk_sd_radps"),
+        *_named_doubles("gamma_angle_sd_rad", "lever_sd_m", "quad_sd_s2pm", "delay_sd_s", "delta_sd_rad", "tau_sd_s", "eps_sd_rad", "walk_sd_radps"),
         *_named_doubles("walk_tau_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts", "accel_noise_multiplier"),
         *_named_doubles("stand_sd_rad", "stand_noise_rate_hz", "stand_interval_s", "stand_guard_s"),
     ]
@@ -43,6 +43,8 @@ class ParamsStruct(c.Structure):
         ("df_mps2", _D * 3),
         ("gamma", _D * 9),
         ("lever_m", _D * 9),
+        ("quadratic_s2pm", _D * 3),
+        ("delay_s", _D),
         ("delta_rad", _D * 3),
         ("tau_s", _D),
         ("eps_rad", _D * 3),

@@ -16,10 +16,11 @@ from scipy.spatial.transform import Rotation
 from psabench.errors import BadInput, expected
 from psabench.native.nav import ARCMIN, DEGPH, Floats, Refused
 from psabench.native.sins import Params, Sins, SinsConfig
-from psabench.sins.correction import Correction
+from psabench.sins.correction import SHAPES, Correction
 from psabench.sins.covariance import GAMMA_AT, KNOWN
 from psabench.sins.data_check import findings
 from psabench.sins.increments import Increments
+from psabench.sins.layout import G_MPS2
 
 WHITE = 3.3  # standard deviations of a correlation between innovations of neighbouring seconds, 1 in 1000
 NIS_LEAST = 0.02  # what noise that is given to one part in a hundred does
@@ -46,6 +47,8 @@ SCALES: Mapping[str, Scale] = {
     "gamma_ii": Scale(unit="ppm", per_si=1e6, symbol="Γ{i}{j}"),
     "gamma_ij": Scale(unit="″", per_si=60.0 / ARCMIN, symbol="Γ{i}{j}"),
     "lever": Scale(unit="mm", per_si=1e3, symbol="r{i}{j}"),
+    "quad": Scale(unit="µg/g²", per_si=1e6 * G_MPS2, symbol="q{i}"),
+    "delay": Scale(unit="ms", per_si=1e3, symbol="τ_a"),
     "delta": Scale(unit="″", per_si=60.0 / ARCMIN, symbol="δ{i}"),
     "tau": Scale(unit="ms", per_si=1e3, symbol="τ"),
 }
@@ -136,7 +139,7 @@ def feed(s: Sins, data: Increments, stand: tuple[Floats, Floats] | None) -> Floa
 def elements(s_rows: Mapping[str, slice], cfg: SinsConfig) -> list[tuple[str, str, int]]:
     """Name, key of SCALES and place in the state of each parameter."""
     found: list[tuple[str, str, int]] = []
-    for block in ("nu", "theta", "df", "gamma", "lever", "delta", "tau"):
+    for block in ("nu", "theta", "df", "gamma", "lever", "quad", "delay", "delta", "tau"):
         rows = s_rows[block]
         for k in range(rows.stop - rows.start):
             found.append((*_named(block, k, cfg, rows.stop - rows.start), rows.start + k))
@@ -145,9 +148,9 @@ def elements(s_rows: Mapping[str, slice], cfg: SinsConfig) -> list[tuple[str, st
 
 def _named(block: str, k: int, cfg: SinsConfig, size: int) -> tuple[str, str]:
     """Of the k-th element of a block."""
-    if block == "tau":
-        return "tau", "tau"
-    if block in ("nu", "df", "delta"):
+    if block in ("tau", "delay"):
+        return block, block
+    if block in ("nu", "df", "quad", "delta"):
         return f"{block}_{k + 1}", block
     at = GAMMA_AT[cfg.gauge][k] if block == "gamma" else 4 * k if block == "lever" and size == 3 else k
     i, j = divmod(at, 3)
@@ -155,13 +158,21 @@ def _named(block: str, k: int, cfg: SinsConfig, size: int) -> tuple[str, str]:
     return f"{block}_{i + 1}{j + 1}", key
 
 
+FIELDS: Mapping[str, str] = {  # of Params, where a block's name is another
+    "nu": "nu_radps",
+    "df": "df_mps2",
+    "lever": "lever_m",
+    "quad": "quadratic_s2pm",
+    "delay": "delay_s",
+    "delta": "delta_rad",
+    "tau": "tau_s",
+}
+
+
 def value_of(params: Params, name: str) -> float:
     """In SI, by the name of a parameter."""
     block, _, at = name.partition("_")
-    field = {"nu": "nu_radps", "df": "df_mps2", "delta": "delta_rad", "tau": "tau_s", "lever": "lever_m"}.get(
-        block, block
-    )
-    found = getattr(params, field)
+    found = getattr(params, FIELDS.get(block, block))
     return float(found if not at else found[tuple(int(c) - 1 for c in at)])
 
 
@@ -191,7 +202,7 @@ def _result_of(cfg: SinsConfig, s: Sins, innovations: Floats, start_c_nb: Floats
         parameters=parameters,
         covariance=covariance,
         params=p,
-        correction=Correction(nu_radps=p.nu_radps, theta=p.theta, df_mps2=p.df_mps2, gamma=p.gamma, lever_m=p.lever_m),
+        correction=_correction_of(p),
         nis_accel=state.nis_accel,
         nis_stand=state.nis_stand,
         correlation=correlation,
@@ -203,6 +214,11 @@ def _result_of(cfg: SinsConfig, s: Sins, innovations: Floats, start_c_nb: Floats
             *_attitude_doubts(state.c0_nb @ start_c_nb.T, cfg),
         ),
     )
+
+
+def _correction_of(p: Params) -> Correction:
+    """What of a model a unit carries along: all but the mounting on the table and its clock."""
+    return Correction(**{name: getattr(p, name) for name in SHAPES})
 
 
 def _neighbours(innovations: Floats) -> Floats:
