@@ -58,12 +58,15 @@ static vec3 without_lever(const struct nav_sins *s, const vec3 &dv, const mat3 &
     return left;
 }
 
-/* The square is of a force that still has the term in it: what is left is of the order of q^2 f^3, under 1e-9 m/s^2 of 100 ug/g^2. */
+/* f = f'' - (I + Gamma)^-1 q f^2, twice from f'' on: what is left is of the order of q^3 f^4, 1e-10 m/s^2 of 100 ug/g^2. */
 static vec3 without_quad(const struct nav_sins *s, const vec3 &dv)
 {
     const Eigen::Map<const vec3> q(s->model.quadratic_s2pm);
     if (q.isZero(0.0)) return dv;
-    return dv - s->accel_back * (q.cwiseProduct(dv).cwiseProduct(dv) / s->cfg.sample_s);
+    vec3 left = dv;
+    for (int pass = 0; pass < 2; pass++)
+        left = dv - s->accel_back * (q.cwiseProduct(left).cwiseProduct(left) / s->cfg.sample_s);
+    return left;
 }
 
 /* f(t) of f'(t) = f(t - delay): exp(-w delay) f', w relative to n. */

@@ -109,7 +109,9 @@ class Params:
         """Specific forces f of rows of measured ones: f = (I + Gamma)^-1 (f' - df - q f^2); lever arms, delay stay."""
         back = np.linalg.inv(np.eye(3) + self.gamma).T
         found = (f_measured - self.df_mps2) @ back
-        return np.asarray(found - (self.quadratic_s2pm * found**2) @ back)
+        for _ in range(2):
+            found = (f_measured - self.df_mps2 - self.quadratic_s2pm * found**2) @ back
+        return np.asarray(found)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

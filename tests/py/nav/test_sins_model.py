@@ -34,14 +34,18 @@ def test_the_defaults_of_python_are_those_of_the_library() -> None:
 
 def test_blocks_have_their_names_and_places() -> None:
     assert [library().sins_block_name(k).decode() for k in range(-1, len(BLOCKS) + 1)] == ["", *BLOCKS, ""]
-    full = SinsConfig(gauge=Gauge.FREE9, lever=9, stand=True, base=True, walk=True, clone=True)
+    full = SinsConfig(
+        gauge=Gauge.FREE9, lever=9, stand=True, base=True, walk=True, clone=True, quad_sd_s2pm=1e-5, delay_sd_s=5e-3
+    )
     sizes = {name: rows.stop - rows.start for name, rows in sins.state_layout(full).items()}
-    assert sizes == dict(zip(BLOCKS, (3, 3, 3, 9, 3, 9, 9, 3, 1, 3, 3), strict=True))
+    assert sizes == dict(zip(BLOCKS, (3, 3, 3, 9, 3, 9, 9, 3, 1, 3, 1, 3, 3), strict=True))
     p = sins.prior_covariance(full)
     sd = np.sqrt(np.diag(p))
     rows = sins.state_layout(full)
     assert sd[rows["theta"]].reshape(3, 3) == pytest.approx(np.where(np.eye(3) > 0, 1e-3, 3 * ARCMIN))
     assert sd[rows["nu"]] == pytest.approx(0.5 * DEGPH)
+    assert (sd[rows["quad"]], sd[rows["delay"]]) == (pytest.approx(1e-5), pytest.approx(5e-3))
+    assert sins.state_layout(SinsConfig())["quad"] == sins.state_layout(SinsConfig())["delay"]  # empty: no prior
     assert np.array_equal(p[rows["beta"], rows["beta0"]], p[rows["beta"], rows["beta"]])
 
 
@@ -62,10 +66,13 @@ def strapdown(c: Floats, dtheta: Floats, dv: Floats, dt: float, per_step: int) -
     return np.array(out)
 
 
-def residuals(e: Errors, beta0: Floats, lever: Floats | None = None) -> Floats:
+def residuals(
+    e: Errors, beta0: Floats, lever: Floats | None = None, quad: Floats | None = None, delay_s: float = 0.0
+) -> Floats:
     """Of the nonlinear model: an uncalibrated strapdown on what a unit with these errors measures."""
     table = Table(truth.placed(0.3), SHORT)
     d = truth.measured(table, e, 0.01)
+    d.dv += unlike_samples(table, np.zeros(3) if quad is None else quad, delay_s)
     if lever is not None:
         middle: Floats = np.arange(len(d.dv), dtype=np.float64) * 0.01 + 0.005
         relative_rate, earth = table.rate(middle), np.einsum("kji,j->ki", table.attitude(middle), U_N)
@@ -74,6 +81,16 @@ def residuals(e: Errors, beta0: Floats, lever: Floats | None = None) -> Floats:
             seen = np.cross(rate, np.cross(rate, lever[i])) + np.cross(turning, lever[i])
             d.dv[:, i] += seen[:, i] * 0.01
     return strapdown(turned(beta0) @ truth.placed(0.3), d.dtheta, d.dv, 0.01, 10)
+
+
+def unlike_samples(table: Table, quad: Floats, delay_s: float) -> Floats:
+    """Increments of velocity of q f^2 and of the force of delay_s ago less that of now, by Simpson's rule."""
+    total = np.zeros((round(table.edges[-1] / 0.01), 3))
+    for part, weight in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
+        t: Floats = (np.arange(len(total)) + part) * 0.01
+        now, then = (np.einsum("kji,j->ki", table.attitude(at), G_N) for at in (t, t - delay_s))
+        total += weight * (then - now + quad * then**2)
+    return total * (0.01 / 6.0)
 
 
 def sensitivities(cfg: SinsConfig) -> Floats:
@@ -92,9 +109,9 @@ def sensitivities(cfg: SinsConfig) -> Floats:
     return np.array(out)
 
 
-def error_of(block: str, k: int, size: float) -> tuple[Errors, Floats, Floats | None]:
+def error_of(block: str, k: int, size: float) -> tuple[Errors, Floats, Floats | None, Floats | None, float]:
     """An instrument with one error."""
-    e, beta0, lever = Errors(), np.zeros(3), None
+    e, beta0, lever, quad, delay_s = Errors(), np.zeros(3), None, None, 0.0
     if block == "beta":
         beta0[k] = size
     elif block == "nu":
@@ -105,24 +122,38 @@ def error_of(block: str, k: int, size: float) -> tuple[Errors, Floats, Floats | 
         e.theta.flat[k] = size
     elif block == "gamma":
         e.gamma.flat[k] = size
+    elif block == "quad":
+        quad = size * np.eye(3)[k]
+    elif block == "delay":
+        delay_s = size
     else:
         lever = np.zeros((3, 3))
         lever.flat[k] = size
-    return e, beta0, lever
+    return e, beta0, lever, quad, delay_s
 
 
 @pytest.mark.parametrize(
     ("block", "size"),
-    [("beta", 1e-4), ("nu", 1e-6), ("theta", 1e-5), ("df", 1e-3), ("gamma", 1e-4), ("lever", 1e-1)],
+    [
+        ("beta", 1e-4),
+        ("nu", 1e-6),
+        ("theta", 1e-5),
+        ("df", 1e-3),
+        ("gamma", 1e-4),
+        ("lever", 1e-1),
+        ("quad", 1e-5),
+        ("delay", 1e-3),
+    ],
 )
 def test_the_jacobians_are_central_differences_of_finite_rotations(block: str, size: float) -> None:
-    cfg = SinsConfig(gauge=Gauge.FREE9, lever=9)
+    cfg = SinsConfig(gauge=Gauge.FREE9, lever=9, quad_sd_s2pm=1e-5, delay_sd_s=5e-3)
     got, rows = sensitivities(cfg), sins.state_layout(cfg)[block]
     # Where rates change, their difference of two samples is an acceleration that the reference does not have.
+    # The force of a delay ago turned by another rate there.
     steady = np.ones(len(got), bool)
-    if block == "lever":
-        for edge in (0.0, 5.0, 10.0):
-            steady[round(edge / 0.1) : round(edge / 0.1) + 1] = False
+    if block in ("lever", "delay"):
+        for edge in (0, 50, 100):
+            steady[max(edge - (block == "delay"), 0) : edge + 1] = False  # a negative delay sees what comes
     for k in range(rows.stop - rows.start):
         plus, minus = (residuals(*error_of(block, k, sign * size)) for sign in (1.0, -1.0))
         want = (plus - minus) / (2.0 * size)
@@ -188,6 +219,41 @@ def test_angles_near_a_change_of_rate_are_left_out_and_others_fit() -> None:
 
 
 # ---- the filter as a whole
+
+
+def test_a_known_quadratic_term_and_delay_are_taken_out() -> None:
+    """Not in the state, but in the model: nothing is left. 5 ms at 10 deg/s are 9e-3 m/s^2, q up to 3e-3."""
+    q, delay_s, table = np.array([1e-5, -2e-5, 3e-5]), 5e-3, Table(truth.placed(0.3), SHORT)
+    d = truth.measured(table, Errors(), 0.01)
+    d.dv += unlike_samples(table, q, delay_s)
+    left = []
+    for model in (Params(), Params(quadratic_s2pm=q, delay_s=delay_s)):
+        s = Sins(SinsConfig(), truth.placed(0.3))
+        s.about(model)
+        s.samples(0.0, d.dtheta, d.dv)
+        left.append(np.max(np.abs(s.state().innovations[:3])))
+    assert left[0] > 0.2, left
+    assert left[1] < 2e-3  # where rates change, the force of a delay ago turned by another one
+    got = Params(quadratic_s2pm=q, gamma=np.diag([1e-3, 0.0, 0.0])).accelerometers(np.array([[9.0, -9.0, 5.0]]))
+    want = np.array([[(9.0 - 1e-5 * 9.0**2) / 1.001, -9.0 + 2e-5 * 9.0**2, 5.0 - 3e-5 * 5.0**2]])
+    assert got == pytest.approx(want, abs=5e-6)
+
+
+@pytest.mark.parametrize("form", list(Form))
+def test_a_quadratic_term_and_a_delay_are_found_in_two_passes(form: Form) -> None:
+    """In the model they are taken out, so a first pass that subtracts with the wrong sign never gets there."""
+    q, delay_s = np.array([1e-5, -2e-5, 3e-5]), 5e-3
+    e = truth.drawn(np.random.default_rng(5), kept=())
+    table = Table(truth.placed(), truth.article_plan(half_s=90.0))
+    d = truth.measured(table, e, 0.01)
+    d.dv += unlike_samples(table, q, delay_s)
+    cfg = SinsConfig(form=form, clone=True, quad_sd_s2pm=1e-4, delay_sd_s=0.02)
+    done = sins.calibrate_unit(cfg, truth.placed(), d.dtheta, d.dv)
+    p, sd = done.state.params, np.sqrt(np.diag(done.covariance))
+    assert np.all(np.abs(p.quadratic_s2pm - q) < 0.2 * sd[done.rows["quad"]])
+    assert abs(p.delay_s - delay_s) < 0.2 * sd[done.rows["delay"]][0]
+    assert np.all(sd[done.rows["quad"]] < 5e-6)
+    assert sd[done.rows["delay"]][0] < 1e-3
 
 
 @pytest.mark.parametrize("form", list(Form))
