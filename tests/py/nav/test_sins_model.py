@@ -44,7 +44,8 @@ def test_blocks_have_their_names_and_places() -> None:
     rows = sins.state_layout(full)
     assert sd[rows["theta"]].reshape(3, 3) == pytest.approx(np.where(np.eye(3) > 0, 1e-3, 3 * ARCMIN))
     assert sd[rows["nu"]] == pytest.approx(0.5 * DEGPH)
-    assert (sd[rows["quad"]], sd[rows["delay"]]) == (pytest.approx(1e-5), pytest.approx(5e-3))
+    assert sd[rows["quad"]] == pytest.approx(1e-5)
+    assert sd[rows["delay"]] == pytest.approx(5e-3)
     assert sins.state_layout(SinsConfig())["quad"] == sins.state_layout(SinsConfig())["delay"]  # empty: no prior
     assert np.array_equal(p[rows["beta"], rows["beta0"]], p[rows["beta"], rows["beta"]])
 
@@ -87,7 +88,7 @@ def unlike_samples(table: Table, quad: Floats, delay_s: float) -> Floats:
     """Increments of velocity of q f^2 and of the force of delay_s ago less that of now, by Simpson's rule."""
     total = np.zeros((round(table.edges[-1] / 0.01), 3))
     for part, weight in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
-        t: Floats = (np.arange(len(total)) + part) * 0.01
+        t = np.asarray((np.arange(len(total)) + part) * 0.01, np.float64)
         now, then = (np.einsum("kji,j->ki", table.attitude(at), G_N) for at in (t, t - delay_s))
         total += weight * (then - now + quad * then**2)
     return total * (0.01 / 6.0)
