@@ -159,12 +159,12 @@ RULES = {
     "loose-modules": Rule(loose_modules, 12, 12),
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
-    "one-word-functions-python": Rule(one_word_functions, 922, 922),
+    "one-word-functions-python": Rule(one_word_functions, 980, 980),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 60_651, 60_651),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 54_278, 54_278),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_838, 1_838),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 59_543, 59_543),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 60_745, 60_745),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_980, 1_980),
 }
 
 
