@@ -22,16 +22,8 @@ class SinsConfigStruct(c.Structure):
         *[(name, _I) for name in ("form", "gauge", "lever", "stand", "base", "walk", "clone")],
         ("beta_sd_rad", _D * 3),
         *_named_doubles("nu_sd_radps", "theta_scale_sd", "theta_angle_sd_rad", "df_sd_mps2", "gamma_scale_sd"),
-        *_named_doubles(
-            "gamma_angle_sd_rad",
-            "lever_sd_m",
-            "quad_sd_s2pm",
-            "delay_sd_s",
-            "delta_sd_rad",
-            "tau_sd_s",
-            "eps_sd_rad",
-            "walk_sd_radps",
-        ),
+        *_named_doubles("gamma_angle_sd_rad", "lever_sd_m", "quad_sd_s2pm", "delay_sd_s", "delta_sd_rad", "tau_sd_s"),
+        *_named_doubles("eps_sd_rad", "walk_sd_radps"),
         *_named_doubles("walk_tau_s", "gyro_noise_radps_rts", "accel_noise_mps2_rts", "accel_noise_multiplier"),
         *_named_doubles("stand_sd_rad", "stand_noise_rate_hz", "stand_interval_s", "stand_guard_s"),
     ]
