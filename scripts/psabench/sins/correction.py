@@ -28,7 +28,8 @@ SHAPES: Mapping[str, tuple[int, ...]] = {
     "lever_m": (3, 3),
     "delay_s": (),
 }
-MOST = 0.5  # of an element of Theta and Gamma: beyond it a correction is none
+MOST: Mapping[str, float] = {"theta": 0.5, "gamma": 0.5, "delay_s": 1.0}  # beyond it a correction is none
+MOST_OTHERS = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +123,7 @@ def _found_inside(found: object, depth: int = 6) -> Mapping[str, Any] | None:
 
 def correction_of(found: Mapping[str, Any]) -> Correction:
     """Raises ValueError with the key."""
-    if found.get("version") != VERSION:
+    if type(found.get("version")) is not int or found["version"] != VERSION:
         raise ValueError(expected(str(VERSION), found.get("version"), "version"))
     unknown = [k for k in found if k not in SHAPES and k not in ("kind", "version")]
     if unknown:
@@ -134,15 +135,25 @@ def correction_of(found: Mapping[str, Any]) -> Correction:
     return Correction(**values)
 
 
+def _are_numbers(given: object) -> bool:
+    """A number or lists of numbers; true and false are none."""
+    if isinstance(given, list):
+        return all(map(_are_numbers, given))
+    return isinstance(given, int | float) and not isinstance(given, bool)
+
+
 def _array(given: object, shape: tuple[int, ...], name: str) -> Floats | float:
+    if not _are_numbers(given):
+        raise ValueError(expected(f"numbers of shape {shape}", given, name))
     try:
         x = np.array(given, np.float64)
     except (TypeError, ValueError) as e:
         raise ValueError(expected(f"numbers of shape {shape}", given, name)) from e
     if x.shape != shape or not np.isfinite(x).all():
         raise ValueError(expected(f"finite numbers of shape {shape}", given, name))
-    if name in ("theta", "gamma") and np.abs(x).max() > MOST:
-        raise ValueError(expected(f"elements within {MOST:g}", f"{np.abs(x).max():g}", name))
+    most = MOST.get(name, MOST_OTHERS)
+    if np.abs(x).max() > most:
+        raise ValueError(expected(f"elements within {most:g}", f"{np.abs(x).max():g}", name))
     if name in ("theta", "gamma") and np.linalg.matrix_rank(np.eye(3) + x) < 3:
         raise ValueError(expected("a matrix that, added to the unit matrix, has an inverse", given, name))
     return x if shape else float(x)

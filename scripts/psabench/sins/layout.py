@@ -142,6 +142,6 @@ def layout_of(found: object) -> Layout:
         if name in fields:
             fields[name] = tuple(given)
     for name, kind in (("columns", int), ("axes", str), ("topic", str), ("interval_s", (int, float, type(None)))):
-        if name in fields and not isinstance(fields[name], kind):
+        if name in fields and (not isinstance(fields[name], kind) or isinstance(fields[name], bool)):
             raise ValueError(expected("a number" if name in ("columns", "interval_s") else "text", fields[name], name))
     return Layout(**fields)

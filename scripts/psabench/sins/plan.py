@@ -27,7 +27,7 @@ MOST_DEGPS, MOST_S, MOST_TURNS = 1000.0, 86400.0, 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RotationPlan:
-    """At the start z1 lies on the table's horizontal axis and z3 is up."""
+    """At the start z1 lies on the table's horizontal axis and z3 is vertical: up here, down on a table of ours."""
 
     name: str
     axis_azimuth_deg: float  # from north, clockwise

@@ -110,12 +110,16 @@ def test_a_file_gives_back_the_same_correction(tmp_path: Path) -> None:
         ({"version": 2}, "version: expected 1, got 2"),
         ({"nu_radps": [1, 2]}, r"nu_radps: expected finite numbers of shape \(3,\)"),
         ({"nu_radps": [1, 2, "x"]}, "nu_radps: expected numbers of shape"),
-        ({"nu_radps": [1, 2, None]}, "nu_radps: expected finite numbers of shape"),
+        ({"nu_radps": [1, 2, None]}, "nu_radps: expected numbers of shape"),
         ({"theta": [[1, 0, 0], [0, 0, 0], [0, 0, 0]]}, "theta: expected elements within 0.5, got 1"),
         (
             {"gamma": [[-0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0, 0, 0]]},
             "gamma: expected a matrix that, added to the unit",
         ),
+        ({"nu_radps": [1, 2, True]}, "nu_radps: expected numbers of shape"),
+        ({"version": True}, "version: expected 1, got True"),
+        ({"delay_s": 2.0}, "delay_s: expected elements within 1, got 2"),
+        ({"df_mps2": [1e300, 0, 0]}, r"df_mps2: expected elements within 1000, got 1e\+300"),
         ({"thetas": 1}, "correction: expected nu_radps.* got thetas"),
     ],
 )
