@@ -65,7 +65,7 @@ UNIT_BIN := $(patsubst %,$(BUILD)/tests/%,$(basename $(notdir $(UNIT))))
 FUZZ_SRC  := $(sort $(wildcard tests/fuzz/fuzz_*.c tests/fuzz/*/fuzz_*.c))
 FUZZ      ?= $(sort $(patsubst fuzz_%.c,%,$(notdir $(FUZZ_SRC))))
 FUZZ_BIN := $(FUZZ:%=$(BUILD)/fuzz/fuzz_%)
-BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c)))
+BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests/bench/*.c))) $(if $(EIGEN),$(BUILD)/bench/bench_kf)
 
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -117,6 +117,8 @@ $(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/o
 $(foreach t,$(FUZZ_SRC),$(eval $(BUILD)/fuzz/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach c,ads1282 ads1256 ad7712,$(eval $(filter $(BUILD)/fuzz/fuzz_$(c)_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/support/$(c)_world.o))
 $(BENCH_BIN): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o
+$(BUILD)/obj/tests/bench/bench_kf.o: CPPFLAGS += -UEIGEN_DONT_VECTORIZE -UEIGEN_NO_MALLOC#   the peer as its users have it
+$(BUILD)/bench/bench_kf: $(BUILD)/libpsabench-nav.a
 $(UNIT_BIN) $(FUZZ_BIN) $(BENCH_BIN): $(BUILD)/lib/emu.a
 	$(call say,LINK)
 	$(Q)$(LINK) -o $@ $(filter %.o,$^) $(filter-out %/emu.a,$(filter %.a,$^)) $(BUILD)/lib/emu.a $(LINK_LIBS)

@@ -30,6 +30,12 @@ MONTE_CARLO = {
     "mc-samples-all": 5000,
 }
 
+NAV = {  # unit, first count
+    "kf-filterpy": ("steps", 1000),
+    "sins-plan": ("plans", 2),
+    "strapdown": ("hours", 2),
+    "strapdown-python-ins": ("hours", 1),
+}
 
 FLEETS = (64, 1000)
 FLEET_MS = (1300, 2300)  # both are asleep before the end
@@ -150,7 +156,7 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
         Case("verilator", "frames", partial(printed, driven.command), 20000, driven.command, (1000, 3000)),
         Case(PSD1, "frames", partial(printed, psd1.command), 1000, psd1.command, (50, 150)),
     ]
-    for exe, unit in (("bench_core", "frames"), ("bench_lib", "bytes")):
+    for exe, unit in (("bench_core", "frames"), ("bench_lib", "bytes"), ("bench_kf", "steps")):
         path = bench / exe
         if not path.exists():
             continue
@@ -159,6 +165,8 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
             cases.append(Case(name, unit, partial(printed, command), 2000, command))
     for name, unit, first in (("decode", "frames", 20000), ("can", "frames", 20000), ("chips-spi", "bytes", 20000)):
         cases.append(Case(name, unit, partial(printed, partial(python, name)), first))
+    for name, (unit, first) in NAV.items():
+        cases.append(Case(name, unit, partial(printed, partial(python, name)), first, fixed=unit == "hours"))
     for name, first in MONTE_CARLO.items():
         cases.append(Case(name, "runs", partial(printed, partial(python, name)), first))
     for name in ("gyro-emulator", "gyro-chain"):

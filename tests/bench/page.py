@@ -60,6 +60,16 @@ MONTE_CARLO = {
     "mc-closed-all": "the same, a thread a core, real time",
 }
 
+NAV = {  # label, unit of work, ms or us of one
+    "kf-joseph": ("filter step, 45 states of which 6 move, 3 measurements: `NAV_KF_JOSEPH`", "µs", "kf-joseph"),
+    "kf-ud": ("the same, `NAV_KF_UD`", "µs", "kf-joseph"),
+    "kf-dense": ("the same, dense Joseph formulas in Eigen, vectorised", "µs", "kf-joseph"),
+    "kf-filterpy": ("the same, filterpy", "µs", "kf-joseph"),
+    "sins-plan": ("covariance of the article's three cycles, 2718 s at 100 Hz, 24 states", "ms", "sins-plan"),
+    "strapdown": ("strapdown, an hour at 100 Hz, path given back", "ms", "strapdown"),
+    "strapdown-python-ins": ("the same, python-ins", "ms", "strapdown"),
+}
+
 
 def figure(x: float | None) -> str:
     """Three digits, thousands apart: 1,230,000; 12.3; 0.0123."""
@@ -123,6 +133,16 @@ def monte_carlo(r: Result) -> str:
         if c := r["cases"].get(name):
             rows.append([label, figure(c["per_s"]), figure(c["times_peer"])])
     return table(["model", "gyrocompasses/s", "times NumPy"], rows)
+
+
+def nav(r: Result) -> str:
+    rows = []
+    for name, (label, unit, ours) in NAV.items():
+        if (c := r["cases"].get(name)) and (base := r["cases"].get(ours)):
+            each = {"µs": 1e6, "ms": 1e3}[unit] / c["per_s"]
+            times = figure(base["per_s"] / c["per_s"]) if name != ours else ""
+            rows.append([label, f"{figure(each)} {unit}", times])
+    return table(["what", "CPU time of one", "times the library's"], rows)
 
 
 def alone(r: Result) -> str:
@@ -193,6 +213,7 @@ SECTIONS: dict[str, Callable[[Result], str]] = {
     "alone": alone,
     "fleets": fleets,
     "monte-carlo": monte_carlo,
+    "nav": nav,
 }
 
 

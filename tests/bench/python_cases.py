@@ -27,6 +27,7 @@ from psabench.link.lineport import BLOCK, CLK, DATA, INT, LineDecoder
 from psabench.places import find_emulator
 
 from tests.bench.cases import FLEETS, ROOT, fleet_scenario
+from tests.bench.nav_cases import NAV_CASES
 
 SAMPLES = 8000  # of a frame period: 8 MHz, 1 ms
 SET_UP_S = 0.3  # of a PSA-2, and some
@@ -321,6 +322,7 @@ CASES: dict[str, Callable[[int], str]] = {
     "gyro-emulator": gyro_emulator,
     "gyro-chain": gyro_chain,
     "fourier": fourier,
+    **NAV_CASES,
 }
 
 if __name__ == "__main__":

@@ -1,0 +1,99 @@
+"""What `make bench` measures of libpsabench-nav from Python, beside filterpy and python-ins, which are of Python."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+N, MOVING, M, TURNS = 45, 6, 3, 16  # as bench_kf.cpp has them
+
+
+def filterpy(count: int) -> str:
+    """Steps of filterpy's KalmanFilter: prediction and three measurements at once."""
+    from filterpy.kalman import KalmanFilter  # type: ignore[import-untyped]
+
+    rng = np.random.default_rng(1)
+    f = KalmanFilter(dim_x=N, dim_z=M)
+    f.F[:MOVING] += 0.01 * rng.uniform(-0.5, 0.5, (MOVING, N))
+    f.Q = np.diag([1e-6] * MOVING + [0.0] * (N - MOVING))
+    f.R = 0.01 * np.eye(M)
+    rows, z = rng.uniform(-0.5, 0.5, (TURNS, M, N)), np.array([0.1, -0.2, 0.3])
+    began_ns = time.process_time_ns()
+    for k in range(count):
+        f.predict()
+        f.update(z, H=rows[k % TURNS])
+    ns = time.process_time_ns() - began_ns
+    if not np.isfinite(f.P).all():
+        raise RuntimeError("filterpy: the covariance is not finite")
+    return f"steps={count} ns={ns}"
+
+
+def sins_plan(count: int) -> str:
+    """Covariances of the article's plan of three cycles, 2718 s at 100 Hz."""
+    from psabench.native.sins import Sins, SinsConfig, Turn
+
+    cfg, tenth, placed = SinsConfig(), np.radians(10.0), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    legs = [(axis, sign, 450.0) for axis in (x, y, z) for sign in (1, -1)]
+    legs[2:2], legs[5:5] = [(z, -1, 9.0)], [(x, -1, 9.0)]
+    turns = [Turn(axis_b=axis, rate_radps=sign * tenth, duration_s=s) for axis, sign, s in legs]
+    began_ns = time.process_time_ns()
+    for _ in range(count):
+        s = Sins(cfg, placed)
+        s.plan(turns)
+    ns = time.process_time_ns() - began_ns
+    if not 0.0 < s.sd("nu").max() < cfg.nu_sd_radps / 10.0:
+        raise RuntimeError("sins-plan: the drifts are not found")
+    return f"plans={count} ns={ns}"
+
+
+def _hour() -> tuple[np.ndarray, np.ndarray]:
+    t = 0.01 * np.arange(360_001)
+    turn = np.stack([0.3 * np.sin(0.9 * t), 0.2 * np.sin(1.3 * t + 1), 0.1 * np.sin(0.1 * t)], -1) * 0.01
+    push = np.stack([0.5 * np.sin(0.6 * t), 0.3 * np.cos(0.5 * t), 9.81 + 0.2 * np.sin(2 * t)], -1) * 0.01
+    return turn, push
+
+
+def strapdown_hours(count: int) -> str:
+    """Hours of strapdown integration at 100 Hz, the path of each interval given back."""
+    from psabench.native.strapdown import State, Strapdown, dcm
+
+    turn, push = _hour()
+    lat, lon, c_nb = np.radians(55.7), np.radians(37.5), dcm(*np.radians([77.0, -5.0, 3.0]))
+    began_ns = time.process_time_ns()
+    for _ in range(count):
+        at = State(lat_rad=lat, lon_rad=lon, h_m=150.0, v_n_mps=np.array([-20.0, 30.0, 0.0]), C_nb=c_nb)
+        Strapdown(at, height_fixed=True).advance(turn[1:], push[1:], 0.01)
+    return f"hours={count} ns={time.process_time_ns() - began_ns}"
+
+
+def python_ins_hours(count: int) -> str:
+    """The same by python-ins, compiled by numba before the clock starts."""
+    import pandas as pd
+    from pyins import strapdown as other  # type: ignore[import-untyped]
+
+    turn, push = _hour()
+    names = [f"{s}_{a}" for s in ("gyro", "accel") for a in "xyz"]
+    to_other = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # forward, right, down
+    imu = pd.DataFrame(
+        np.hstack([turn @ to_other.T, push @ to_other.T]), index=0.01 * np.arange(len(turn)), columns=names
+    )
+    states = ["lat", "lon", "alt", "VN", "VE", "VD", "roll", "pitch", "heading"]
+    began = pd.Series([55.7, 37.5, 150.0, 30.0, -20.0, 0.0, 3.0, -5.0, 77.0], states)
+    increments = other.compute_increments_from_imu(imu, "increment")
+    other.Integrator(began, with_altitude=False).integrate(increments.iloc[:100])
+    began_ns = time.process_time_ns()
+    for _ in range(count):
+        increments = other.compute_increments_from_imu(imu, "increment")
+        other.Integrator(began, with_altitude=False).integrate(increments)
+    return f"hours={count} ns={time.process_time_ns() - began_ns}"
+
+
+NAV_CASES: dict[str, Callable[[int], str]] = {
+    "kf-filterpy": filterpy,
+    "sins-plan": sins_plan,
+    "strapdown": strapdown_hours,
+    "strapdown-python-ins": python_ins_hours,
+}
