@@ -43,6 +43,12 @@ def test_a_watched_board_sends_what_an_unwatched_one_sends(cases_of_one_chain: t
     assert printed(core, cases_of_one_chain[0], FRAMES + 1)["hash"] != unwatched["hash"]
 
 
+@pytest.mark.parametrize("case", ["kf-joseph", "kf-ud", "kf-dense"])
+def test_filters_that_are_timed_end_with_the_same_covariance(case: str) -> None:
+    """The program compares, to 1e-9, and fails."""
+    assert printed(driver("bench_kf"), case, 10)["steps"] == "10"
+
+
 def test_a_watched_psd_1_reads_what_an_unwatched_one_reads() -> None:
     core = driver("bench_core")
     unwatched, cycle, watched = (printed(core, f"psd1-{case}", FRAMES) for case in ("unwatched", "cycle", "watched"))
