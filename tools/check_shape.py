@@ -163,8 +163,8 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 59_543, 59_543),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 60_745, 60_745),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_980, 1_980),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 60_748, 60_748),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 1_982, 1_982),
 }
 
 
