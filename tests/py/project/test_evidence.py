@@ -379,7 +379,7 @@ Not modelled: skew, delays (data are there, with CS).
 
 def test_a_stale_group_is_marked_on_the_page(tmp_path: Path) -> None:
     """In a copy: a changed model, an unchanged one."""
-    for name in ("docs", "proto", "tests", "emu", "scripts"):
+    for name in ("docs", "proto", "tests", "emu", "nav", "scripts"):
         ignore = shutil.ignore_patterns("__pycache__", "img", "*.vcd")
         shutil.copytree(ROOT / name, tmp_path / name, ignore=ignore)
     ledger = evidence.load(tmp_path)
