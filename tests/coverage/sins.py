@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -10,9 +11,11 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from psabench.bench import Bench
+from psabench.estimate.uncertainty import t_quantile
 from psabench.sins import calibration_run as sins_run
-from psabench.sins.calibration import T95, calibrate_unit
-from psabench.sins.calibration_run import CalibrationParams, Graded
+from psabench.sins.calibration import estimate_unit
+from psabench.sins.calibration_grade import Graded, grade_result, truth_of
+from psabench.sins.calibration_params import CalibrationParams, longest_cycle_s
 from psabench.sins.plan import read_plan
 from psabench.sins.table import attitudes, moves_of
 from psabench.sins.table_run import TableRun
@@ -33,14 +36,15 @@ def one_unit(seed: int, plan_name: str) -> tuple[dict[str, tuple[Graded, np.ndar
     began_s = time.monotonic()
     with Bench.start(sins_run.SCENARIO, seed=seed) as bench:
         data = TableRun(bench, list(moves_of(plan.turns, 3)), lambda: None).measure(True)
-        truth = sins_run.truth_of(bench)
+        truth = truth_of(bench)
     took_s = time.monotonic() - began_s
     start, found = attitudes(0.0, np.zeros((1, 3)))[0], {}
     for name, angles in (("with angles", data.stand(0.0)), ("without", None)):
-        cfg = p.config(data.increments.dt_s, angles is not None, sins_run.longest_cycle_s(plan))
-        result = calibrate_unit(cfg, start, data.increments, angles)
-        graded = sins_run.grade(result, truth)
-        found[name] = graded, graded.error / np.array([result.parameter(n).sd for n in graded.names])
+        cfg = p.config(data.increments.dt_s, angles is not None, longest_cycle_s(plan))
+        result = estimate_unit(cfg, start, data.increments, angles)
+        graded = grade_result(result, truth)
+        sd = {p.name: p.sd for p in result.parameters}
+        found[name] = graded, graded.error / np.array([sd[n] for n in graded.names])
     return found, took_s
 
 
@@ -65,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sizes = np.array([unit[0][name][1] for unit in done])
         squares = np.array([unit[0][name][0].chi_square for unit in done])
         total = stats.chi2.sf(squares.sum(), sizes.size)
-        inside = np.mean(np.abs(sizes) <= T95)
+        inside = np.mean(np.abs(sizes) <= t_quantile(math.inf))
         rms = np.sqrt(np.mean(sizes**2))
         print(f"| {name} | {100 * inside:.1f} % | {rms:.2f} | {squares.mean() / sizes.shape[1]:.2f} | {total:.2f} |")
     print(f"largest error/sd {max(np.abs(u[0][n][1]).max() for u in done for n in u[0]):.2f}")

@@ -10,15 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from psabench.errors import BadInput, expected
+from psabench.named_yaml import checked_number, read_named
 from psabench.native.sins import Turn
 from psabench.native.strapdown import ROW, Floats, State, Strapdown
-from psabench.places import proto_file
 from psabench.quartz.draws import draw_source
 from psabench.sins.outputs import Outputs, Point
 from psabench.sins.plan import RotationPlan, read_plan
@@ -81,30 +80,15 @@ LIMITS: Mapping[str, tuple[float, float]] = {
 
 
 def read_experiment(name: str) -> Experiment:
-    """Of this name (NAMED) or a YAML file with the fields of Experiment. Raises BadInput with the file and the
-    key."""
-    import yaml
-
-    path = proto_file(f"sins_experiments/{name}.yaml") if name in NAMED else Path(name)
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--experiment")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
-        raise BadInput(expected("an experiment in YAML", " ".join(str(e).split()), path)) from e
+    """Of this name (NAMED) or a YAML file with the fields of Experiment. Raises BadInput with the file and the key."""
+    found, path = read_named(name, NAMED, "sins_experiments", "--experiment", "an experiment")
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"plan"}:
         raise BadInput(expected(" ".join(["plan", *LIMITS]), str(found)[:80], path))
     plan = found.pop("plan", Experiment().plan)
-    numbers: dict[str, Any] = {k: _checked_number(v, k, path) for k, v in found.items()}
-    return Experiment(plan=str(plan), **numbers)
-
-
-def _checked_number(value: object, key: str, path: Path) -> float:
-    low, high = LIMITS[key]
-    whole = key == "seed"
-    if isinstance(value, bool) or not isinstance(value, int if whole else int | float) or not low <= value <= high:
-        raise BadInput(expected(f"{low:g} to {high:g}", value, f"{path}: {key}"))
-    return int(value) if whole else float(value)
+    numbers: dict[str, Any] = {k: checked_number(v, *LIMITS[k], f"{path}: {k}") for k, v in found.items()}
+    if not float(numbers.get("seed", 0)).is_integer():
+        raise BadInput(expected("a whole number", numbers["seed"], f"{path}: seed"))
+    return Experiment(plan=str(plan), **numbers | {k: int(v) for k, v in numbers.items() if k == "seed"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes as c
 import enum
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -239,21 +239,30 @@ def calibrate_unit(
     cfg.clone must be set for two passes: one pass without the stand claims less than its errors
     (docs/procedures/sins.md)."""
     s = Sins(cfg, c_nb, feedback=True)
-    _feed_data(s, dtheta_rad, dv_mps, stand)
+    feed_data(s, dtheta_rad, dv_mps, stand)
     first = s.state()
     for _ in range(passes - 1):
         s.again()
-        _feed_data(s, dtheta_rad, dv_mps, stand)
+        feed_data(s, dtheta_rad, dv_mps, stand)
     return Calibration(state=s.state(), first=first, covariance=s.covariance()[1], rows=s.rows)
 
 
-def _feed_data(s: Sins, dtheta: Floats, dv: Floats, stand: tuple[Floats, Floats] | None) -> None:
+def feed_data(
+    s: Sins,
+    dtheta: Floats,
+    dv: Floats,
+    stand: tuple[Floats, Floats] | None,
+    each_second: Callable[[], None] | None = None,
+) -> None:
     """All data through an estimator, the stand's angles before the increments that they are compared with."""
-    size = max(round(CHUNK_S / s.cfg.sample_s), 1) if stand else max(len(dtheta), 1)
+    in_parts = stand is not None or each_second is not None
+    size = max(round(CHUNK_S / s.cfg.sample_s), 1) if in_parts else max(len(dtheta), 1)
     for low, angles in _chunks_of(len(dtheta), size, s.cfg.sample_s, stand):
         for t_s, c_st in angles:
             s.stand(t_s, c_st)
         s.samples(low * s.cfg.sample_s, dtheta[low : low + size], dv[low : low + size])
+        if each_second:
+            each_second()
 
 
 def _chunks_of(

@@ -411,14 +411,16 @@ def _run_thermal(args: argparse.Namespace) -> int:
 def _calibrate_sins(args: argparse.Namespace) -> int:
     """Minutes on a table through the wire, or a recording of them."""
     from psabench.report.grading import aligned
-    from psabench.sins import calibration_run as sins_run
+    from psabench.sins import calibration_page
+    from psabench.sins.calibration_params import SinsOptions
+    from psabench.sins.calibration_run import run_calibration
 
-    done = sins_run.run_calibration(of_fields(sins_run.SinsOptions, args, params=_params(args)), Bar())
-    page = sins_run.write_page(args.out, done)
+    done = run_calibration(of_fields(SinsOptions, args, params=_params(args)), Bar())
+    page = calibration_page.write_page(args.out, done)
     if args.verbose:
-        print("\n".join(aligned(sins_run.table_rows(done))))
+        print("\n".join(aligned(calibration_page.table_rows(done))))
     print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
-    print(sins_run.verdict(done))
+    print(calibration_page.verdict_words(done))
     print(f"report: {page}")
     return 0 if done.within else 1
 
@@ -559,7 +561,7 @@ def _of_the_chamber() -> Parameters:
 
 
 def _of_the_sins() -> Parameters:
-    from psabench.sins.calibration_run import CalibrationParams
+    from psabench.sins.calibration_params import CalibrationParams
 
     return Parameters(fields=CalibrationParams.__dataclass_fields__)
 

@@ -73,7 +73,7 @@ def _check(args: argparse.Namespace) -> int:
     found = findings(data)
     print(f"{args.recording}: {len(data)} intervals of {data.dt_s:g} s, {len(found)} findings")
     for f in found:
-        print(f"  {f.what}")
+        print(f"  {f}")
     return 1 if found else 0
 
 

@@ -6,7 +6,6 @@ Sensors that stick or saturate, axes in another order, a unit that does not turn
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -29,16 +28,8 @@ LEAST_MPS2 = 1.0  # of a mean of one second
 LEAST_ROWS = 100
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """`refuse`: an estimate from this recording would be wrong; else it is worth a word."""
-
-    what: str
-    refuse: bool = True
-
-
-def findings(data: Increments) -> list[Finding]:
-    """Everything that is found, in the order of the list above."""
+def findings(data: Increments) -> list[str]:
+    """What makes an estimate from this recording wrong: a text each, none for a good one."""
     return [*_equal_values(data), *_no_turn(data), *_axes(data)]
 
 
@@ -48,7 +39,7 @@ def _runs(x: Floats) -> tuple[Ints, Ints]:
     return first.astype(np.int64), np.diff(np.append(first, len(x))).astype(np.int64)
 
 
-def _equal_values(data: Increments) -> list[Finding]:
+def _equal_values(data: Increments) -> list[str]:
     found = []
     for name, x in zip(CHANNELS, np.hstack([data.dtheta_rad, data.dv_mps]).T, strict=True):
         first, length = _runs(x)
@@ -59,12 +50,12 @@ def _equal_values(data: Increments) -> list[Finding]:
         if limited.any() and _differs(length[~extreme], len(x)):
             count, at_s = int(length[limited].sum()), data.end_s[first[limited][0]]
             what = f"{name} is at its limit for {count} intervals, the first at {at_s:.2f} s: saturated"
-            found.append(Finding(what=what))
+            found.append(what)
             continue
         k = int(length.argmax())
         if length[k] * data.dt_s >= STUCK_S and _differs(np.delete(length, k), len(x)):
             what = f"{name} sticks for {length[k] * data.dt_s:.2f} s from {data.end_s[first[k]]:.2f} s on"
-            found.append(Finding(what=what))
+            found.append(what)
     return found
 
 
@@ -73,15 +64,15 @@ def _differs(length: Ints, rows: int) -> bool:
     return len(length) >= max(NOISY * int(length.sum()), rows / 10)
 
 
-def _no_turn(data: Increments) -> list[Finding]:
+def _no_turn(data: Increments) -> list[str]:
     second = max(1, round(1.0 / data.dt_s))
     rows = len(data) // second * second
     if rows == 0:
-        return [Finding(what=f"the recording has {len(data) * data.dt_s:.2f} s: expected 1 s or more")]
+        return [f"the recording has {len(data) * data.dt_s:.2f} s: expected 1 s or more"]
     rate = np.linalg.norm(data.dtheta_rad[:rows].reshape(-1, second, 3).mean(axis=1), axis=1) / data.dt_s
     if rate.max() >= STILL_RADPS:
         return []
-    return [Finding(what=f"the unit does not turn: {np.degrees(rate.max()) * 3600:.0f} deg/h at most")]
+    return [f"the unit does not turn: {np.degrees(rate.max()) * 3600:.0f} deg/h at most"]
 
 
 def _product(turns: Rotation) -> Rotation:
@@ -112,7 +103,7 @@ def _attitudes(data: Increments) -> tuple[list[Rotation], Floats, Floats]:
     return found, np.array(turned), force
 
 
-def _axes(data: Increments) -> list[Finding]:
+def _axes(data: Increments) -> list[str]:
     """At rest on the Earth the specific force keeps its direction in space: axes in another order break it.
 
     Looked at turn by turn: a scale error of 1e-3 is 4.5 deg after a cycle of 4500 deg, and no fault.
@@ -121,7 +112,7 @@ def _axes(data: Increments) -> list[Finding]:
     if not at or max(x.magnitude() for x in at) < TURN_RAD:
         return []
     if np.linalg.norm(force, axis=1).min() < LEAST_MPS2:
-        return [Finding(what=f"the accelerometers show less than {LEAST_MPS2:g} m/s^2: no gravity")]
+        return [f"the accelerometers show less than {LEAST_MPS2:g} m/s^2: no gravity"]
     C = np.array([x.as_matrix() for x in at])
     turns = [np.flatnonzero(turned // WINDOW_RAD == k) for k in np.unique(turned // WINDOW_RAD)]
     error = {name: max(_wander_rad(C[k], force[k] @ matrix.T) for k in turns) for name, matrix in signed_axes()}
@@ -131,8 +122,8 @@ def _axes(data: Increments) -> list[Finding]:
         return []
     wander = f"the force wanders by {np.degrees(as_given):.0f} deg against the gyros' attitude"
     if error[best] > RIGHT_RAD:
-        return [Finding(what=f"{wander}: the unit does not rest on a table")]
-    return [Finding(what=f"{wander}: axes in another order; as {best} of the accelerometers they agree")]
+        return [f"{wander}: the unit does not rest on a table"]
+    return [f"{wander}: axes in another order; as {best} of the accelerometers they agree"]
 
 
 def _wander_rad(C: Floats, force: Floats) -> float:

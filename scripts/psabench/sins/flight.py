@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from psabench.errors import BadInput, expected
+from psabench.named_yaml import checked_number, read_named
 from psabench.native.nav_errors import Way
 from psabench.native.strapdown import Floats, dcm, gravity_mps2, radii_m
-from psabench.places import proto_file
 from psabench.sins.alignment import EARTH_RADPS
 
 NAMED = ("snake", "straight")  # of proto/flights
@@ -79,19 +78,11 @@ class Flight:
 
 def read_flight(name: str) -> Flight:
     """Of this name (NAMED) or a YAML file with the fields of Flight. Raises BadInput with the file and the key."""
-    import yaml
-
-    path = proto_file(f"flights/{name}.yaml") if name in NAMED else Path(name)
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--flight")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
-        raise BadInput(expected("a flight in YAML", " ".join(str(e).split()), path)) from e
+    found, path = read_named(name, NAMED, "flights", "--flight", "a flight")
     if not isinstance(found, dict) or set(found) - set(LIMITS) - {"axes"}:
         raise BadInput(expected(" ".join([*LIMITS, "axes"]), str(found)[:80], path))
     axes = _read_axes(found.pop("axes", "forward left up"), f"{path}: axes")
-    numbers = {key: _checked_number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
+    numbers = {key: checked_number(value, *LIMITS[key], f"{path}: {key}") for key, value in found.items()}
     return Flight(axes=axes, **numbers)
 
 
@@ -104,12 +95,6 @@ def _read_axes(value: object, where: str) -> tuple[str, str, str]:
     if np.linalg.det(np.array([ALONG[a] for a in axes])) < 0.5:
         raise BadInput(expected(want, value, where))
     return axes
-
-
-def _checked_number(value: object, low: float, high: float, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise BadInput(expected(f"{low:g} to {high:g}", value, where))
-    return float(value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

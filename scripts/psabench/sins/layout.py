@@ -25,10 +25,12 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.errors import BadInput, expected
+from psabench.named_yaml import read_yaml
+from psabench.procedures.run_table import G_MPS2
 
 Floats = npt.NDArray[np.float64]
 
-DEG, G_MPS2 = np.pi / 180.0, 9.80665  # standard gravity, CGPM 1901
+DEG = np.pi / 180.0
 # Unit: factor to rad or m/s, and whether it is of a rate, which an interval makes an increment.
 GYRO_UNITS: Mapping[str, tuple[float, bool]] = {
     "rad": (1.0, False),
@@ -113,14 +115,7 @@ def turn(axes: str) -> Floats:
 
 def read_layout(path: Path) -> Layout:
     """Raises BadInput with the file and the key."""
-    import yaml
-
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
-    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
-        raise BadInput(expected("a layout in YAML", " ".join(str(e).split())[:160], path)) from e
+    found = read_yaml(path, "a layout")
     try:
         return layout_of(found)
     except (TypeError, ValueError) as e:

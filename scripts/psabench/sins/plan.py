@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from psabench.errors import BadInput, expected
+from psabench.named_yaml import checked_number, read_named
 from psabench.native.nav import Floats
 from psabench.native.sins import DEG, Turn
-from psabench.places import proto_file
 
 NAMED = ("article", "two_rates", "secondary", "secondary_reversing")  # of proto/rotation_plans
 AXES: Mapping[str, tuple[float, float, float]] = {
@@ -57,15 +56,7 @@ class RotationPlan:
 
 def read_plan(name: str) -> RotationPlan:
     """Of this name (NAMED) or a YAML file. Raises BadInput with the file and the key."""
-    import yaml
-
-    path = proto_file(f"rotation_plans/{name}.yaml") if name in NAMED else Path(name)
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise BadInput(expected(f"{', '.join(NAMED)}, or a file", f"no file {name}", "--plan")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
-        raise BadInput(expected("a plan of rotations in YAML", " ".join(str(e).split()), path)) from e
+    found, path = read_named(name, NAMED, "rotation_plans", "--plan", "a plan of rotations")
     return plan_of_dict(found, str(path), path.stem)
 
 
@@ -79,7 +70,7 @@ def plan_of_dict(found: object, where: str, name: str = "") -> RotationPlan:
         raise BadInput(expected(f"a list of 1 to {MOST_TURNS}", turns, f"{where}: turns"))
     return RotationPlan(
         name=name,
-        axis_azimuth_deg=_checked_number(
+        axis_azimuth_deg=checked_number(
             found.get("axis_azimuth_deg", 0.0), -360.0, 360.0, f"{where}: axis_azimuth_deg"
         ),
         turns=tuple(_turn_of_dict(t, f"{where}: turns[{k}]") for k, t in enumerate(turns)),
@@ -95,16 +86,10 @@ def _turn_of_dict(found: Any, where: str) -> Turn:
         raise BadInput(expected("true or false", found["remount"], f"{where}: remount"))
     return Turn(
         axis_b=AXES[found["axis"]],
-        rate_radps=_checked_number(found["rate_degps"], -MOST_DEGPS, MOST_DEGPS, f"{where}: rate_degps") * DEG,
-        duration_s=_checked_number(found["for_s"], 0.0, MOST_S, f"{where}: for_s"),
+        rate_radps=checked_number(found["rate_degps"], -MOST_DEGPS, MOST_DEGPS, f"{where}: rate_degps") * DEG,
+        duration_s=checked_number(found["for_s"], 0.0, MOST_S, f"{where}: for_s"),
         remount=found.get("remount", False),
     )
-
-
-def _checked_number(value: object, low: float, high: float, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise BadInput(expected(f"{low:g} to {high:g}", value, where))
-    return float(value)
 
 
 def rates_of(turns: Sequence[Turn]) -> set[float]:

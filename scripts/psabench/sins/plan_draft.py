@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from psabench.sins.plan import RotationPlan, plan_of_dict
-from psabench.sins.table import AXES, rotations
+from psabench.sins.table import AXES, axis_directions
 
 GRID_S = 0.1  # of durations: a step of the filter
 LEAST_LEG_S = 5.0
@@ -105,9 +105,8 @@ def _turn_of(leg: Leg, quarters_at: Sequence[int], for_s: float, limits: Limits)
 
 
 def _along(axis: int, quarters_at: Sequence[int]) -> tuple[str, int]:
-    """Which axis of the instrument lies along this one of the table, and its sense (as sins.table has it)."""
-    about_2, about_3 = (rotations(k, np.array([-math.pi / 2 * quarters_at[k]]))[0] for k in (1, 2))
-    direction = (about_3 @ about_2[:, 0], about_3[:, 1], np.array([0.0, 0.0, 1.0]))[axis - 1]
+    """Which axis of the instrument lies along this one of the table, and its sense."""
+    direction = axis_directions(*(math.pi / 2 * quarters_at[k] for k in (1, 2)))[axis - 1]
     k = int(np.argmax(np.abs(direction)))
     return f"z{k + 1}", 1 if direction[k] > 0 else -1
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from psabench.errors import BadInput, expected
 from psabench.native.nav import Floats
@@ -20,24 +21,18 @@ PARALLEL = math.cos(math.radians(2.0))  # of a turn's axis and the table's
 AXES = 3
 
 
-def rotations(axis: int, angle_rad: Floats) -> Floats:
-    """(n, 3, 3): about x, y or z (0, 1, 2)."""
-    angle = np.atleast_1d(angle_rad)
-    c, s, out = np.cos(angle), np.sin(angle), np.zeros((len(angle), 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    out[:, axis, axis] = 1.0
-    out[:, i, i] = out[:, j, j] = c
-    out[:, i, j], out[:, j, i] = -s, s
-    return out
-
-
 def attitudes(azimuth_rad: float, angles_rad: Floats) -> Floats:
     """C_nb, (n, 3, 3), of angles (n, 3) of the axes; n is east, north, up."""
     to_enu = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # from north, east, down
-    found = to_enu @ rotations(2, np.array([azimuth_rad]))[0]
-    for axis in range(AXES):
-        found = found @ rotations(axis, angles_rad[:, axis])
-    return np.asarray(found)
+    to_table = to_enu @ Rotation.from_euler("z", azimuth_rad).as_matrix()
+    return np.asarray(to_table @ Rotation.from_euler("XYZ", angles_rad).as_matrix())
+
+
+def axis_directions(axis_2_rad: float, axis_3_rad: float) -> Floats:
+    """Rows: the table's axes 1, 2, 3 in the unit's axes b; they depend on the angles of the inner axes."""
+    c2, s2 = math.cos(axis_2_rad), math.sin(axis_2_rad)
+    c3, s3 = math.cos(axis_3_rad), math.sin(axis_3_rad)
+    return np.array([[c2 * c3, -c2 * s3, s2], [s3, c3, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,10 +60,7 @@ def moves_of(turns: Sequence[Turn], axes: int) -> Iterator[Move]:
 
 
 def _move_of(turn: Turn, at_rad: Floats, axes: int, number: int) -> Move:
-    """The axes of the table in b hang on the inner ones' angles."""
-    inner = rotations(2, -at_rad[2:])[0]
-    directions = (inner @ rotations(1, -at_rad[1:2])[0][:, 0], inner[:, 1], np.array([0.0, 0.0, 1.0]))
-    along = [float(np.dot(turn.axis_b, d)) for d in directions[:axes]]
+    along = axis_directions(at_rad[1], at_rad[2])[:axes] @ turn.axis_b
     best = int(np.argmax(np.abs(along)))
     if abs(along[best]) < PARALLEL:
         names = ", ".join(str(a + 1) for a in range(axes))

@@ -25,13 +25,11 @@ STAND_S = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableData:
-    """What a run has recorded. Times count from the beginning of the first interval."""
+    """What a run has recorded, from angles of zero on. Times count from the beginning of the first interval."""
 
     increments: Increments
     stand_s: Floats  # (m,) instants of the table's angles; none: a coarse table
     stand_deg: Floats  # (m, 3)
-    start_deg: Floats  # (3,) angles that were set at the start
-    end_of_moves_s: Floats
 
     def stand(self, azimuth_rad: float) -> tuple[Floats, Floats] | None:
         """Instants and rotations C_st."""
@@ -65,11 +63,9 @@ class TableRun:
         self._unit.start()
         self._bench.run_for(REST_S)
         self._logged_s = self._bench.time_s
-        ends = []
         for number, move in enumerate(self._moves, start=1):
             self._make(move, self._following(number))
             self._set_deg[move.axis - 1] += move.angle_deg
-            ends.append(self._bench.time_s)
             self._take()
             if stand:
                 self._read_log()
@@ -77,7 +73,7 @@ class TableRun:
         self._bench.run_for(REST_S)
         self._take()
         self._unit.stop()
-        return self.data(np.array(ends))
+        return self.data()
 
     def _following(self, number: int) -> Move | None:
         return self._moves[number] if number < len(self._moves) else None
@@ -110,9 +106,8 @@ class TableRun:
         bad = np.flatnonzero(~got.whole)
         if len(bad):
             at_s = got.end_s[bad[0]]
-            raise DeviceError(
-                "increments", 0, expected("whole readings", f"{len(bad)} that are not, first at {at_s:.2f} s")
-            )
+            got_bad = f"{len(bad)} that are not, first at {at_s:.2f} s"
+            raise DeviceError("increments", 0, expected("whole readings", got_bad))
         self._taken.append((got.end_s, got.dtheta_rad, got.dv_mps))
 
     def _read_log(self) -> None:
@@ -129,7 +124,7 @@ class TableRun:
         self._stand.append((at_s, angles))
         self._logged_s = float(at_s[-1]) + STAND_S / 2
 
-    def data(self, ends_s: Floats) -> TableData:
+    def data(self) -> TableData:
         """What has been recorded so far. Raises BenchError where there is nothing."""
         self._take()
         if not self._taken or self._weights is None:
@@ -139,13 +134,7 @@ class TableRun:
         zero_s = increments.end_s[0] - increments.dt_s
         at_s = np.concatenate([s for s, _ in self._stand]) if self._stand else np.empty(0)
         angles = np.concatenate([a for _, a in self._stand]) if self._stand else np.empty((0, AXES))
-        return TableData(
-            increments=increments,
-            stand_s=at_s - zero_s,
-            stand_deg=angles,
-            start_deg=np.zeros(AXES),
-            end_of_moves_s=ends_s - zero_s,
-        )
+        return TableData(increments=increments, stand_s=at_s - zero_s, stand_deg=angles)
 
     def _of_one_interval(self, i: Increments) -> Increments:
         """A unit that latches its gyros late says how old the velocity is (object 2221h:4): it is taken later."""

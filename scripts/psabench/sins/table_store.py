@@ -48,13 +48,7 @@ def read_angles(path: Path | None, increments: Increments) -> TableData:
     if len(moved) and not np.all(moved > 0.0):
         k = int(np.flatnonzero(moved <= 0.0)[0]) + 2
         raise BadInput(expected("times that ascend", f"{rows[k - 1, 0]:g} s in row {k}", path))
-    return TableData(
-        increments=increments,
-        stand_s=rows[:, 0] - zero_s,
-        stand_deg=rows[:, 1:],
-        start_deg=np.zeros(AXES),
-        end_of_moves_s=np.empty(0),
-    )
+    return TableData(increments=increments, stand_s=rows[:, 0] - zero_s, stand_deg=rows[:, 1:])
 
 
 def _read_rows(path: Path) -> np.ndarray:

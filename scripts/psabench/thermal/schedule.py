@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from psabench.errors import BadInput, expected
 from psabench.estimate.face import Face
-from psabench.places import proto_file
+from psabench.named_yaml import read_named
 from psabench.thermal.compensation import DEGREE, MOST_DEGREE
 
 Part = TypeVar("Part")
@@ -286,15 +285,7 @@ class _Plan:
 
 def read_schedule(name: str) -> Schedule:
     """Of this name (quick, full) or a YAML file. Raises BadInput with the file and the key."""
-    import yaml
-
-    path = proto_file(f"schedules/{name}.yaml") if name in NAMED else Path(name)
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise BadInput(expected(f"{' or '.join(NAMED)}, or a file", f"no file {name}", "--schedule")) from e
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
-        raise BadInput(expected("a schedule in YAML", " ".join(str(e).split()), path)) from e
+    found, path = read_named(name, NAMED, "schedules", "--schedule", "a schedule")
     return schedule_of_dict(found, str(path), path.stem)
 
 

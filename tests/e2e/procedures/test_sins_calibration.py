@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from psabench import cli
 from psabench.sins import calibration_run as sins_run
+from psabench.sins.calibration_params import SinsOptions
 
 pytestmark = pytest.mark.host
 
@@ -159,7 +160,7 @@ class Interrupted:
 
 
 def test_an_interrupted_run_keeps_what_it_measured(tmp_path: Path) -> None:
-    options = sins_run.SinsOptions(out=tmp_path / "a", params={"plan": str(plan(tmp_path))})
+    options = SinsOptions(out=tmp_path / "a", params={"plan": str(plan(tmp_path))})
     with pytest.raises(KeyboardInterrupt):
         sins_run.run_calibration(options, Interrupted())
     assert (tmp_path / "a/increments.bin").stat().st_size > 7000 * 56  # two turns of 36 s

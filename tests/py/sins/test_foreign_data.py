@@ -12,8 +12,8 @@ import pytest
 from psabench.native import sins
 from psabench.native.nav import Floats
 from psabench.native.sins import Calibration, Gauge, Params, SinsConfig
-from psabench.sins.calibration import SCALES, elements, value_of
 from psabench.sins.layout import read_layout
+from psabench.sins.parameters import SCALES, state_parameters, value_of
 from psabench.sins.readers import read_increments
 from recordings import recorded_file
 
@@ -80,7 +80,7 @@ def found() -> Calibration:
     return sins.calibrate_unit(CFG, start, data.dtheta_rad, data.dv_mps)
 
 
-PARAMETERS = elements(sins.state_layout(CFG), CFG)
+PARAMETERS = state_parameters(sins.state_layout(CFG), CFG)
 
 
 def test_all_errors_are_looked_at_but_the_three_that_the_gauge_sets_to_zero() -> None:

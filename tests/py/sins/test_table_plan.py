@@ -59,8 +59,6 @@ def recorded() -> TableData:
         increments=data,
         stand_s=np.array([0.1, 0.2, 0.3]),
         stand_deg=rng.normal(0, 90, (3, 3)),
-        start_deg=np.zeros(3),
-        end_of_moves_s=np.empty(0),
     )
 
 
