@@ -1,10 +1,9 @@
 #include "nav/errors/errors_model.hpp"
 
 #include "nav/common/nav_check.hpp"
-#include "nav/common/nav_math.hpp"
+#include "nav/common/nav_earth.hpp"
 
 constexpr double TURN_MAX_RAD = 0.5;                  /* in a step: the series below ends at 1e-6 of it */
-constexpr double LATITUDE_MAX_RAD = 89.9 * NAV_DEG;   /* as of the strapdown integration */
 constexpr int NOT_VERTICAL[] = {0, 1, 3, 4, 6, 7, 8}; /* of the nine moving states */
 constexpr int ALL_MOVING[] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
 
@@ -52,7 +51,7 @@ static int column_of(const struct nav_errors_cfg *cfg, int k)
 /* Mean of exp([w t x]) over the step. */
 static mat3 mean_turn(const vec3 &turn)
 {
-    const mat3 a = sins_cross(turn);
+    const mat3 a = nav_cross_matrix(turn);
     const mat3 a2 = a * a;
     return mat3::Identity() + 0.5 * a + a2 * (1.0 / 6.0) + a2 * a * (1.0 / 24.0) + a2 * a2 * (1.0 / 120.0);
 }
@@ -69,7 +68,7 @@ static int check_step(const struct nav_state *at, const vec3 &w_b, const vec3 &f
 {
     if (!is_fit(at, w_b, f_b)) return NAV_NOT_FINITE;
     if (!(dt_s > 0.0 && dt_s <= 10.0) || w_b.norm() * dt_s > TURN_MAX_RAD) return NAV_RANGE;
-    return std::fabs(at->lat_rad) <= LATITUDE_MAX_RAD ? NAV_OK : NAV_RANGE;
+    return std::fabs(at->lat_rad) <= EARTH_LATITUDE_MAX_RAD ? NAV_OK : NAV_RANGE;
 }
 
 /* Noise of one step: its walk in beta and dv. */
@@ -132,8 +131,9 @@ int nav_errors_alignment(const struct nav_errors_cfg *cfg, const struct nav_stat
     const int status = check_step(at, vec3::Zero(), vec3::Zero(), 1.0);
     if (status != NAV_OK) return status;
     const mat3 c = Eigen::Map<const mat3_rows>(at->C_nb);
-    const double g = nav_gravity_mps2(at->lat_rad, at->h_m);
-    const vec3 u = errors_earth(at->lat_rad);
+    const earth_place place = earth_place_at(at->lat_rad, at->h_m);
+    const double g = earth_gravity_mps2(place.sin_lat, at->h_m);
+    const vec3 u = earth_rate_n(place);
     const errors_drive d = errors_of_sensors(c, c.transpose() * u, c.transpose() * vec3(0.0, 0.0, g));
     for (int j = 0; j < 3 * n; j++) beta_rows[j] = 0.0;
     for (int j = rows[NAV_ERRORS_NU].offset; j < n; j++) {

@@ -17,6 +17,4 @@ errors_square errors_rates(const struct nav_errors_cfg *cfg, const struct nav_st
 /* G, with this mean of C over the step. */
 errors_drive errors_of_sensors(const mat3 &mean_c, const vec3 &w_b, const vec3 &f_b);
 
-vec3 errors_earth(double lat_rad); /* u */
-
 #endif

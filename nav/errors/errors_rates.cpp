@@ -1,7 +1,7 @@
 /* The equations of errors.h as matrices. */
 #include "nav/errors/errors_model.hpp"
 
-#include "nav/common/nav_math.hpp"
+#include "nav/common/nav_earth.hpp"
 
 namespace
 {
@@ -9,28 +9,19 @@ namespace
 enum { E, N, U };
 
 /* Where the unit is, with what its rates are made of. */
-struct Place {
-    double sin_lat, cos_lat, tan_lat;
-    double meridian_m, vertical_m;
+struct Place : earth_place {
+    double tan_lat;
     vec3 v;
 };
 
 Place place_of(const struct nav_errors_cfg *cfg, const struct nav_state *at)
 {
     Place p;
-    p.sin_lat = nav_sin(at->lat_rad);
-    p.cos_lat = nav_cos(at->lat_rad);
+    static_cast<earth_place &>(p) = earth_place_at(at->lat_rad, at->h_m);
     p.tan_lat = p.sin_lat / p.cos_lat;
-    nav_radii_m(at->lat_rad, at->h_m, &p.meridian_m, &p.vertical_m);
     p.v = vec3(at->v_n_mps);
     if (cfg->vertical == NAV_VERTICAL_FIXED) p.v(U) = 0.0;
     return p;
-}
-
-vec3 transport_rate(const Place &p)
-{
-    const double east = p.v(E) / p.vertical_m;
-    return {-p.v(N) / p.meridian_m, east, east * p.tan_lat};
 }
 
 mat3 place_rates(const Place &p, double damping_per_s)
@@ -84,27 +75,22 @@ mat3 gravity_by_place(const Place &p, double g)
 
 } // namespace
 
-vec3 errors_earth(double lat_rad)
-{
-    return NAV_EARTH_RADPS * vec3(0.0, nav_cos(lat_rad), nav_sin(lat_rad));
-}
-
 errors_square errors_rates(const struct nav_errors_cfg *cfg, const struct nav_state *at, const vec3 &f_n)
 {
     const Place p = place_of(cfg, at);
-    const vec3 u = errors_earth(at->lat_rad), rho = transport_rate(p);
-    const mat3 v = sins_cross(p.v);
+    const vec3 u = earth_rate_n(p), rho = earth_transport_n(p, p.v);
+    const mat3 v = nav_cross_matrix(p.v);
     const mat3 du = earth_by_place(p), rho_r = transport_by_place(p), rho_v = transport_by_velocity(p);
     errors_square a = errors_square::Zero();
     a.block<3, 3>(0, 0) = place_rates(p, cfg->damping_per_s);
     a.block<3, 3>(0, 3) = mat3::Identity();
-    a.block<3, 3>(3, 0) = v * (2.0 * du + rho_r) + gravity_by_place(p, nav_gravity_mps2(at->lat_rad, at->h_m));
+    a.block<3, 3>(3, 0) = v * (2.0 * du + rho_r) + gravity_by_place(p, earth_gravity_mps2(p.sin_lat, at->h_m));
     a(5, 2) -= cfg->damping_per_s2;
-    a.block<3, 3>(3, 3) = v * rho_v - sins_cross(2.0 * u + rho);
-    a.block<3, 3>(3, 6) = -sins_cross(f_n);
+    a.block<3, 3>(3, 3) = v * rho_v - nav_cross_matrix(2.0 * u + rho);
+    a.block<3, 3>(3, 6) = -nav_cross_matrix(f_n);
     a.block<3, 3>(6, 0) = -du - rho_r;
     a.block<3, 3>(6, 3) = -rho_v;
-    a.block<3, 3>(6, 6) = -sins_cross(u + rho);
+    a.block<3, 3>(6, 6) = -nav_cross_matrix(u + rho);
     return a;
 }
 

@@ -17,7 +17,7 @@ int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, c
     const mat3 c = Eigen::Map<const mat3_rows>(c_nb);
     if (n < 0) return n;
     if (!c.allFinite()) return NAV_NOT_FINITE;
-    if (!memory || bytes < sizeof(struct nav_sins) || !sins_is_rotation(c, 1e-6)) return NAV_RANGE;
+    if (!memory || bytes < sizeof(struct nav_sins) || !nav_is_rotation(c, 1e-6)) return NAV_RANGE;
     memset(memory, 0, sizeof(struct nav_sins));
     struct nav_sins *s = (struct nav_sins *)memory;
     s->cfg = *cfg;
@@ -26,10 +26,10 @@ int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, c
     s->dynamic = at[NAV_SINS_NU].offset;
     s->per_step = (int)nav_floor(cfg->step_s / cfg->sample_s + 0.5);
     s->feedback = feedback != 0;
-    s->c0 = s->c0_prior = sins_normal(c);
+    s->c0 = s->c0_prior = nav_nearest_rotation(c);
     s->gravity_n = vec3(0.0, 0.0, cfg->gravity_mps2);
     s->earth_n = NAV_EARTH_RADPS * vec3(0.0, nav_cos(cfg->latitude_rad), nav_sin(cfg->latitude_rad));
-    s->earth_turn = sins_exp(-s->earth_n * cfg->sample_s);
+    s->earth_turn = nav_rotation_by(-s->earth_n * cfg->sample_s);
     const int status = sins_reset(s);
     if (status == NAV_OK) *out = s;
     return status;
@@ -88,9 +88,9 @@ int nav_sins_get(const nav_sins *s, struct nav_sins_state *state)
     *state = s->found;
     state->params = s->model;
     sins_add_state(s, &state->params);
-    sins_store(sins_exp(-vec3(x[0], x[1], x[2])) * s->c, state->c_nb);
+    nav_store_rows(nav_rotation_by(-vec3(x[0], x[1], x[2])) * s->c, state->c_nb);
     const vec3 beta0 = s->cfg.clone ? vec3(start[0], start[1], start[2]) : vec3::Zero();
-    sins_store(sins_exp(-beta0) * s->c0, state->c0_nb);
+    nav_store_rows(nav_rotation_by(-beta0) * s->c0, state->c0_nb);
     return NAV_OK;
 }
 

@@ -32,14 +32,14 @@ int nav_sins_to_gauge(int gauge, struct nav_sins_params *p, double r_out[9])
     const struct sins_gauge *g = &sins_gauges[gauge];
     mat3 r = mat3::Identity();
     for (int turn = 0; g->count == 6 && turn < 6; turn++) { /* Newton's: the error is squared each time */
-        const mat3 back = sins_exp(find_turn(g, p->gamma));
+        const mat3 back = nav_rotation_by(find_turn(g, p->gamma));
         turn_rows(p->gamma, back);
         turn_rows(p->theta, back);
         r = back.transpose() * r;
     }
     for (int k = 0; g->count == 6 && k < 3; k++) p->gamma[g->dropped[k]] = 0.0;
     Eigen::Map<vec3> delta(p->delta_rad);
-    delta = sins_log(r * sins_exp(delta));
-    if (r_out) sins_store(r, r_out);
+    delta = nav_rotation_log(r * nav_rotation_by(delta));
+    if (r_out) nav_store_rows(r, r_out);
     return NAV_OK;
 }

@@ -2,14 +2,12 @@
 #ifndef PSABENCH_NAV_SINS_MODEL_HPP
 #define PSABENCH_NAV_SINS_MODEL_HPP
 
+#include "nav/common/nav_rotation.hpp"
 #include "nav/filter/kf_form.hpp"
 #include "nav/sins.h"
 
 #include <Eigen/Dense>
 
-using vec3 = Eigen::Vector3d;
-using mat3 = Eigen::Matrix3d;
-using mat3_rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using sens_drift = Eigen::Matrix<double, 3, 12>; /* of beta to nu and Theta, row-major */
 using sens_accel = Eigen::Matrix<double, 3, 25>; /* of z_a to df, Gamma, lever, q, delay */
 
@@ -71,15 +69,6 @@ struct nav_sins {
     struct nav_sins_state found; /* counts and last innovations */
     struct nav_kf kf;
 };
-
-/* ---- algebra */
-
-mat3 sins_cross(const vec3 &v);
-mat3 sins_exp(const vec3 &v);    /* rotation by v */
-vec3 sins_log(const mat3 &c);    /* below half a turn */
-mat3 sins_normal(const mat3 &c); /* the nearest rotation, of a matrix that is one nearly */
-bool sins_is_rotation(const mat3 &c, double within);
-void sins_store(const mat3 &c, double rows[9]);
 
 /* How far back the ring must reach: from the sample before the guard to the one after the filter's step. */
 double sins_kept_s(const struct nav_sins_cfg *cfg);

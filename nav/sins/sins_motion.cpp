@@ -13,7 +13,7 @@ void sins_use_model(struct nav_sins *s)
 /* What an accelerometer at r sees beside f, row i of [w x][w x] + [dw/dt x] times r_i, as a matrix: L(i, :) of accelerometer i. */
 static mat3 lever_rows(const vec3 &w, const vec3 &dw)
 {
-    return w * w.transpose() - w.squaredNorm() * mat3::Identity() + sins_cross(dw);
+    return w * w.transpose() - w.squaredNorm() * mat3::Identity() + nav_cross_matrix(dw);
 }
 
 /* Sensitivity of beta: integrals of C and of C w' over the sample, by the mean of its ends (docs/procedures/sins.md (2)). */
@@ -73,7 +73,7 @@ static vec3 without_quad(const struct nav_sins *s, const vec3 &dv)
 static vec3 without_delay(const struct nav_sins *s, const vec3 &dv, const vec3 &turn_rel)
 {
     if (s->model.delay_s == 0.0) return dv;
-    return sins_exp(-turn_rel * (s->model.delay_s / s->cfg.sample_s)) * dv;
+    return nav_rotation_by(-turn_rel * (s->model.delay_s / s->cfg.sample_s)) * dv;
 }
 
 void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv_raw)
@@ -88,7 +88,7 @@ void sins_take_sample(struct nav_sins *s, const vec3 &dtheta_raw, const vec3 &dv
     dv = without_quad(s, s->accel_back * dv);
 
     const vec3 turn = dtheta + s->dtheta_before.cross(dtheta) / 12.0; /* coning of two samples */
-    const mat3 after = s->earth_turn * (s->c * sins_exp(turn));
+    const mat3 after = s->earth_turn * (s->c * nav_rotation_by(turn));
     const mat3 middle = 0.5 * (s->c + after);
     const vec3 turn_rel = dtheta - middle.transpose() * s->earth_n * dt;
     add_drift(s, middle, dtheta);

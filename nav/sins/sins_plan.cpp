@@ -21,7 +21,7 @@ static int run_turn(struct nav_sins *s, const struct nav_sins_turn *turn)
 {
     const double dt = s->cfg.sample_s;
     const vec3 step = Eigen::Map<const vec3>(turn->axis_b) * (turn->rate_radps * dt);
-    const mat3 a = sins_cross(step);
+    const mat3 a = nav_cross_matrix(step);
     const mat3 mean = (mat3::Identity() - 0.5 * a + a * a / 6.0) * dt;
     for (int64_t k = samples_of(s, turn->duration_s); k > 0; k--) {
         const mat3 to_b = s->c.transpose();
@@ -42,7 +42,7 @@ static int run_turn(struct nav_sins *s, const struct nav_sins_turn *turn)
 static int run_remount(struct nav_sins *s, const struct nav_sins_turn *turn)
 {
     const double angle = turn->rate_radps * turn->duration_s;
-    s->c = s->c * sins_exp(vec3(Eigen::Map<const vec3>(turn->axis_b) * angle));
+    s->c = s->c * nav_rotation_by(vec3(Eigen::Map<const vec3>(turn->axis_b) * angle));
     s->carry.drift.setZero();
     s->carry.time_s = 0.0;
     s->pending_first = s->pending_count = 0;

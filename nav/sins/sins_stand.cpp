@@ -22,7 +22,7 @@ static vec3 mean_rate(const struct nav_sins *s, double from_s, double to_s)
     const struct sins_ring_entry *a = sample_at(s, from_s);
     const struct sins_ring_entry *b = sample_at(s, to_s);
     if (!a || !b || b->t_s <= a->t_s) return vec3::Constant(NAV_NAN);
-    return sins_log(a->c.transpose() * b->c) / (b->t_s - a->t_s);
+    return nav_rotation_log(a->c.transpose() * b->c) / (b->t_s - a->t_s);
 }
 
 /* Rates before and after agree: no change within the guard. */
@@ -41,12 +41,12 @@ static vec3 set_rows(struct nav_sins *s, const struct sins_angle *angle, double 
 {
     const int n = s->n;
     const struct sins_ring_entry *at = sample_at(s, t_s);
-    const mat3 c = at->c * sins_exp(-at->w_rel_b * (at->t_s - t_s));
+    const mat3 c = at->c * nav_rotation_by(-at->w_rel_b * (at->t_s - t_s));
     const vec3 delta = Eigen::Map<const vec3>(s->model.delta_rad);
     const vec3 eps = Eigen::Map<const vec3>(s->model.eps_rad);
-    const mat3 to_delta = -c * (mat3::Identity() + 0.5 * sins_cross(delta));
+    const mat3 to_delta = -c * (mat3::Identity() + 0.5 * nav_cross_matrix(delta));
     const vec3 to_tau = -c * at->w_rel_b;
-    const mat3 between = -lag_s * c * sins_exp(0.5 * lag_s * at->w_rel_b);
+    const mat3 between = -lag_s * c * nav_rotation_by(0.5 * lag_s * at->w_rel_b);
     const vec3 w = at->w_rel_b + c.transpose() * s->earth_n;
     memset(s->h + 3 * n, 0, sizeof *s->h * (size_t)(3 * n));
     for (int i = 0; i < 3; i++) {
@@ -60,7 +60,7 @@ static vec3 set_rows(struct nav_sins *s, const struct sins_angle *angle, double 
         }
         row[s->at[NAV_SINS_TAU].offset] = to_tau(i);
     }
-    return sins_log(c * sins_exp(delta) * angle->c_st.transpose() * sins_exp(eps));
+    return nav_rotation_log(c * nav_rotation_by(delta) * angle->c_st.transpose() * nav_rotation_by(eps));
 }
 
 static double trace_of(const struct nav_sins *s, int block)
@@ -119,7 +119,7 @@ int nav_sins_stand(nav_sins *s, double t_s, const double c_st[9])
     const mat3 c = Eigen::Map<const mat3_rows>(c_st);
     if (!s->cfg.stand || s->pending_count == SINS_PENDING) return NAV_RANGE;
     if (!std::isfinite(t_s) || !c.allFinite()) return NAV_NOT_FINITE;
-    if (!sins_is_rotation(c, 1e-6)) return NAV_RANGE;
+    if (!nav_is_rotation(c, 1e-6)) return NAV_RANGE;
     const int last = (s->pending_first + s->pending_count + SINS_PENDING - 1) % SINS_PENDING;
     if (s->pending_count > 0 && t_s <= s->pending[last].t_s) return NAV_TIMES;
     s->pending[(s->pending_first + s->pending_count) % SINS_PENDING] = {t_s, c};

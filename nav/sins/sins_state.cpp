@@ -58,10 +58,10 @@ void sins_feed_back(struct nav_sins *s)
     const double *start = x + s->at[NAV_SINS_BETA0].offset;
     sins_add_state(s, &s->model);
     sins_use_model(s);
-    const mat3 back = sins_exp(-vec3(x[0], x[1], x[2]));
+    const mat3 back = nav_rotation_by(-vec3(x[0], x[1], x[2]));
     s->c = back * s->c;
     if (s->cfg.stand) turn_ring(s, back);
-    if (s->cfg.clone) s->c0 = sins_exp(-vec3(start[0], start[1], start[2])) * s->c0;
+    if (s->cfg.clone) s->c0 = nav_rotation_by(-vec3(start[0], start[1], start[2])) * s->c0;
     for (int i = 0; i < s->n; i++)
         if (i < 3 || i >= s->dynamic) x[i] = 0.0;
 }
@@ -69,7 +69,7 @@ void sins_feed_back(struct nav_sins *s)
 /* The prior's mean seen from the model: of the attitude it is c0 against c0_prior, of the parameters less the model's. */
 static void set_mean(struct nav_sins *s, double *x)
 {
-    const vec3 beta = sins_log(s->c0 * s->c0_prior.transpose());
+    const vec3 beta = nav_rotation_log(s->c0 * s->c0_prior.transpose());
     for (int k = 0; k < 3; k++) {
         x[k] = beta(k);
         if (s->cfg.clone) x[s->at[NAV_SINS_BETA0].offset + k] = beta(k);

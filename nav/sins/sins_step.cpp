@@ -19,7 +19,7 @@ static bool has_block(const struct nav_sins *s, int block)
 static void set_phi(struct nav_sins *s, const struct sins_span *span)
 {
     const int n = s->n;
-    const mat3 turn = mat3::Identity() - sins_cross(s->earth_n) * span->time_s;
+    const mat3 turn = mat3::Identity() - nav_cross_matrix(s->earth_n) * span->time_s;
     memset(s->phi, 0, sizeof s->phi);
     for (int i = 0; i < 3; i++) {
         double *row = s->phi + i * n;
@@ -109,7 +109,7 @@ int sins_finish_step(struct nav_sins *s)
     if (status == NAV_OK && s->cfg.stand) status = sins_take_angles(s, s->found.t_s);
     s->carry = s->now;
     clear_sums(s);
-    s->c = sins_normal(s->c);
+    s->c = nav_nearest_rotation(s->c);
     s->steps++;
     if (status == NAV_OK && s->feedback) sins_feed_back(s);
     return status;
