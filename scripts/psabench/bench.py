@@ -36,7 +36,7 @@ from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table
 from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
 from psabench.link.control import Control, Reply
 from psabench.link.endpoints import FIRST, emulator_buses, emulator_endpoints, opening_order, scpi_addresses
-from psabench.probe import Probe
+from psabench.link.probe import Probe
 from psabench.report import provenance
 
 NS = 1_000_000_000

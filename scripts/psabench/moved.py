@@ -20,6 +20,7 @@ NAMES = {
     "canopen_host": "link.canopen_host",
     "control": "link.control",
     "lineport": "link.lineport",
+    "probe": "link.probe",
     "protocol_files": "link.protocol_files",
     "signals": "link.signals",
     "vcd": "link.vcd",

@@ -16,7 +16,7 @@ def read_yaml(path: Path, what: str) -> object:
     try:
         return yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError as e:
-        raise BadInput(f"{path}: no such file") from e
+        raise BadInput(expected(f"{what} in YAML", "no file", path)) from e
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
         raise BadInput(expected(f"{what} in YAML", " ".join(str(e).split())[:160], path)) from e
 

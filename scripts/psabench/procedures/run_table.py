@@ -15,6 +15,7 @@ ON_THE_PLATFORM: Mapping[str, str] = {
     "improved one",
     "heading-hold": "gyrocompassing, then heading kept for hours with the drifts compensated",
 }
+ALL = "all"  # those of the head, each on each bench
 COMPARE = (
     "compare-converters",
     "one motion to every generation of converters: resolution, noise, drift, velocity error",

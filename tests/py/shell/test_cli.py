@@ -18,6 +18,7 @@ from psabench.link import lineport, log_file, record_command
 from psabench.link.protocol_files import dbc_node
 from psabench.procedures import command as run_command
 from psabench.procedures import compare_converters, gyro_params, run_table
+from psabench.procedures.command_table import COMMANDS
 from psabench.procedures.registry import PROCEDURES
 
 from tests.py.link.test_lineport import lines
@@ -191,17 +192,17 @@ def test_help_of_run_names_each_procedure_and_no_option_of_any(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told = help_of("run", capsys, monkeypatch)
-    for c in run_command.COMMANDS.values():
+    for c in COMMANDS.values():
         assert re.search(rf"^  {c.name} +{re.escape(' '.join(c.summary.split()[:6]))}", told, re.MULTILINE)
     assert re.search(r"^  script +lines of the shell", told, re.MULTILINE)
     assert set(re.findall(r"^  .*?(--[a-z-]+)", told, re.MULTILINE)) == {"--help", "--list"}
 
 
-@pytest.mark.parametrize("name", list(run_command.COMMANDS))
+@pytest.mark.parametrize("name", list(COMMANDS))
 def test_help_of_a_procedure_is_of_its_own_options_with_unit_and_default(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    command = run_command.COMMANDS[name]
+    command = COMMANDS[name]
     told = help_of(f"run {name}", capsys, monkeypatch)
     shown = re.findall(r"^  (?:-v, )?(--[a-z0-9-]+)", told, re.MULTILINE)
     own = [f"--{f.replace('_', '-')}" for f in command.parameters.fields]
@@ -227,7 +228,7 @@ def test_defaults_of_another_reading_and_of_another_procedure_are_told(
     assert "readings at each position (1; turns 16)" in help_of("run all", capsys, monkeypatch)
 
 
-@pytest.mark.parametrize("name", [*run_command.COMMANDS, "script"])
+@pytest.mark.parametrize("name", [*COMMANDS, "script"])
 def test_every_example_of_a_help_is_understood(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -267,8 +268,8 @@ def test_the_procedure_may_stand_anywhere_among_its_options(typed: str, name: st
 def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(":")[0] for line in lines[::2]] == list(run_command.COMMANDS)
-    for line, c in zip(lines[1::2], run_command.COMMANDS.values(), strict=True):
+    assert [line.partition(":")[0] for line in lines[::2]] == list(COMMANDS)
+    for line, c in zip(lines[1::2], COMMANDS.values(), strict=True):
         assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.parameters.fields), *c.common]
 
 

@@ -1,0 +1,185 @@
+"""What each procedure of `psabench run` does with its options: run, write the report, print the verdict.
+
+Returns the exit status.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from psabench.options import of_fields
+from psabench.procedures.run_table import ALL, CONDITIONS
+from psabench.progress import Bar
+
+if TYPE_CHECKING:
+    from psabench.estimate.uncertainty import Estimate
+    from psabench.procedures.head_bench import Progress
+
+
+def _params(args: argparse.Namespace) -> dict[str, Any]:
+    """The parameters that were given."""
+    return {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
+
+
+def run_on_head(args: argparse.Namespace) -> int:
+    from psabench.procedures import run
+    from psabench.procedures.registry import PROCEDURES
+    from psabench.report import calibration as report
+    from psabench.report import grading
+    from psabench.report.nominal import console_nominal
+
+    options = of_fields(
+        run.RunOptions,
+        args,
+        procedures=list(PROCEDURES) if args.procedure == ALL else [args.procedure],
+        conditions=list(CONDITIONS) if args.condition == "both" else [args.condition],
+        g_mps2=args.gravity,
+        params=_params(args),
+    )
+    with progress_of(args) as followers:
+        page, sections, nominal = run.run(options, followers.progress)
+        for s in sections:
+            followers.result(s.result.procedure, s.label, s.result.estimates, report.within_limits([s]))
+    if args.verbose:
+        for section in sections:
+            print(report.console_table(section))
+        print(console_nominal(sections, nominal), end="")
+    print(grading.verdict(sections))
+    print(f"report: {page}")
+    return 0 if report.within_limits(sections) else 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Followers:
+    """Of a run: each step, each result."""
+
+    progress: Progress
+    result: Callable[[str, str, Sequence[Estimate], bool], None]
+
+
+@contextmanager
+def progress_of(args: argparse.Namespace) -> Iterator[Followers]:
+    """A bar, and LCM where --lcm asks for it."""
+    if args.lcm is None:
+        yield Followers(progress=Bar(), result=lambda *_: None)
+        return
+    from psabench.lcm.channel import publisher
+    from psabench.lcm.progress import LcmProgress, publish_result
+
+    with publisher(args.lcm) as out:
+        yield Followers(progress=LcmProgress(out, args.procedure, Bar()), result=partial(publish_result, out))
+
+
+def compare_units(args: argparse.Namespace) -> int:
+    """Its units stand on one bench, their motion in the scenario: it starts an emulator and takes no addresses."""
+    from psabench.logs.call_log import refuse_beside_replay
+    from psabench.procedures import compare_converters, comparison
+    from psabench.report import comparison_page
+
+    p = compare_converters.CompareParams()
+    if args.replay:
+        refuse_beside_replay({"--record": args.record, "--scenario": args.scenario, "--seed": args.seed})
+        c = comparison.replay_comparison(args.out, p, Bar(), args.replay)
+    else:
+        c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed, record=args.record)
+    page = comparison_page.write(args.out, c)
+    if args.verbose:
+        print(comparison.console_table(c))
+    print(comparison.verdict(c))
+    print(f"report: {page}")
+    return 0 if c.within else 1
+
+
+def run_on_platform(args: argparse.Namespace) -> int:
+    """Its platform is a unit on the bus: no dividing head, no volts to average."""
+    from psabench.procedures import gyro_run
+    from psabench.report import gyro_grading, gyro_page
+
+    options = of_fields(gyro_run.GyroOptions, args, params=_params(args))
+    with progress_of(args) as followers:
+        sections = gyro_run.run(options, followers.progress)
+        for s in sections:
+            followers.result(options.procedure, s.label, s.result.estimates, gyro_grading.within_limits([s]))
+    page = gyro_page.write(args.out, sections, gyro_run.facts(options))
+    if args.verbose:
+        for section in sections:
+            print(gyro_grading.console_table(section))
+    else:
+        for section in sections:
+            print("".join(f"DOUBT: {section.label}: {d}\n" for d in gyro_grading.doubts(section)), end="")
+    print(gyro_grading.verdict(sections))
+    print(f"report: {page}")
+    return 0 if gyro_grading.within_limits(sections) else 1
+
+
+def run_in_chamber(args: argparse.Namespace) -> int:
+    """Hours in a chamber: what it records is kept as it comes, and it can be resumed."""
+    from psabench.report import thermal_grading, thermal_page
+    from psabench.thermal import run as thermal_run
+
+    options = of_fields(thermal_run.ThermalOptions, args, params=_params(args))
+    with thermal_run.run_thermal(options, Bar()) as done:
+        truth = thermal_grading.read_truth(done.folder, done.result.recordings)
+        report = thermal_grading.graded_report(done.result, truth, done.facts)
+        page = thermal_page.write_page(done.folder.path, report)
+    if args.verbose:
+        print(thermal_grading.console_lines(report))
+    print(thermal_grading.state_verdict(report))
+    print(f"report: {page}")
+    return 0 if thermal_grading.within_limits(report) else 1
+
+
+def calibrate_sins(args: argparse.Namespace) -> int:
+    """Minutes on a table through the wire, or a recording of them."""
+    from psabench.report.grading import aligned
+    from psabench.sins import calibration_page
+    from psabench.sins.calibration_params import SinsOptions
+    from psabench.sins.calibration_run import run_calibration
+
+    done = run_calibration(of_fields(SinsOptions, args, params=_params(args)), Bar())
+    page = calibration_page.write_page(args.out, done)
+    if args.verbose:
+        print("\n".join(aligned(calibration_page.table_rows(done))))
+    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
+    print(calibration_page.verdict_words(done))
+    print(f"report: {page}")
+    return 0 if done.within else 1
+
+
+def predict_sins(args: argparse.Namespace) -> int:
+    """A covariance: no bench, no data."""
+    from psabench.procedures.result import made_params
+    from psabench.sins import covariance_run
+
+    study = covariance_run.run_study(made_params(covariance_run.CovarianceParams, args.procedure, _params(args)))
+    print(covariance_run.console_lines(study))
+    print(f"report: {covariance_run.write_page(args.out, study)}")
+    return 0
+
+
+def fly_snake(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import snake, snake_page
+
+    found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, _params(args)))
+    print("\n".join(snake_page.console_lines(found)))
+    print(snake_page.verdict_words(found))
+    print(f"report: {snake_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0
+
+
+def calibrate_secondary(args: argparse.Namespace) -> int:
+    from psabench.procedures.result import made_params
+    from psabench.sins import secondary_page, secondary_run
+
+    params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
+    found = secondary_run.run_secondary(params, args.first, args.second)
+    print("\n".join(secondary_page.console_lines(found)))
+    print(secondary_page.verdict_words(found))
+    print(f"report: {secondary_page.write_page(args.out, found)}")
+    return 1 if found.within is False else 0

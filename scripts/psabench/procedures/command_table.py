@@ -1,0 +1,256 @@
+"""The procedures of `psabench run`: of each its options, handler, parameters, examples."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Any
+
+from psabench.options import KEPT
+from psabench.procedures import command_handlers
+from psabench.procedures.command_options import COMMON, FROM_OUTPUTS, ON_THE_TABLE
+from psabench.procedures.run_table import (
+    ALL,
+    COMPARE,
+    CONDITIONS,
+    COVARIANCE,
+    ON_THE_HEAD,
+    ON_THE_PLATFORM,
+    SECONDARY,
+    SINS,
+    SNAKE,
+    THERMAL,
+)
+
+NOTES_HEAD = """
+Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings so far stay
+in OUT/PROCEDURE-CONDITION.csv. Exit status 1: a result is off by more than its limits.
+"""
+
+NOTES_PLATFORM = """
+Without --can or --control an emulator is started for each reading, with the scenario gyrocompass. Exit status 1:
+a result is off by more than its limits, or is doubtful; the reason is printed.
+"""
+
+NOTES_CHAMBER = """
+Without --head, --chamber or --control an emulator is started, with the scenario quartz_run_in, whose chain and head
+are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit status 1: a compensation is off the true
+outputs by more than its limits.
+"""
+
+NOTES_OUTPUTS = """
+Exit status 1: a figure is out of its limits. docs/procedures/sins_secondary.md derives the method.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameters:
+    """Of a procedure."""
+
+    fields: Mapping[str, Any] = field(default_factory=dict)  # of its parameters' dataclasses
+    defaults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # others for its fields, by who has them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A procedure as the command line has it."""
+
+    name: str
+    summary: str
+    handler: Callable[[argparse.Namespace], int]
+    common: Sequence[str]  # of COMMON
+    load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
+    examples: str
+    notes: str = ""
+    kept: str = ""  # when it is interrupted
+
+    @cached_property
+    def parameters(self) -> Parameters:
+        return self.load()
+
+
+# What each takes of COMMON.
+_STARTED = ("--scenario", "--seed", "--record", "--replay", "--out", "--verbose")
+_PLATFORM = (
+    *("--can", "--control", "--truth", "--scenario", "--seed", "--real-time"),
+    *("--record", "--replay", "--out", "--lcm", "--verbose"),
+)
+_HEAD = tuple(COMMON)
+_TABLE = ("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose")
+_CHAMBER = (
+    *("--schedule", "--resume", "--can", "--head", "--chamber", "--control", "--truth", "--scenario", "--node"),
+    *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
+)
+
+_EXAMPLES: Mapping[str, str] = {
+    "turns": """\
+  psabench run turns
+  psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
+""",
+    "fourier": """\
+  psabench run fourier
+  psabench run fourier --scenario my.yaml --average 32
+""",
+    "reversal": """\
+  psabench run reversal
+  psabench run reversal --condition quiet --realisations 2   a shorter one, without noise
+""",
+    ALL: """\
+  psabench run all             quiet and realistic, on emulators started for it
+  psabench run all --condition quiet --realisations 2
+""",
+    COMPARE[0]: """\
+  psabench run compare-converters --out build/run/converters
+""",
+    "gyrocompass": """\
+  psabench run gyrocompass                                   the article's way and a better one
+  psabench run gyrocompass --reading article --sequence 0,120,240 --window-s 20
+  psabench run gyrocompass --scenario my.yaml --latitude-deg 60   a scenario of yours, at its latitude
+  psabench run gyrocompass --can slcan:/dev/ttyACM0 --latitude-deg 50.45   the platform on this bus
+""",
+    "heading-hold": """\
+  psabench run heading-hold
+  psabench run heading-hold --reading improved --hours 4 --speed-kmh 500 --track-deg 90   in flight to the east
+""",
+    THERMAL[0]: """\
+  psabench run thermal                       a quick look, on an emulator started for it
+  psabench run thermal --schedule full --out build/run/qa-0001
+  psabench run thermal --resume build/run/qa-0001
+""",
+    SINS[0]: """\
+  psabench run sins-calibration                     the article's plan on an emulated precise table, 45 minutes
+  psabench run sins-calibration --stand no          on a coarse table, which shows no angles
+  psabench run sins-calibration --data build/run/increments.bin --layout build/run/increments.yaml --stand no
+  psabench nav apply run.csv --calibration build/run/result.json --out corrected.csv
+""",
+    SECONDARY[0]: """\
+  psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
+  psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+""",
+    SNAKE[0]: """\
+  psabench run sins-snake
+  psabench run sins-snake --flight my_flight.yaml --plan two_rates
+""",
+    COVARIANCE[0]: """\
+  psabench run sins-covariance                                the article's two tables in every reading of its noise
+  psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
+  psabench run sins-covariance --plan two_rates --lever 3     lever arms of the accelerometers
+""",
+}
+
+
+def _of_the_head(name: str) -> Parameters:
+    from psabench.budget.accuracy import EXACT, BenchAccuracy
+    from psabench.procedures.registry import PROCEDURES
+
+    fields = {**PROCEDURES[name].params.__dataclass_fields__, **BenchAccuracy.__dataclass_fields__}
+    return Parameters(fields=fields, defaults={c.label: EXACT for c in CONDITIONS.values() if c.exact})
+
+
+def _of_all() -> Parameters:
+    from psabench.budget.accuracy import EXACT
+
+    each = {name: _of_the_head(name).fields for name in ON_THE_HEAD}
+    return Parameters(
+        fields={name: f for fields in each.values() for name, f in fields.items()},
+        defaults={label: {name: f.default for name, f in fields.items()} for label, fields in each.items()}
+        | {c.label: EXACT for c in CONDITIONS.values() if c.exact},
+    )
+
+
+def _of_the_platform(name: str) -> Parameters:
+    from psabench.procedures import gyro_params, gyrocompass_params
+
+    return Parameters(fields=gyro_params.fields_of(name), defaults=gyrocompass_params.READINGS)
+
+
+def _of_the_chamber() -> Parameters:
+    from psabench.budget.accuracy import BenchAccuracy
+
+    # How far the board is from 25 degC is the run's own matter.
+    return Parameters(fields={k: f for k, f in BenchAccuracy.__dataclass_fields__.items() if k != "chain_off_k"})
+
+
+def _of_the_sins() -> Parameters:
+    from psabench.sins.calibration_params import CalibrationParams
+
+    return Parameters(fields=CalibrationParams.__dataclass_fields__)
+
+
+def _of_the_covariance() -> Parameters:
+    from psabench.sins.covariance_run import CovarianceParams
+
+    return Parameters(fields=CovarianceParams.__dataclass_fields__)
+
+
+def _of_outputs(name: str) -> Parameters:
+    from psabench.sins import secondary_run, snake
+
+    kind: type[Any] = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
+    return Parameters(fields=kind.__dataclass_fields__)
+
+
+def _command(offered: tuple[str, str], handler: Callable[[argparse.Namespace], int], **how: Any) -> Command:
+    name, summary = offered
+    return Command(name=name, summary=summary, handler=handler, examples=_EXAMPLES[name], **how)
+
+
+def _on_the_head() -> Iterator[Command]:
+    every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
+    for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
+        load = _of_all if name == ALL else partial(_of_the_head, name)
+        how = {"common": _HEAD, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
+        yield _command((name, summary), command_handlers.run_on_head, **how)
+
+
+def _on_the_platform() -> Iterator[Command]:
+    for name, summary in ON_THE_PLATFORM.items():
+        how = {"common": _PLATFORM, "load": partial(_of_the_platform, name), "notes": NOTES_PLATFORM}
+        yield _command((name, summary), command_handlers.run_on_platform, **how)
+
+
+_THERMAL = _command(
+    THERMAL,
+    command_handlers.run_in_chamber,
+    common=_CHAMBER,
+    load=_of_the_chamber,
+    notes=NOTES_CHAMBER,
+    kept=f"{KEPT}; --resume continues the run",
+)
+_SINS = (
+    _command(
+        SINS,
+        command_handlers.calibrate_sins,
+        common=_TABLE,
+        load=_of_the_sins,
+        kept="what was measured is in OUT",
+    ),
+    _command(COVARIANCE, command_handlers.predict_sins, common=("--out",), load=_of_the_covariance),
+    _command(
+        SNAKE,
+        command_handlers.fly_snake,
+        common=("--out",),
+        load=partial(_of_outputs, SNAKE[0]),
+        notes=NOTES_OUTPUTS,
+    ),
+    _command(
+        SECONDARY,
+        command_handlers.calibrate_secondary,
+        common=(*FROM_OUTPUTS, "--out"),
+        load=partial(_of_outputs, SECONDARY[0]),
+        notes=NOTES_OUTPUTS,
+    ),
+)
+
+COMMANDS: Mapping[str, Command] = {
+    c.name: c
+    for c in (
+        *_on_the_head(),
+        _command(COMPARE, command_handlers.compare_units, common=_STARTED),
+        *_SINS,
+        _THERMAL,
+        *_on_the_platform(),
+    )
+}
