@@ -18,7 +18,7 @@ from psabench.report import provenance
 # Module and help line of each command. The module and its libraries are loaded when the command is called (`parse`).
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "run": (
-        "procedures.command",
+        "procedures.command_line.parser",
         "run a calibration or gyrocompassing procedure and report it; psabench run --help lists them",
     ),
     "record": ("link.record_command", "record the CAN bus to a log file"),

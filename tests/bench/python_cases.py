@@ -229,9 +229,9 @@ def fourier(count: int) -> str:
     """`count` positions of `run fourier` on the realistic bench: bench time and real time, host and emulator."""
     from psabench.bench import Bench
     from psabench.estimate.face import Face
+    from psabench.procedures.command_line.offered import CONDITIONS
     from psabench.procedures.fourier import FourierParams
     from psabench.procedures.head_bench import Watch
-    from psabench.procedures.run_table import CONDITIONS
     from psabench.procedures.series import measure_face
     from psabench.procedures.wire_bench import WireBench
 

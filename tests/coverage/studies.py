@@ -12,11 +12,11 @@ import numpy as np
 import yaml
 from psabench.places import proto_file
 from psabench.procedures import comparison, gyro_run, heading_hold, run
+from psabench.procedures.command_line.offered import CONDITIONS
 from psabench.procedures.compare_converters import CompareParams
 from psabench.procedures.gyrocompass_params import GyrocompassParams
 from psabench.procedures.head_bench import Silent
 from psabench.procedures.registry import PROCEDURES
-from psabench.procedures.run_table import CONDITIONS
 from psabench.report import grading, gyro_grading
 from psabench.report.gyro_grading import GyroSection
 

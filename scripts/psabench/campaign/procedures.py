@@ -15,7 +15,7 @@ CAMPAIGNS: Mapping[str, tuple[str, str]] = {
         "quartz.deformation_command",
         "deformation of a quartz accelerometer's sensing element over temperature, with tolerances",
     ),
-    "sins-plan": ("sins.plan_search_command", "plan of rotations that calibrates a strapdown unit best"),
+    "sins-plan": ("sins.planner.command", "plan of rotations that calibrates a strapdown unit best"),
     "run-in": ("quartz.run_in_command", "thermal run-in of a production batch of quartz accelerometers"),
     "sins-secondary": (
         "campaign.sins_command",

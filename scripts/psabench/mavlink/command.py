@@ -12,7 +12,7 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import BUS_HELP, Parser, natural, node_id, positive
-from psabench.procedures.run_table import G_MPS2, ON_THE_HEAD
+from psabench.procedures.command_line.offered import G_MPS2, ON_THE_HEAD
 
 AUTOPILOTS = ("generic", "px4", "ardupilot", "invalid")  # psabench.mavlink.station has their numbers
 

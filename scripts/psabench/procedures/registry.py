@@ -1,4 +1,4 @@
-"""The procedures by name: `psabench.procedures.run_table` says what each is for.
+"""The procedures by name: `psabench.procedures.command_line.offered` says what each is for.
 
 A procedure is one function, `run(bench, params, watch)`, that measures and then calls `estimate(readings,
 params)`, which is pure: an interrupted run is estimated from the readings that were recorded

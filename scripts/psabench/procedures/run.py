@@ -22,12 +22,12 @@ from psabench.emulator import read_resolved
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
+from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
 from psabench.procedures.recording import CsvRecorder
 from psabench.procedures.registry import PROCEDURES, Procedure
 from psabench.procedures.result import fields_of, made_params
-from psabench.procedures.run_table import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration as report
 from psabench.report.grading import Section

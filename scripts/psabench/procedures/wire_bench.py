@@ -8,7 +8,7 @@ import numpy.typing as npt
 from psabench.boards.psa2.device import SETTLE_PERIODS, Psa2
 from psabench.estimate.face import Face
 from psabench.instruments import Head
-from psabench.procedures.run_table import G_MPS2
+from psabench.procedures.command_line.offered import G_MPS2
 
 
 class WireBench:

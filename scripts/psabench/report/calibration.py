@@ -12,8 +12,8 @@ from pathlib import Path
 
 from psabench.errors import expected
 from psabench.estimate.uncertainty import Estimate
+from psabench.procedures.command_line.offered import ON_THE_HEAD
 from psabench.procedures.result import LIMIT_CI
-from psabench.procedures.run_table import ON_THE_HEAD
 from psabench.report.grading import (
     Graded,
     Section,

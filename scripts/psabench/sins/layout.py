@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from psabench.errors import BadInput, expected
 from psabench.named_yaml import read_yaml
-from psabench.procedures.run_table import G_MPS2
+from psabench.procedures.command_line.offered import G_MPS2
 
 Floats = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from psabench.estimate.uncertainty import t_quantile
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.native.sins import Params, SinsConfig
-from psabench.procedures.run_table import G_MPS2
+from psabench.procedures.command_line.offered import G_MPS2
 from psabench.sins.covariance import GAMMA_AT, KNOWN
 
 

@@ -20,9 +20,9 @@ from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
+from psabench.procedures.command_line.offered import G_MPS2, SITE_G_MPS2
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.result import fields_of, made_params
-from psabench.procedures.run_table import G_MPS2, SITE_G_MPS2
 from psabench.report import provenance
 from psabench.thermal.bench import WireThermal
 from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule, restarted_origin, whole_parts

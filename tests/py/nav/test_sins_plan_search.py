@@ -19,7 +19,7 @@ from psabench.cli import main
 from psabench.native.sins import SinsConfig
 from psabench.sins.covariance import READINGS, predict_accuracy, read_as
 from psabench.sins.plan import plan_of_dict, read_plan
-from psabench.sins.plan_draft import (
+from psabench.sins.planner.draft import (
     Draft,
     Leg,
     Limits,
@@ -31,7 +31,7 @@ from psabench.sins.plan_draft import (
     random_draft,
     time_of,
 )
-from psabench.sins.plan_search import CHILDREN, LINES, Search, score_of, sigmas, whole_plans
+from psabench.sins.planner.search import CHILDREN, LINES, Search, score_of, sigmas, whole_plans
 from psabench.sins.table import moves_of
 
 CFG = read_as(READINGS["B"], SinsConfig())
@@ -116,7 +116,7 @@ def test_where_nothing_is_better_the_articles_plan_stays(monkeypatch: pytest.Mon
     def worse(task: Any) -> tuple[int, Any]:
         return task.number, np.full(21, in_long_steps if task.cfg.step_s > CFG.step_s else 1.0)
 
-    monkeypatch.setattr("psabench.sins.plan_search.compute", worse)
+    monkeypatch.setattr("psabench.sins.planner.search.compute", worse)
     search = searched(ThisProcess())
     assert (search.score, search.best) == (0.0, article_draft(SHORT))
 

@@ -16,9 +16,10 @@ from psabench import cli
 from psabench import options as arguments
 from psabench.link import lineport, log_file, record_command
 from psabench.link.protocol_files import dbc_node
-from psabench.procedures import command as run_command
-from psabench.procedures import compare_converters, gyro_params, run_table
-from psabench.procedures.command_table import COMMANDS
+from psabench.procedures import compare_converters, gyro_params
+from psabench.procedures.command_line import offered
+from psabench.procedures.command_line import parser as run_command
+from psabench.procedures.command_line.commands import COMMANDS
 from psabench.procedures.registry import PROCEDURES
 
 from tests.py.link.test_lineport import lines
@@ -379,9 +380,9 @@ def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
     assert arguments.LINE_HZ == lineport.SAMPLE_HZ
     shown = re.findall(r"\.[a-z0-9]+", record_command.FORMATS)
     assert set(shown) | {".mf4"} == {*log_file.FORMATS, ".mf4"}  # .mf4 with asammdf
-    assert list(run_table.ON_THE_HEAD) == list(PROCEDURES)
-    assert list(run_table.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
-    assert run_table.COMPARE[0] == compare_converters.NAME
+    assert list(offered.ON_THE_HEAD) == list(PROCEDURES)
+    assert list(offered.ON_THE_PLATFORM) == list(gyro_params.PARAMS)
+    assert offered.COMPARE[0] == compare_converters.NAME
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,8 @@ from psabench.sins.covariance import (
     warnings_of,
 )
 from psabench.sins.plan import RotationPlan, plan_of_dict
-from psabench.sins.plan_draft import PlanDict, article_draft, plan_dict, plan_text, time_of
-from psabench.sins.plan_search import BLOCKS, Search, score_of
+from psabench.sins.planner.draft import PlanDict, article_draft, plan_dict, plan_text, time_of
+from psabench.sins.planner.search import BLOCKS, Search, score_of
 
 NAME = "sins-plan"
 FORMAT = 1  # of result.json

@@ -9,9 +9,9 @@ from functools import cached_property, partial
 from typing import Any
 
 from psabench.options import KEPT
-from psabench.procedures import command_handlers
-from psabench.procedures.command_options import COMMON, FROM_OUTPUTS, ON_THE_TABLE
-from psabench.procedures.run_table import (
+from psabench.procedures.command_line import handlers
+from psabench.procedures.command_line.bench_options import COMMON, FROM_OUTPUTS, ON_THE_TABLE
+from psabench.procedures.command_line.offered import (
     ALL,
     COMPARE,
     CONDITIONS,
@@ -202,18 +202,18 @@ def _on_the_head() -> Iterator[Command]:
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
         load = _of_all if name == ALL else partial(_of_the_head, name)
         how = {"common": _HEAD, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
-        yield _command((name, summary), command_handlers.run_on_head, **how)
+        yield _command((name, summary), handlers.run_on_head, **how)
 
 
 def _on_the_platform() -> Iterator[Command]:
     for name, summary in ON_THE_PLATFORM.items():
         how = {"common": _PLATFORM, "load": partial(_of_the_platform, name), "notes": NOTES_PLATFORM}
-        yield _command((name, summary), command_handlers.run_on_platform, **how)
+        yield _command((name, summary), handlers.run_on_platform, **how)
 
 
 _THERMAL = _command(
     THERMAL,
-    command_handlers.run_in_chamber,
+    handlers.run_in_chamber,
     common=_CHAMBER,
     load=_of_the_chamber,
     notes=NOTES_CHAMBER,
@@ -222,22 +222,22 @@ _THERMAL = _command(
 _SINS = (
     _command(
         SINS,
-        command_handlers.calibrate_sins,
+        handlers.calibrate_sins,
         common=_TABLE,
         load=_of_the_sins,
         kept="what was measured is in OUT",
     ),
-    _command(COVARIANCE, command_handlers.predict_sins, common=("--out",), load=_of_the_covariance),
+    _command(COVARIANCE, handlers.predict_sins, common=("--out",), load=_of_the_covariance),
     _command(
         SNAKE,
-        command_handlers.fly_snake,
+        handlers.fly_snake,
         common=("--out",),
         load=partial(_of_outputs, SNAKE[0]),
         notes=NOTES_OUTPUTS,
     ),
     _command(
         SECONDARY,
-        command_handlers.calibrate_secondary,
+        handlers.calibrate_secondary,
         common=(*FROM_OUTPUTS, "--out"),
         load=partial(_of_outputs, SECONDARY[0]),
         notes=NOTES_OUTPUTS,
@@ -248,7 +248,7 @@ COMMANDS: Mapping[str, Command] = {
     c.name: c
     for c in (
         *_on_the_head(),
-        _command(COMPARE, command_handlers.compare_units, common=_STARTED),
+        _command(COMPARE, handlers.compare_units, common=_STARTED),
         *_SINS,
         _THERMAL,
         *_on_the_platform(),

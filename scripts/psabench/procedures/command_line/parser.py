@@ -12,8 +12,8 @@ from typing import Any
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, yes_no
-from psabench.procedures.command_options import EVERY
-from psabench.procedures.command_table import COMMANDS, Command
+from psabench.procedures.command_line.bench_options import EVERY
+from psabench.procedures.command_line.commands import COMMANDS, Command
 from psabench.shell import command_line
 
 EPILOG = """\

@@ -1,4 +1,4 @@
-"""Options of `psabench run` as argparse takes them: who takes which is in command_table.py."""
+"""Options of `psabench run` as argparse takes them: who takes which is in commands.py."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from psabench.boards.registry import DBC_NODE
 from psabench.instruments import EXAMPLES
 from psabench.options import natural, node_id, positive
-from psabench.procedures.run_table import CONDITIONS, G_MPS2
+from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2
 
 # Options of more than one procedure.
 COMMON: Mapping[str, Mapping[str, Any]] = {

@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from psabench.options import of_fields
-from psabench.procedures.run_table import ALL, CONDITIONS
+from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
 
 if TYPE_CHECKING:

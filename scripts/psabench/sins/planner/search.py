@@ -18,7 +18,7 @@ from psabench.native.nav import Floats
 from psabench.native.sins import SinsConfig
 from psabench.sins.covariance import predict_accuracy
 from psabench.sins.plan import RotationPlan
-from psabench.sins.plan_draft import Draft, Limits, article_draft, changed_draft, plan_of, random_draft
+from psabench.sins.planner.draft import Draft, Limits, article_draft, changed_draft, plan_of, random_draft
 
 LINES = 4
 CHILDREN = 6  # of each line in a generation

@@ -17,9 +17,9 @@ from psabench.report import provenance
 if TYPE_CHECKING:
     from psabench.native.sins import SinsConfig
     from psabench.procedures.head_bench import Progress
-    from psabench.sins.plan_draft import Limits
-    from psabench.sins.plan_search import Search
-    from psabench.sins.plan_search_page import Found
+    from psabench.sins.planner.draft import Limits
+    from psabench.sins.planner.page import Found
+    from psabench.sins.planner.search import Search
 
 ABOUT = """\
 Search the plan of rotations that calibrates a strapdown unit best on your table and in your time. Plans are compared
@@ -94,7 +94,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 def _run_command(args: argparse.Namespace) -> int:
     from psabench.progress import Bar
-    from psabench.sins import plan_search_page as page
+    from psabench.sins.planner import page
 
     found = find_plan(of_fields(Options, args), Bar())
     where = page.write_page(args.out, found)
@@ -109,8 +109,8 @@ def _run_command(args: argparse.Namespace) -> int:
 def find_plan(o: Options, progress: Progress) -> Found:
     """Search, and compare what is found. Ctrl-C keeps the best so far. Raises BadInput, LinkError."""
     from psabench.native.nav import Refused
-    from psabench.sins.plan_search import Search
-    from psabench.sins.plan_search_page import gather
+    from psabench.sins.planner.page import gather
+    from psabench.sins.planner.search import Search
 
     limits, cfg = _check_options(o)
     try:
@@ -126,7 +126,7 @@ def find_plan(o: Options, progress: Progress) -> Found:
 def _search(search: Search, o: Options, progress: Progress) -> bool:
     """Whether Ctrl-C has ended it."""
     from psabench.campaign.workers import workers
-    from psabench.sins.plan_search import whole_plans
+    from psabench.sins.planner.search import whole_plans
 
     count = o.workers
     if count is None and o.dask is None and o.plans * search.limits.budget_s * PLAN_S_PER_S < ALONE_S:
@@ -145,8 +145,8 @@ def _search(search: Search, o: Options, progress: Progress) -> bool:
 def _check_options(o: Options) -> tuple[Limits, SinsConfig]:
     from psabench.native.sins import DEG, SinsConfig
     from psabench.sins.covariance import read_as
-    from psabench.sins.plan_draft import Limits, article_draft, plan_dict
-    from psabench.sins.plan_search_page import reading_of
+    from psabench.sins.planner.draft import Limits, article_draft, plan_dict
+    from psabench.sins.planner.page import reading_of
 
     rows = (
         ("--axes", o.axes, 1, 3),
