@@ -1,4 +1,4 @@
-"""What the columns of somebody's file of increments are, as data: a layout in YAML (docs/procedures/sins_data.md).
+"""What the columns of a file of increments are, as data: a layout in YAML (docs/procedures/sins_data.md).
 
 gyro: [wx, wy, wz]          # names of columns; in a file of raw numbers: their places from 1
 gyro_unit: deg/s            # rad, deg, arcsec: increments; rad/s, deg/s, deg/h: rates

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench.bench import Bench
-from psabench.boards.bins.device import Bins, Increments, increments_of
+from psabench.boards.bins.device import Bins, UnitIncrements, increments_of
 from psabench.errors import InstrumentError
 from psabench.link.vcd import read_vcd
 
@@ -39,7 +39,7 @@ def ideal(folder: Path, table: str = "") -> Path:
     return path
 
 
-def taken(bench: Bench, count: int) -> Increments:
+def taken(bench: Bench, count: int) -> UnitIncrements:
     unit = bench.board(Bins)
     return increments_of(unit.stream(count), unit.weights())
 

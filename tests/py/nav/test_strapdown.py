@@ -1,4 +1,4 @@
-"""The strapdown integration against motions in closed form, and against python-ins, which is someone else's."""
+"""The strapdown integration against motions in closed form, and against python-ins, a third-party package."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from psabench.boards.board import Beat, Board
+from psabench.boards.psa2.board import BOARD as PSA2_BOARD
+from psabench.boards.psa2.board import SESSION as PSA2_SESSION
 from psabench.boards.session import GREEN, Session, period_stack
-
-PSA2_LINES = tuple("SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK Int".split())
 
 SESSION = Session(
     stacks=(period_stack("Readings", GREEN, "TICK"),),
@@ -16,16 +16,14 @@ SESSION = Session(
     gtk_cursor_ns=200_000_000,
     groups={
         "Gyros": "TICK",
-        "Accelerometers": "SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ",
-        "Temperatures": "SYNC_T CST DRD_T DInT DOutT",
-        "To the computer": "Res Int Data CLK",
+        **PSA2_SESSION.groups,
     },
 )
 
 BOARD = Board(
     name="bins",
     device="Bins",
-    lines=(*PSA2_LINES, "TICK"),
+    lines=(*PSA2_BOARD.lines, "TICK"),
     port_lines=("TICK", "Int", "Data", "CLK"),
     beat=Beat(
         rows={"BINS-CAN-02": "period_us"},

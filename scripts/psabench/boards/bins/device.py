@@ -33,7 +33,7 @@ class Weights:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Increments:
+class UnitIncrements:
     """n readings in SI, axes of the instrument; errors of the sensors are in them."""
 
     end_s: Floats  # (n,) end of the interval of dtheta, the unit's clock, unwrapped
@@ -43,10 +43,10 @@ class Increments:
     whole: np.ndarray  # (n,) bool: settled, complete, of one period, within the range
 
 
-def increments_of(readings: Readings, weights: Weights) -> Increments:
+def increments_of(readings: Readings, weights: Weights) -> UnitIncrements:
     """Readings as the unit sends them, in SI."""
     whole = (readings["SETTLED"] == 1) & (readings["CLIP"] + readings["INCOMPLETE"] + readings["STRETCHED"] == 0)
-    return Increments(
+    return UnitIncrements(
         end_s=readings.t_sample_s,
         dtheta_rad=np.stack([readings[f"G{axis}"] for axis in "XYZ"], axis=1) * weights.gyro_rad,
         dv_mps=(np.stack([readings[f"A{axis}"] for axis in "XYZ"], axis=1) + readings["WORDS"][:, None] / 2)

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from psabench.conform.capture.log import Bools, Capture
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, conclusive
-from psabench.link.signals import Ints
+from psabench.conform.verdict import Failed, conclusive, none_of
+from psabench.link.signals import Floats, Ints
 
 
 def fact(e: Capture, name: str, lacking: str = "") -> Any:
@@ -70,6 +70,21 @@ def interval(
     saw = [f"{t:.0f} ns {what}" for t in took_ns]
     first_bad(np.abs(took_ns - due_ns) > slack_ns, from_ns, saw, f"{due_ns:.1f} +- {slack_ns:.1f} ns", lines)
     return f"{len(took_ns)} times {took_ns.min():.0f} to {took_ns.max():.0f} ns {what}"
+
+
+def rises_at_rate(e: Capture, row: Requirement, line: str, what: str) -> str:
+    """Rises of the line come at `period_us` of the row, as exact as its clock. As interval()."""
+    rises, period_ns = e.wires.rises(line), row.limit("period_us") * 1e3
+    tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
+    return interval(e, rises[:-1], rises[1:], period_ns, tolerance_ns, what, (line,))
+
+
+def counted(numbers: Ints | Floats, modulo: int, name: str) -> str:
+    """(n,) readings are numbered without a gap, over the wrap. Raises Failed."""
+    n: Ints = numbers.astype(np.int64)
+    steps: Ints = np.diff(n) % modulo
+    none_of(np.flatnonzero(steps != 1).tolist(), lambda k: f"{name} {n[k]}, then {n[k + 1]}", "one more")
+    return f"{len(numbers)} readings without a gap"
 
 
 def nearest(edges_ns: Ints, at_ns: Ints) -> Ints:

@@ -2,7 +2,7 @@
 
 Several lines of descent at once: each generation changes a line's best plan at random and keeps the best of parent
 and children; a line that no longer improves starts again elsewhere. No gradients: the number of turns changes, too.
-The same seed gives the same plan whoever computes, and however many at once.
+The same seed gives the same plan on any machine, with any number of processes.
 """
 
 from __future__ import annotations

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from psabench.boards.bins.device import MESSAGES
-from psabench.conform.capture.intervals import interval
+from psabench.conform.capture.intervals import counted, interval, rises_at_rate
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, booted, in_turn
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.signals import Ints
 
 LEAST = 20
@@ -47,20 +47,13 @@ def messages_have_their_lengths(e: Capture) -> str:
 @check("stream", "BINS-CAN-02", needs={"can"})
 def readings_are_counted(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
-    seq = reading_columns(e)["SEQ"].astype(np.int64)
-    steps: Ints = np.diff(seq) % int(row.limit("modulo"))
-    bad = np.flatnonzero(steps != 1).tolist()
-    none_of(bad, lambda k: f"SEQ {seq[k]}, then {seq[k + 1]}", "one more")
-    return f"{len(seq)} readings without a gap"
+    return counted(reading_columns(e)["SEQ"], int(row.limit("modulo")), "SEQ")
 
 
 @check("stream", "BINS-CAN-02", needs={"line"}, wires=("TICK",))
 def readings_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Measure from one rise of TICK to the next."""
-    rises = e.wires.rises("TICK")
-    period_ns = row.limit("period_us") * US
-    tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
-    return interval(e, rises[:-1], rises[1:], period_ns, tolerance_ns, "from latch to latch", ("TICK",))
+    return rises_at_rate(e, row, "TICK", "from latch to latch")
 
 
 @check("stream", "BINS-SIG-01", needs={"line"}, wires=("TICK",))

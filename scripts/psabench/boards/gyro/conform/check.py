@@ -8,13 +8,13 @@ import numpy as np
 
 from psabench.boards.gyro.conform.capture_readings import EARTH_DEGPH, EMCY, MESSAGES, columns, setting, vertical_degph
 from psabench.boards.gyro.device import Mode, Phase
-from psabench.conform.capture.intervals import fact, interval
+from psabench.conform.capture.intervals import counted, fact, interval, rises_at_rate
 from psabench.conform.capture.log import CanLog, Capture
 from psabench.conform.capture.messages import as_laid_out, emergencies, in_turn, late_readings
 from psabench.conform.plan import check
 from psabench.conform.proves import row_for
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect, none_of
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats, layout
@@ -36,20 +36,13 @@ def three_messages_make_a_reading(e: Capture) -> str:
 @check("run", "GYRO-CAN-02", needs={"can"})
 def steps_are_counted(e: Capture, row: Requirement) -> str:
     """Look at STEP from reading to reading."""
-    step = columns(e)["STEP"].astype(np.int64)
-    modulo = int(row.limit("modulo"))
-    bad = np.flatnonzero(np.diff(step) % modulo != 1).tolist()
-    none_of(bad, lambda k: f"STEP {step[k]}, then {step[k + 1]}", "one more")
-    return f"{len(step)} readings without a gap"
+    return counted(columns(e)["STEP"], int(row.limit("modulo")), "STEP")
 
 
 @check("run", "GYRO-CAN-02", needs={"line"}, wires=("STEP",))
 def steps_come_at_their_rate(e: Capture, row: Requirement) -> str:
     """Measure from one rise of STEP to the next."""
-    rises = e.wires.rises("STEP")
-    period_ns = row.limit("period_us") * US
-    tolerance_ns = period_ns * row.limit("clock_error_ppm") * 1e-6
-    return interval(e, rises[:-1], rises[1:], period_ns, tolerance_ns, "from step to step", ("STEP",))
+    return rises_at_rate(e, row, "STEP", "from step to step")
 
 
 @check("run", "GYRO-CAN-03", needs={"can"})
