@@ -9,6 +9,11 @@ import errno
 
 # What the machine lacks; any other reason why a file cannot be written lies in the path that the user gave.
 MACHINE = {errno.ESTALE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+REASONS = {
+    errno.ESTALE: "moved, removed or replaced while it was written",
+    errno.EEXIST: "expected a folder, got a file",  # of mkdir(), which takes a folder that is there
+    errno.ENOTDIR: "expected a path of folders, got a file among them",
+}
 
 
 def expected(what: str, got: object = None, where: object = "") -> str:
@@ -39,10 +44,10 @@ class OutputError(BenchError):
 def output_error(where: object, e: OSError, stored: str = "") -> BenchError:
     """The error of a file that could not be written: OutputError, or BadInput where another path would do.
 
-    stored: what of it is on the disk. ESTALE: the file was moved, removed or replaced.
+    stored: what of it is on the disk.
     """
     kind = OutputError if e.errno in MACHINE else BadInput
-    reason = "moved, removed or replaced while it was written" if e.errno == errno.ESTALE else e.strerror or e
+    reason = REASONS.get(e.errno or 0) or e.strerror or e
     return kind("; ".join(filter(None, (f"{where}: {reason}", stored))))
 
 

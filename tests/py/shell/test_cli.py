@@ -42,6 +42,7 @@ MISTAKES: list[tuple[str, str]] = [
     ("run gyrocompass --node 5", "gyrocompass: expected an option that --help lists, got --node"),
     ("run gyrocompass --hours 4", "gyrocompass: expected an option that --help lists, got --hours"),
     ("run sins-snake --flight loop", "--flight: expected snake, straight, or a file, got no file loop"),
+    ("run sins-snake --out /dev/full", "/dev/full: expected a folder, got a file"),
     ("run sins-calibration-secondary", "--first: expected a recording"),
     ("run sins-calibration-secondary --first x.csv", "x.csv: No such file"),
     ("campaign sins-secondary --pairs 0", "--pairs: expected 1 to 100000, got 0"),
