@@ -42,7 +42,6 @@ MISTAKES: list[tuple[str, str]] = [
     ("run gyrocompass --node 5", "gyrocompass: expected an option that --help lists, got --node"),
     ("run gyrocompass --hours 4", "gyrocompass: expected an option that --help lists, got --hours"),
     ("run sins-snake --flight loop", "--flight: expected snake, straight, or a file, got no file loop"),
-    ("run sins-snake --out /dev/full", "/dev/full: expected a folder, got a file"),
     ("run sins-calibration-secondary", "--first: expected a recording"),
     ("run sins-calibration-secondary --first x.csv", "x.csv: No such file"),
     ("campaign sins-secondary --pairs 0", "--pairs: expected 1 to 100000, got 0"),
@@ -81,6 +80,11 @@ def test_a_mistake_gets_one_line_and_status_2(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert words in mistake_line(line.split(), capsys)
+
+
+def test_a_file_where_the_folder_of_a_report_should_be_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "sins-snake", "--out", "/dev/full"]) == 2
+    assert capsys.readouterr().err == "psabench: /dev/full: expected a folder, got a file\n"
 
 
 @pytest.mark.parametrize(
