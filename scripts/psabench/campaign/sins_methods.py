@@ -63,10 +63,15 @@ def _by_filter(r: Recording, *, stand: bool = False) -> Params:
 METHODS = (
     Method(name="six positions alone", plan="six_positions", needs="level, azimuth, angles", find=_by_dwells),
     Method(name="six positions and turns", plan="six_positions", needs="level, azimuth, angles", find=_by_positions),
-    Method(name="filter, the same data", plan="six_positions", needs="nothing", find=_by_filter),
-    Method(name="Fourier", plan="article", needs="steady axis, its azimuth", find=_by_fourier),
-    Method(name="filter", plan="article", needs="nothing", find=_by_filter),
-    Method(name="filter with angles", plan="article", needs="angles", find=partial(_by_filter, stand=True)),
+    Method(name="filter, the same data", plan="six_positions", needs="attitude to degrees", find=_by_filter),
+    Method(name="Fourier", plan="article", needs="a steady axis, its azimuth", find=_by_fourier),
+    Method(name="filter", plan="article", needs="attitude to degrees", find=_by_filter),
+    Method(
+        name="filter with angles",
+        plan="article",
+        needs="angles, attitude to degrees",
+        find=partial(_by_filter, stand=True),
+    ),
 )
 
 

@@ -43,12 +43,12 @@ def _run_command(args: argparse.Namespace) -> int:
     from psabench.progress import Bar
     from psabench.report import provenance
 
-    for where, value, low, high in (("--units", args.units, 1, MOST_UNITS), ("--seed", args.seed, 0, MOST_SEED)):
+    for option, value, low, high in (("--units", args.units, 1, MOST_UNITS), ("--seed", args.seed, 0, MOST_SEED)):
         if not low <= value <= high:
-            raise BadInput(expected(f"{low} to {high}", value, where))
+            raise BadInput(expected(f"{low} to {high}", value, option))
     provenance.note_digest(page.NAME, args.seed, {"units": args.units})
     rows = run_methods(args.units, args.seed, Bar())
-    where = page.write_page(args.out, rows, args.units, args.seed)
+    report = page.write_page(args.out, rows, args.units, args.seed)
     print("\n".join(page.console_lines(rows)))
-    print(f"report: {where}")
+    print(f"report: {report}")
     return 0

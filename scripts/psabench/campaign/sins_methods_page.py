@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from psabench.campaign.sins_methods import METHODS, PRIOR, Row
 from psabench.campaign.sins_table import BASES, Base
+from psabench.report import plots
 from psabench.report.grading import aligned
-from psabench.report.page import bullets, section, table, whole_page, write_report
+from psabench.report.page import bullets, figure, section, table, whole_page, write_report
 from psabench.sins.covariance import QUANTITIES
 
 NAME = "sins-methods"
 FORMAT = 1  # of result.json
+REFERENCE, MARKS = "filter", "sovDPX"
 NOTES = (
     "Each figure is the root mean square error over the units and the elements of a column, in the article's gauge. "
     "Noise: the article's, accelerometers x 4 (reading B), angles of the table 15 arcsec a reading at 10 Hz.",
@@ -70,11 +73,29 @@ def result_dict(rows: Sequence[Row], units: int, seed: int) -> dict[str, Any]:
     }
 
 
+def error_figure(rows: Sequence[Row]) -> str:
+    """Errors of each method as multiples of the filter's without angles, a panel each rate table."""
+    with plots.drawing(3.6, 1, len(BASES), sharey=True) as (drawn, axes):
+        for ax, base in zip(axes, BASES, strict=True):
+            chosen = {r.method.name: r.rms for r in rows if r.base == base}
+            for (name, rms), colour, mark in zip(chosen.items(), cycle(plots.SERIES), MARKS, strict=False):
+                ratio = [rms[q.key] / chosen[REFERENCE][q.key] for q in QUANTITIES]
+                ax.plot(range(len(ratio)), ratio, mark, ms=5, color=colour, label=name)
+            ax.axhline(1.0, color=plots.MUTED, lw=0.8)
+            ax.set_yscale("log")
+            ax.set_xticks(range(len(QUANTITIES)), [q.label for q in QUANTITIES])
+            ax.set_title(base.name)
+        axes[0].set_ylabel("error / error of the filter")
+        drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        return plots.svg(drawn, NAME)
+
+
 def write_page(out: Path, rows: Sequence[Row], units: int, seed: int) -> Path:
     """report.html and result.json; the page. Raises OSError, OutputError."""
     out.mkdir(parents=True, exist_ok=True)
     sections = (
         *(section(f"Table: {base.name}", table(error_rows(rows, base))) for base in BASES),
+        section("Beside the filter", figure(error_figure(rows))),
         section("What each method takes", table(cost_rows(rows))),
         section("How to read it", bullets(NOTES)),
     )

@@ -1,8 +1,8 @@
 """The Fourier method: cycles of steady rotation there and back about a horizontal axis, no angles of the table.
 
-In a cycle about axis j the unit's own gyro, less the Earth's rate along the axis, gives the angle psi. The accelerometers
-of the other two axes, k and m, show gravity going round: z = f_k + i f_m = Z exp(-i psi). Its Fourier coefficients over
-both halves are
+In a cycle about axis j the unit's own gyro, less the Earth's rate along the axis, gives the angle psi. The
+accelerometers of the other two axes, k and m, show gravity going round: z = f_k + i f_m = Z exp(-i psi). Its Fourier
+coefficients over both halves are
 
     1                 df_k + i df_m
     exp(-i psi)       |Z| = g (1 + (Gamma_kk + Gamma_mm)/2)
