@@ -1,7 +1,6 @@
 #include "nav/filter/kf_form.hpp"
 
 #include "nav/common/nav_math.hpp"
-#include "nav/common/nav_width.hpp"
 
 #include <cstdint>
 #include <cstring>
@@ -39,6 +38,7 @@ size_t nav_kf_bytes(void)
     return sizeof(struct nav_kf);
 }
 
+/* The filter points into its own memory: it stays where it was started. */
 static void place(struct nav_kf *kf)
 {
     const uintptr_t past = (uintptr_t)kf->store % KF_ALIGN_BYTES;
@@ -56,7 +56,7 @@ int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_k
     kf->dynamic = dynamic;
     kf->form = form;
     kf->stride = KF_PADDED(n);
-    kf->kernels = &kf_kernels[nav_width()];
+    kf->kernels = &kf_kernels[kf_width()];
     place(kf);
     for (int i = 0; form == NAV_KF_UD && i < n; i++) kf->p[i * n + i] = 1.0;
     *out = kf;

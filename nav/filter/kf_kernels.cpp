@@ -85,3 +85,8 @@ BY_WIDTH(square, (const struct kf_square *s), subtract_square<WIDTH>(s))
 const struct kf_kernels kf_kernels[KF_WIDTHS] = {{add_by_width[0], square_by_width[0]},
                                                  {add_by_width[1], square_by_width[1]},
                                                  {add_by_width[2], square_by_width[2]}};
+
+int kf_width(void)
+{
+    return nav_width();
+}

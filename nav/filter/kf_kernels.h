@@ -35,8 +35,9 @@ struct kf_kernels {
     void (*subtract_square)(const struct kf_square *s);
 };
 
-/* By nav_width(); a processor runs its own and those before it. */
+/* This processor runs kf_kernels[0] to kf_kernels[kf_width()]; the last is the quickest. */
 extern const struct kf_kernels kf_kernels[KF_WIDTHS];
+int kf_width(void);
 
 #ifdef __cplusplus
 }
