@@ -13,6 +13,7 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.procedures.head_bench import Reading, Watch
+from psabench.progress import Advance
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult, made_params
 from psabench.procedures.wire_bench import WireBench
@@ -63,10 +64,11 @@ class _Progress:
         self._percent, self._cancelled = percent, cancelled
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def step(self, name: str, total: int) -> Iterator[Advance]:
         done = 0
 
-        def advance() -> None:
+        def advance(note: str = "") -> None:
+            del note
             nonlocal done
             done += 1
             share = (self._begun + done / total) / max(self._steps, self._begun + 1)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from psabench import cli
+from psabench.progress import Advance
 from psabench.sins import calibration_run as sins_run
 from psabench.sins.calibration_params import SinsOptions
 
@@ -148,11 +149,12 @@ class Interrupted:
     """A progress whose second step is Ctrl-C."""
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def step(self, name: str, total: int) -> Iterator[Advance]:
         del name, total
         steps = itertools.count()
 
-        def advance() -> None:
+        def advance(note: str = "") -> None:
+            del note
             if next(steps) == 1:
                 raise KeyboardInterrupt
 

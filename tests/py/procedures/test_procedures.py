@@ -15,6 +15,7 @@ from psabench.estimate.face import Face
 from psabench.estimate.model import Sensor
 from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, fourier
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
+from psabench.progress import Advance
 from psabench.procedures.recording import CsvRecorder, load_csv
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult
@@ -321,10 +322,11 @@ def test_progress_counts_every_position_of_every_face() -> None:
 
     class Counter:
         @contextmanager
-        def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        def step(self, name: str, total: int) -> Iterator[Advance]:
             told[name] = [0, total]
 
-            def done() -> None:
+            def done(note: str = "") -> None:
+                del note
                 told[name][0] += 1
 
             yield done
