@@ -37,7 +37,7 @@ class Bar:
             now_s = time.monotonic()
             if self._live and (now_s - drawn_s >= REDRAW_S or done == total):
                 drawn_s = now_s
-                self._draw(f"{name} {_drawn(done, total, now_s - start_s)}", said)
+                self._draw(name, done, total, now_s - start_s, said)
 
         try:
             yield advance
@@ -48,14 +48,12 @@ class Bar:
             self._stream.write(f"{name}: {done}/{total} in {took_s:.1f} s{said and f'; {said}'}\n")
             self._stream.flush()
 
-    def _draw(self, line: str, said: str) -> None:
-        """One line of the terminal: what is longer would be left behind by the next."""
-        whole = f"{line}{said and f'; {said}'}"
-        self._stream.write(f"\r{whole[: get_terminal_size().columns - 1]}\x1b[K")
+    def _draw(self, name: str, done: int, total: int, took_s: float, said: str) -> None:
+        """In one line of the terminal, as a longer one would be left behind by the next; the bar gives way to words."""
+        columns = get_terminal_size().columns - 1
+        words = f"{done}/{total}, {took_s * (total - done) / done:.0f} s left{said and f'; {said}'}"
+        length = max(0, min(BAR, columns - len(name) - len(words) - 2))
+        filled = length * done // total
+        line = " ".join([name, *(["█" * filled + "·" * (length - filled)] if length else []), words])
+        self._stream.write(f"\r{line[:columns]}\x1b[K")
         self._stream.flush()
-
-
-def _drawn(done: int, total: int, took_s: float) -> str:
-    filled = BAR * done // total
-    left_s = took_s * (total - done) / done
-    return f"{'█' * filled}{'·' * (BAR - filled)} {done}/{total}, {left_s:.0f} s left"

@@ -13,10 +13,10 @@ from typing import Any
 
 from psabench.bench import Bench
 from psabench.procedures.head_bench import Reading, Watch
-from psabench.progress import Advance
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult, made_params
 from psabench.procedures.wire_bench import WireBench
+from psabench.progress import Advance
 
 # Of an estimate's name, so that "CAL_" and the rest are a parameter's 16 characters.
 _ENDINGS = (("_v_per_g2", ""), ("_v_per_g", ""), ("_deg", "_DEG"), ("_v", "_V"))

@@ -70,14 +70,17 @@ class LivePass:
 
 
 def sigma_words(s: Sins) -> str:
-    """Of each kind of parameter the largest standard deviation: ν 0.012 °/h, Θii 3.1 ppm, ..."""
+    """Of each block the largest standard deviation, of each of its units: ν 0.012 °/h, Θ 3.1 ppm 2.0 ″, ..."""
     sd = np.sqrt(np.diag(s.covariance()[1]))
     largest: dict[str, float] = {}
     for _, key, k in state_parameters(s.rows, s.cfg):
-        largest[key] = max(largest.get(key, 0.0), float(sd[k]))
-    return ", ".join(f"{_symbol(key)} {x * SCALES[key].per_si:.3g} {SCALES[key].unit}" for key, x in largest.items())
+        largest[key] = max(largest.get(key, 0.0), float(sd[k]) * SCALES[key].per_si)
+    words: dict[str, str] = {}
+    for key, x in largest.items():
+        symbol = SCALES[key].symbol.format(i="", j="")
+        words[symbol] = f"{words.get(symbol, symbol)} {_short(x)} {SCALES[key].unit}"
+    return ", ".join(words.values())
 
 
-def _symbol(key: str) -> str:
-    plain = SCALES[key].symbol.replace("{i}", "").replace("{j}", "")
-    return plain + (key.partition("_")[2])
+def _short(x: float) -> str:
+    return f"{x:.0f}" if x >= 100.0 else f"{x:.2g}"

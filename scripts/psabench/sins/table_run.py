@@ -26,7 +26,7 @@ STAND_S = 0.1
 
 
 class Follower(Protocol):
-    """Looks on while a run goes: readings stamped in the unit's time, angles of the table in degrees, in the bench's."""
+    """Looks on while a run goes."""
 
     def take(self, end_s: Floats, dtheta_rad: Floats, dv_mps: Floats) -> None: ...
 

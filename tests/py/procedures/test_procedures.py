@@ -15,12 +15,12 @@ from psabench.estimate.face import Face
 from psabench.estimate.model import Sensor
 from psabench.procedures.fourier import FourierParams, estimate_fourier, expected_fourier, fourier
 from psabench.procedures.head_bench import HeadBench, Reading, Watch
-from psabench.progress import Advance
 from psabench.procedures.recording import CsvRecorder, load_csv
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
 from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
+from psabench.progress import Advance
 
 ARTICLE = Sensor(
     u0_v=2.50,
