@@ -220,8 +220,9 @@ class Calibration:
     """Result of `calibrate_unit`."""
 
     state: State
-    first: State  # of the first pass
     covariance: Floats
+    first: State  # of the first pass, and its own covariance
+    first_covariance: Floats
     rows: Mapping[str, slice]
 
 
@@ -240,11 +241,17 @@ def calibrate_unit(
     (docs/procedures/sins.md)."""
     s = Sins(cfg, c_nb, feedback=True)
     feed_data(s, dtheta_rad, dv_mps, stand)
-    first = s.state()
+    first, first_covariance = s.state(), s.covariance()[1]
     for _ in range(passes - 1):
         s.again()
         feed_data(s, dtheta_rad, dv_mps, stand)
-    return Calibration(state=s.state(), first=first, covariance=s.covariance()[1], rows=s.rows)
+    return Calibration(
+        state=s.state(),
+        covariance=s.covariance()[1],
+        first=first,
+        first_covariance=first_covariance,
+        rows=s.rows,
+    )
 
 
 def feed_data(
