@@ -20,7 +20,7 @@ from psabench.sins.covariance import GAMMA_AT, QUANTITIES, READINGS, SAMPLE_S, r
 from psabench.sins.plan import RotationPlan, read_plan
 
 ROOT = Path(__file__).resolve().parents[2]
-EVERY_S = 30.0
+EVERY_S = 60.0
 CONSTANT = ("nu", "theta", "df", "gamma")
 TURNED = ((2, 1), (0, 2), (1, 0))  # (i, j) of e_k in [e x]: element ij is e_k, element ji is -e_k
 
@@ -52,7 +52,7 @@ def draw_sigmas(plan: RotationPlan) -> str:
     cfg = config()
     times_s = np.append(np.arange(0.0, plan.duration_s, EVERY_S), plan.duration_s)
     runs = [after(cfg, plan, t) for t in times_s]
-    cycles_s = np.flatnonzero(np.diff([np.argmax(np.abs(t.axis_b)) for t in plan.turns]))
+    cycles = np.flatnonzero(np.diff([np.argmax(np.abs(t.axis_b)) for t in plan.turns]))
     ends_s = np.cumsum([t.duration_s for t in plan.turns])
     with style.drawing(4.4, 2, 3, sharex=True) as (fig, axes):
         for ax, q in zip(np.ravel(axes), QUANTITIES, strict=True):
@@ -62,8 +62,8 @@ def draw_sigmas(plan: RotationPlan) -> str:
                 i, j = divmod(place, 3)
                 if q.chosen(i, j):
                     ax.plot(times_s / 60.0, sd[:, k], color=style.SERIES[i], lw=1.2)
-            for k in cycles_s:
-                ax.axvline(ends_s[k] / 60.0, color=style.MUTED, lw=0.6, ls=":")
+            for end_s in ends_s[cycles]:
+                ax.axvline(end_s / 60.0, color=style.MUTED, lw=0.6, ls=":")
             ax.set_yscale("log")
             ax.minorticks_off()
             ax.set_title(f"{q.label}{', ' + q.unit if q.unit else ''}")

@@ -24,12 +24,13 @@ def config(dt_s: float, stand: bool) -> SinsConfig:
 
 def recording() -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """A turn about axis 1: ends of intervals, increments; instants and angles of the table."""
-    end_s = AT_S + DT_S * np.arange(1, COUNT + 1)
+    end_s: Floats = AT_S + DT_S * np.arange(1, COUNT + 1, dtype=np.float64)
     dtheta = np.tile([RATE_DPS * DEG * DT_S, 0.0, 0.0], (COUNT, 1))
     roll = RATE_DPS * DEG * DT_S * (np.arange(COUNT) + 0.5)
     dv = -9.81 * DT_S * np.stack([np.zeros(COUNT), np.sin(roll), np.cos(roll)], -1)
-    at_s = AT_S + 0.1 * np.arange(1, COUNT // 10)
-    return end_s, dtheta, dv, at_s, np.stack([RATE_DPS * (at_s - AT_S), 0.0 * at_s, 0.0 * at_s], -1)
+    at_s: Floats = AT_S + 0.1 * np.arange(1, COUNT // 10, dtype=np.float64)
+    angles: Floats = np.stack([RATE_DPS * (at_s - AT_S), 0.0 * at_s, 0.0 * at_s], -1)
+    return end_s, np.asarray(dtheta), np.asarray(dv), at_s, angles
 
 
 def whole(stand: bool, count: int) -> Sins:

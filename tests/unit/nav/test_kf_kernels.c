@@ -67,7 +67,7 @@ static void test_sums_of_rows(void **state)
             const int columns = KF_PADDED(n);
             int at[MAX];
             int count = 0;
-            seed = (uint64_t)(n * 100 + rows);
+            seed = (uint64_t)n * 100 + (uint64_t)rows;
             for (int k = 0; k < n; k++)
                 if (k % 5 != 3) at[count++] = k;
             fill(n, n, columns, given.p);
@@ -109,7 +109,7 @@ static void test_squares(void **state)
     (void)state;
     for (size_t c = 0; c < COUNT(sizes); c++)
         for (int next = 0; next < 2; next++) {
-            seed = (uint64_t)(sizes[c] * 2 + next);
+            seed = (uint64_t)sizes[c] * 2 + (uint64_t)next;
             check_square(sizes[c], next);
         }
 }
