@@ -5,32 +5,12 @@
 #include <cstdint>
 #include <cstring>
 
-static uint64_t bits_of(double x)
-{
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
-
 /* One more in an exponent of all ones runs over into the sign. */
 static bool all_finite(const double *a, int count)
 {
     uint64_t over = 0;
-    for (int i = 0; i < count; i++) over |= (bits_of(a[i]) & 0x7ff0000000000000) + 0x0010000000000000;
+    for (int i = 0; i < count; i++) over |= (kf_bits(a[i]) & 0x7ff0000000000000) + 0x0010000000000000;
     return !(over >> 63);
-}
-
-int kf_list_used(int rows, int n, const double *a, int *at)
-{
-    uint64_t used[KF_MAX] = {0};
-    for (int i = 0; i < rows; i++)
-        for (int k = 0; k < n; k++) used[k] |= bits_of(a[i * n + k]) << 1; /* without the sign */
-    int count = 0;
-    for (int k = 0; k < n; k++) {
-        at[count] = k;
-        count += used[k] != 0;
-    }
-    return count;
 }
 
 size_t nav_kf_bytes(void)
@@ -39,7 +19,7 @@ size_t nav_kf_bytes(void)
 }
 
 /* The filter points into its own memory: it stays where it was started. */
-static void place(struct nav_kf *kf)
+static void place_arrays(struct nav_kf *kf)
 {
     const uintptr_t past = (uintptr_t)kf->store % KF_ALIGN_BYTES;
     kf->p = kf->store + (KF_ALIGN_BYTES - past) % KF_ALIGN_BYTES / sizeof *kf->store;
@@ -57,7 +37,7 @@ int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_k
     kf->form = form;
     kf->stride = KF_PADDED(n);
     kf->kernels = &kf_kernels[kf_width()];
-    place(kf);
+    place_arrays(kf);
     for (int i = 0; form == NAV_KF_UD && i < n; i++) kf->p[i * n + i] = 1.0;
     *out = kf;
     return NAV_OK;
@@ -101,15 +81,6 @@ double kf_variance(const nav_kf *kf, int i)
     double sum = 0.0;
     for (int k = i; k < kf->n; k++) sum += kf->p[k * kf->n + i] * kf->p[k * kf->n + i] * kf->d[k];
     return sum;
-}
-
-/* By columns: as many sums at once as there are rows. */
-void kf_move(const struct nav_kf *kf, const double *a, int count, double *y)
-{
-    const struct kf_phi *phi = &kf->phi;
-    for (int i = 0; i < kf->dynamic; i++) y[i] = 0.0;
-    for (int k = 0; k < count; k++)
-        for (int i = 0; i < kf->dynamic; i++) y[i] += phi->rows[i * kf->n + phi->at[k]] * a[phi->at[k]];
 }
 
 static void move_state(struct nav_kf *kf)

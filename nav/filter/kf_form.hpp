@@ -5,7 +5,17 @@
 #include "nav/filter/kf_kernels.h"
 #include "nav/kf.h"
 
+#include <cstdint>
+#include <cstring>
+
 constexpr int KF_MAX = NAV_KF_MAX;
+
+inline uint64_t kf_bits(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
 
 /* Phi's moving rows, dynamic x n, the caller's, and the columns of it that are not zero. */
 struct kf_phi {
