@@ -30,7 +30,7 @@ inline int nav_width(void)
         __VA_ARGS__;                                                                                                   \
     }
 
-/* name_by_width[nav_width()] has these parameters and is the call, inlined and compiled for that width; it may name WIDTH. */
+/* name_by_width[nav_width()] has these parameters and is the call, compiled for that width; it may name WIDTH. */
 #define BY_WIDTH(name, parameters, ...)                                                                                \
     COMPILE_FOR(name, parameters, 2, __VA_ARGS__)                                                                      \
     TARGET_WIDE COMPILE_FOR(name, parameters, 4, __VA_ARGS__)                                                          \

@@ -33,7 +33,7 @@ void kf_full_update(struct nav_kf *kf, struct kf_gain *g, const double *next_h)
     g->of = next_h;
 }
 
-/* N = Phi P and its transpose as the moving rows and columns; of the square where they meet, Q + Phi N' is what is right. */
+/* N = Phi P and its transpose as the moving rows and columns; in the square where they meet, Q + Phi N'. */
 void kf_full_predict(struct nav_kf *kf, const double *q)
 {
     const int n = kf->n;

@@ -42,7 +42,7 @@ template <int LANES> INLINE void add_rows(const struct kf_sum *s)
     for (; column < s->columns; column += LANES) add_columns<LANES, 1>(s, column);
 }
 
-/* -v_i v_j and -v_j v_i are the same number: p stays symmetric to the last bit. Half of it and a mirror would cost more. */
+/* -v_i v_j and -v_j v_i are the same number: p stays symmetric to the last bit. Half and a mirror would cost more. */
 template <int LANES, int VECTORS, bool NEXT> INLINE void subtract_tile(const struct kf_square *s, int column)
 {
     using vec = typename lanes<LANES>::v;

@@ -1,5 +1,5 @@
-/* The two loops that a step of the filter spends its time in, for vectors of 2, 4 or 8 doubles. Each element of a result is summed
- * in the order of the plain loop, without fused operations: the same bytes from all. */
+/* The two loops that a step of the filter spends its time in, for vectors of 2, 4 or 8 doubles. Each element of a
+ * result is summed in the order of the plain loop, without fused operations: the same bytes from all. */
 #ifndef PSABENCH_NAV_KF_KERNELS_H
 #define PSABENCH_NAV_KF_KERNELS_H
 
