@@ -6,11 +6,11 @@
 #include <assert.h>
 #include <math.h>
 
-#define GRAIN_NS  INT64_C(1000000)
-#define GRAIN_S   1e-3
-#define STEEPEST  1.875             /* of the quintic: its first derivative, at s = 1/2 */
-#define SHARPEST  5.773502691896258 /* its second, 10/sqrt 3, at s = 1/2 -+ 1/sqrt 12 */
-#define SHORTEST_S 0.05             /* of a rise */
+#define GRAIN_NS   INT64_C(1000000)
+#define GRAIN_S    1e-3
+#define STEEPEST   1.875             /* of the quintic: its first derivative, at s = 1/2 */
+#define SHARPEST   5.773502691896258 /* its second, 10/sqrt 3, at s = 1/2 -+ 1/sqrt 12 */
+#define SHORTEST_S 0.05              /* of a rise */
 
 /* ---- ramps */
 

@@ -6,7 +6,7 @@
 #define ELLIPSOID_FLATTENING   (1.0 / 298.257223563)
 
 struct radii {
-    double meridian_m, vertical_m;                       /* M, N: on the ellipsoid, add the height */
+    double meridian_m, vertical_m;                 /* M, N: on the ellipsoid, add the height */
     double meridian_m_per_rad, vertical_m_per_rad; /* by the latitude */
 };
 

@@ -1,7 +1,7 @@
 #include "phys/flight/flight.h"
 
-#include "phys/flight/path.h"
 #include "phys/flight/ellipsoid.h"
+#include "phys/flight/path.h"
 
 #include <math.h>
 #include <string.h>

@@ -13,7 +13,7 @@
 #include "phys/flight/plan.h"
 #include "phys/motion/pose.h"
 
-#define FLIGHT_NODES    2048u
+#define FLIGHT_NODES            2048u
 #define FLIGHT_LATITUDE_MAX_DEG 85.0
 
 struct flight_cfg {

@@ -6,11 +6,11 @@
 #include <math.h>
 #include <stdio.h>
 
-#define STEP_S   8.0 /* between nodes at most, */
+#define STEP_S        8.0 /* between nodes at most, */
 #define TURN_STEP_RAD 0.2 /* with less turn than this, */
-#define PIECES   8u  /* so many where speed or track are curves, */
-#define PERIOD   48u /* and so many a period of a swing */
-#define SUBSTEPS 16u /* of the integrator from node to node */
+#define PIECES        8u  /* so many where speed or track are curves, */
+#define PERIOD        48u /* and so many a period of a swing */
+#define SUBSTEPS      16u /* of the integrator from node to node */
 
 /* ---- motion without place */
 
@@ -66,8 +66,7 @@ static void set_node(const struct path *p, int64_t t_ns, struct flight_node *n)
     const double east = (p->a_enu_mps2[0] - p->w_en_n_radps[0] * p->vertical_d1_mps) / p->vertical_m;
     *n = (struct flight_node){
         .t_ns = t_ns,
-        .lat = {p->lat_rad, p->lat_d1_radps,
-                (p->a_enu_mps2[1] - p->lat_d1_radps * p->meridian_d1_mps) / p->meridian_m},
+        .lat = {p->lat_rad, p->lat_d1_radps, (p->a_enu_mps2[1] - p->lat_d1_radps * p->meridian_d1_mps) / p->meridian_m},
         .lon = {p->lon_rad, lon_d1, (east + lon_d1 * p->lat.sin * p->lat_d1_radps) / p->lat.cos},
     };
 }
@@ -128,8 +127,8 @@ static unsigned nodes_of(const struct flight_plan *plan, int64_t from_ns, int64_
     if (begin.speed_mps.at == 0.0 && middle.speed_mps.at == 0.0 && end.speed_mps.at == 0.0) return 1;
     const double s = sched_since_s(from_ns, to_ns);
     const double rate = fmax(fabs(begin.track_rad.d1), fmax(fabs(middle.track_rad.d1), fabs(end.track_rad.d1)));
-    const bool curved = middle.speed_mps.d2 != 0.0 || middle.track_rad.d2 != 0.0 || begin.speed_mps.d1 != end.speed_mps.d1 ||
-                        begin.track_rad.d1 != end.track_rad.d1;
+    const bool curved = middle.speed_mps.d2 != 0.0 || middle.track_rad.d2 != 0.0 ||
+                        begin.speed_mps.d1 != end.speed_mps.d1 || begin.track_rad.d1 != end.track_rad.d1;
     const double by_turn = s * rate / TURN_STEP_RAD, by_swing = swing_nodes(plan, from_ns, to_ns);
     return (unsigned)ceil(fmax(fmax(s / STEP_S, by_turn), fmax(by_swing, curved ? (double)PIECES : 1.0)));
 }
@@ -137,7 +136,8 @@ static unsigned nodes_of(const struct flight_plan *plan, int64_t from_ns, int64_
 static void cross(struct flight *f, int64_t from_ns, int64_t to_ns, double at[2])
 {
     for (int64_t i = 0; i < SUBSTEPS; i++)
-        advance(&f->plan, from_ns + (to_ns - from_ns) * i / SUBSTEPS, from_ns + (to_ns - from_ns) * (i + 1) / SUBSTEPS, at);
+        advance(&f->plan, from_ns + (to_ns - from_ns) * i / SUBSTEPS, from_ns + (to_ns - from_ns) * (i + 1) / SUBSTEPS,
+                at);
 }
 
 static bool fail(const struct flight *f, int64_t t_ns, struct flight_error *e, const char *text)
@@ -151,7 +151,8 @@ static bool fail(const struct flight *f, int64_t t_ns, struct flight_error *e, c
 static bool cross_smooth(struct flight *f, int64_t from_ns, int64_t to_ns, double at[2], struct flight_error *e)
 {
     const unsigned n = nodes_of(&f->plan, from_ns, to_ns);
-    if (f->nodes + n > FLIGHT_NODES) return fail(f, from_ns, e, "expected a shorter flight, got more turns than there is room for");
+    if (f->nodes + n > FLIGHT_NODES)
+        return fail(f, from_ns, e, "expected a shorter flight, got more turns than there is room for");
     for (int64_t i = 0; i < n; i++) {
         const int64_t end_ns = from_ns + (to_ns - from_ns) * (i + 1) / n;
         cross(f, from_ns + (to_ns - from_ns) * i / n, end_ns, at);
@@ -195,7 +196,8 @@ static double hermite(const double a[3], const double b[3], double h, double s)
 {
     const double r = s * s * s;
     const double by_value = r * (10.0 + s * (-15.0 + 6.0 * s)) * (b[0] - a[0]);
-    const double by_rate = h * (s * a[1] + r * ((-6.0 + s * (8.0 - 3.0 * s)) * a[1] + (-4.0 + s * (7.0 - 3.0 * s)) * b[1]));
+    const double by_rate =
+        h * (s * a[1] + r * ((-6.0 + s * (8.0 - 3.0 * s)) * a[1] + (-4.0 + s * (7.0 - 3.0 * s)) * b[1]));
     const double by_accel =
         0.5 * h * h * (s * s * a[2] + r * ((-3.0 + s * (3.0 - s)) * a[2] + (1.0 + s * (-2.0 + s)) * b[2]));
     return a[0] + (by_value + by_rate + by_accel);

@@ -9,13 +9,13 @@
 
 #define G_MPS2            9.80665 /* of coordination: tan(bank) = speed * turn rate / g */
 #define BOUNDLESS         1e12
-#define VERTICAL_MPS2     1.5  /* of a change of the rate of climb (E0) */
+#define VERTICAL_MPS2     1.5                 /* of a change of the rate of climb (E0) */
 #define ROTATION_RADPS    (3.0 * RAD_PER_DEG) /* nose up and down again (E0) */
 #define ROTATION_RADPS2   (3.0 * RAD_PER_DEG)
-#define APPROACH_MPS2     1.0  /* of the change to the speed of touchdown (E0) */
-#define TAXI_LATERAL_MPS2 2.0  /* in a turn on the ground (E0) */
-#define SNAKE_ACCEL       3.2  /* largest d2 of a snake by A w^2, and */
-#define SNAKE_RATE        1.7  /* largest d1 by A w, while the envelope rises over half a period */
+#define APPROACH_MPS2     1.0 /* of the change to the speed of touchdown (E0) */
+#define TAXI_LATERAL_MPS2 2.0 /* in a turn on the ground (E0) */
+#define SNAKE_ACCEL       3.2 /* largest d2 of a snake by A w^2, and */
+#define SNAKE_RATE        1.7 /* largest d1 by A w, while the envelope rises over half a period */
 
 #define BIT(p) (1u << (p))
 #define CHANGE (BIT(FLIGHT_SPEED_MPS) | BIT(FLIGHT_ACCEL_MPS2))
@@ -23,16 +23,16 @@
 
 // clang-format off
 static const struct flight_kind kinds[FLIGHT_KINDS] = {
-    [FLIGHT_PARK] = {"park_s", "parked, swaying in wind", 0.1, 86400, SWAY, {[FLIGHT_ROLL_S] = 3, [FLIGHT_PITCH_S] = 4}},
-    [FLIGHT_TAXI] = {"taxi_m", "straight on the ground", 0.1, 20000, CHANGE, {[FLIGHT_SPEED_MPS] = 8, [FLIGHT_ACCEL_MPS2] = 0.8}},
-    [FLIGHT_STOP] = {"stop_s", "brakes to rest, and stands", 0.1, 86400, BIT(FLIGHT_ACCEL_MPS2), {[FLIGHT_ACCEL_MPS2] = 1}},
-    [FLIGHT_TURN] = {"turn_deg", "turn to the right, negative: to the left", -3600, 3600, BIT(FLIGHT_BANK_DEG) | BIT(FLIGHT_RADIUS_M), {[FLIGHT_BANK_DEG] = 25, [FLIGHT_RADIUS_M] = 40}},
-    [FLIGHT_TAKEOFF] = {"takeoff_mps", "take-off run to this speed, nose up", 20, 200, BIT(FLIGHT_ACCEL_MPS2), {[FLIGHT_ACCEL_MPS2] = 4}},
-    [FLIGHT_CLIMB] = {"climb_m", "climb by so much", 1, 20000, CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_ACCEL_MPS2] = 1, [FLIGHT_RATE_MPS] = 10}},
-    [FLIGHT_DESCEND] = {"descend_m", "descent by so much", 1, 20000, CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_ACCEL_MPS2] = 1, [FLIGHT_RATE_MPS] = 8}},
-    [FLIGHT_FLY] = {"fly_s", "straight and level", 0.1, 86400, CHANGE, {[FLIGHT_ACCEL_MPS2] = 1}},
-    [FLIGHT_SNAKE] = {"snake_s", "level, the track swings as a sine", 1, 86400, BIT(FLIGHT_AMPLITUDE_DEG) | BIT(FLIGHT_PERIOD_S), {[FLIGHT_AMPLITUDE_DEG] = 30, [FLIGHT_PERIOD_S] = 600}},
-    [FLIGHT_LAND] = {"land_mps", "down to the field, touchdown at this speed, braked", 20, 200, CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_SPEED_MPS] = 8, [FLIGHT_ACCEL_MPS2] = 2.5, [FLIGHT_RATE_MPS] = 4}},
+    [FLIGHT_PARK] = {"park_s", SWAY, {[FLIGHT_ROLL_S] = 3, [FLIGHT_PITCH_S] = 4}},
+    [FLIGHT_TAXI] = {"taxi_m", CHANGE, {[FLIGHT_SPEED_MPS] = 8, [FLIGHT_ACCEL_MPS2] = 0.8}},
+    [FLIGHT_STOP] = {"stop_s", BIT(FLIGHT_ACCEL_MPS2), {[FLIGHT_ACCEL_MPS2] = 1}},
+    [FLIGHT_TURN] = {"turn_deg", BIT(FLIGHT_BANK_DEG) | BIT(FLIGHT_RADIUS_M), {[FLIGHT_BANK_DEG] = 25, [FLIGHT_RADIUS_M] = 40}},
+    [FLIGHT_TAKEOFF] = {"takeoff_mps", BIT(FLIGHT_ACCEL_MPS2), {[FLIGHT_ACCEL_MPS2] = 4}},
+    [FLIGHT_CLIMB] = {"climb_m", CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_ACCEL_MPS2] = 1, [FLIGHT_RATE_MPS] = 10}},
+    [FLIGHT_DESCEND] = {"descend_m", CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_ACCEL_MPS2] = 1, [FLIGHT_RATE_MPS] = 8}},
+    [FLIGHT_FLY] = {"fly_s", CHANGE, {[FLIGHT_ACCEL_MPS2] = 1}},
+    [FLIGHT_SNAKE] = {"snake_s", BIT(FLIGHT_AMPLITUDE_DEG) | BIT(FLIGHT_PERIOD_S), {[FLIGHT_AMPLITUDE_DEG] = 30, [FLIGHT_PERIOD_S] = 600}},
+    [FLIGHT_LAND] = {"land_mps", CHANGE | BIT(FLIGHT_RATE_MPS), {[FLIGHT_SPEED_MPS] = 8, [FLIGHT_ACCEL_MPS2] = 2.5, [FLIGHT_RATE_MPS] = 4}},
 };
 // clang-format on
 
@@ -127,7 +127,8 @@ static void rotate(struct builder *b, double by_rad)
     b->t_ns += ramp_ns(&r);
 }
 
-static void swing(struct builder *b, enum swing_of of, double amplitude_deg, double period_s, int64_t ns, int64_t edge_ns)
+static void swing(struct builder *b, enum swing_of of, double amplitude_deg, double period_s, int64_t ns,
+                  int64_t edge_ns)
 {
     if (amplitude_deg == 0.0) return;
     b->p->swing[b->p->swings++] =
@@ -156,8 +157,8 @@ static bool in_flight(struct builder *b)
 
 /* ---- legs */
 
-static bool sway_fits(struct builder *b, const struct flight_leg *l, enum flight_param amplitude, enum flight_param period,
-                      const char *key)
+static bool sway_fits(struct builder *b, const struct flight_leg *l, enum flight_param amplitude,
+                      enum flight_param period, const char *key)
 {
     return l->param[amplitude] == 0.0 || 2.0 * l->param[period] <= l->value ||
            fail(b, key, "expected up to half of park_s (%.10g), got %.10g", 0.5 * l->value, l->param[period]);
@@ -336,7 +337,8 @@ bool flight_plan_make(struct flight_plan *p, const struct flight_plan_cfg *cfg, 
     }
     p->leg_ns[cfg->legs] = b.t_ns;
     if (cfg->legs) b.leg = cfg->legs - 1;
-    return b.speed_mps == 0.0 || fail(&b, NULL, "expected a last leg that ends at rest (stop_s), got %.10g m/s", b.speed_mps);
+    return b.speed_mps == 0.0 ||
+           fail(&b, NULL, "expected a last leg that ends at rest (stop_s), got %.10g m/s", b.speed_mps);
 }
 
 /* ---- questions */
@@ -361,7 +363,8 @@ int64_t flight_plan_next_ns(const struct flight_plan *p, int64_t t_ns)
 {
     const struct channel *const all[] = {&p->speed_mps, &p->height_m, &p->track_rad, &p->attack_rad};
     int64_t next_ns = INT64_MAX;
-    for (unsigned i = 0; i < sizeof all / sizeof *all; i++) next_ns = earlier_ns(next_ns, channel_next_ns(all[i], t_ns));
+    for (unsigned i = 0; i < sizeof all / sizeof *all; i++)
+        next_ns = earlier_ns(next_ns, channel_next_ns(all[i], t_ns));
     for (unsigned i = 0; i < p->swings; i++) next_ns = earlier_ns(next_ns, swing_next_ns(&p->swing[i], t_ns));
     return next_ns;
 }

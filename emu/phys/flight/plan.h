@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#define FLIGHT_LEGS_MAX 64u
-#define FLIGHT_SWINGS   (2u * FLIGHT_LEGS_MAX)
+#define FLIGHT_LEGS_MAX     64u
+#define FLIGHT_SWINGS       (2u * FLIGHT_LEGS_MAX)
 #define FLIGHT_BANK_MAX_DEG 60.0
 
 enum flight_leg_kind {
@@ -61,8 +61,7 @@ struct flight_plan_cfg {
 };
 
 struct flight_kind {
-    const char *key, *what;
-    double min, max; /* of the value */
+    const char *key; /* of its value in a list */
     uint32_t params; /* bits by enum flight_param */
     double standard[FLIGHT_PARAMS];
 };
@@ -88,7 +87,8 @@ struct flight_error {
 };
 
 /* False, with the error. height_m: of the field. */
-bool flight_plan_make(struct flight_plan *p, const struct flight_plan_cfg *cfg, double height_m, struct flight_error *e);
+bool flight_plan_make(struct flight_plan *p, const struct flight_plan_cfg *cfg, double height_m,
+                      struct flight_error *e);
 
 /* The leg under way; of the time after the flight the last one. */
 unsigned flight_plan_leg(const struct flight_plan *p, int64_t t_ns);

@@ -50,9 +50,9 @@ EXPORT void bridge_flight_states(const struct flight *f, const int64_t *t_ns, un
     for (unsigned i = 0; i < n; i++) {
         struct flight_state s;
         flight_at(f, t_ns[i], &s);
-        const double first[12] = {s.lat_rad,       s.lon_rad,       s.h_m,           s.v_enu_mps[0],
-                                  s.v_enu_mps[1],  s.v_enu_mps[2],  s.a_enu_mps2[0], s.a_enu_mps2[1],
-                                  s.a_enu_mps2[2], s.heading_rad, s.pitch_rad,     s.roll_rad};
+        const double first[12] = {s.lat_rad,       s.lon_rad,      s.h_m,           s.v_enu_mps[0],
+                                  s.v_enu_mps[1],  s.v_enu_mps[2], s.a_enu_mps2[0], s.a_enu_mps2[1],
+                                  s.a_enu_mps2[2], s.heading_rad,  s.pitch_rad,     s.roll_rad};
         memcpy(out[i], first, sizeof first);
         memcpy(out[i] + 12, s.pose.C_nb, sizeof s.pose.C_nb);
         memcpy(out[i] + 21, s.f_b_mps2, sizeof s.f_b_mps2);
@@ -62,7 +62,8 @@ EXPORT void bridge_flight_states(const struct flight *f, const int64_t *t_ns, un
 }
 
 /* Of n intervals of dt_ns: angle, speed. */
-EXPORT void bridge_flight_increments(const struct flight *f, int64_t from_ns, int64_t dt_ns, unsigned n, double out[][6])
+EXPORT void bridge_flight_increments(const struct flight *f, int64_t from_ns, int64_t dt_ns, unsigned n,
+                                     double out[][6])
 {
     for (unsigned i = 0; i < n; i++)
         flight_increment(f, from_ns + i * dt_ns, from_ns + (i + 1) * dt_ns, out[i], out[i] + 3);
