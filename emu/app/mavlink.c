@@ -38,6 +38,7 @@ static void put_aircraft(const struct flight_state *s, struct mav_world *out)
     out->height_m = s->h_m;
     out->east_mps = s->v_enu_mps[0];
     out->north_mps = s->v_enu_mps[1];
+    out->down_mps = -s->v_enu_mps[2];
 }
 
 static void on_world(void *ctx, struct mav_world *out, int64_t t_ns)

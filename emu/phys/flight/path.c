@@ -7,8 +7,8 @@
 #include <stdio.h>
 
 #define STEP_S        8.0 /* between nodes at most, */
-#define TURN_STEP_RAD 0.2 /* with less turn than this, */
-#define PIECES        8u  /* so many where speed or track are curves, */
+#define TURN_STEP_RAD 0.1 /* with less turn than this, */
+#define PIECES        16u /* so many where speed or track are curves, */
 #define PERIOD        48u /* and so many a period of a swing */
 #define SUBSTEPS      16u /* of the integrator from node to node */
 

@@ -61,6 +61,7 @@ class States:
     f_b_mps2: Array
     w_ib_b_radps: Array
     baro_m: Array
+    g_mps2: Array
 
 
 class CannotFly(Exception):
@@ -110,7 +111,7 @@ class Flight:
     def states(self, t_ns: NDArray[np.int64]) -> States:
         """At all these instants."""
         times = np.ascontiguousarray(t_ns, dtype=np.int64)
-        out = np.empty((times.size, 28))
+        out = np.empty((times.size, 29))
         self.lib.bridge_flight_states(
             self.handle,
             times.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
@@ -119,7 +120,7 @@ class Flight:
         )
         return States(
             *out[:, :3].T, out[:, 3:6], out[:, 6:9], *out[:, 9:12].T, out[:, 12:21].reshape(-1, 3, 3),
-            out[:, 21:24], out[:, 24:27], out[:, 27],
+            out[:, 21:24], out[:, 24:27], out[:, 27], out[:, 28],
         )  # fmt: skip
 
     def increments(self, from_ns: int, dt_ns: int, n: int) -> tuple[Array, Array]:

@@ -44,8 +44,9 @@ EXPORT int64_t bridge_flight_leg_ns(const struct flight *f, unsigned leg)
     return f->plan.leg_ns[leg];
 }
 
-/* Latitude, longitude, height; velocity, acceleration (east, north, up); heading, pitch, roll; C_nb; force; rate; barometric height. */
-EXPORT void bridge_flight_states(const struct flight *f, const int64_t *t_ns, unsigned n, double out[][28])
+/* Latitude, longitude, height; velocity, acceleration (east, north, up); heading, pitch, roll; C_nb; force; rate; barometric height; gravity of
+ * the ellipsoid. */
+EXPORT void bridge_flight_states(const struct flight *f, const int64_t *t_ns, unsigned n, double out[][29])
 {
     for (unsigned i = 0; i < n; i++) {
         struct flight_state s;
@@ -58,6 +59,7 @@ EXPORT void bridge_flight_states(const struct flight *f, const int64_t *t_ns, un
         memcpy(out[i] + 21, s.f_b_mps2, sizeof s.f_b_mps2);
         memcpy(out[i] + 24, s.pose.w_ib_b_radps, sizeof s.pose.w_ib_b_radps);
         out[i][27] = flight_baro_m(f, t_ns[i]);
+        out[i][28] = earth_gravity_mps2(s.lat_rad, s.h_m);
     }
 }
 
