@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#define STEP_S        8.0 /* between nodes at most, */
+#define STEP_S        60.0 /* between nodes at most, */
 #define TURN_STEP_RAD 0.1 /* with less turn than this, */
 #define PIECES        16u /* so many where speed or track are curves, */
 #define PERIOD        48u /* and so many a period of a swing */

@@ -17,6 +17,7 @@ from tests.py.support import flight
 
 ROOT = Path(__file__).resolve().parents[3]
 HOUR_NS = 3600 * 10**9
+STEP_NS = 2_500_000
 TAKEOFF = 13  # leg of the scenario
 A_M = 6378137.0
 
@@ -43,23 +44,29 @@ def pva(path: flight.Flight, t_ns: int) -> pd.Series:
     return pd.Series([*place, north, east, -up, *angles], index=TRAJECTORY_COLS)
 
 
-def imu(path: flight.Flight, from_ns: int, dt_ns: int) -> pd.DataFrame:
-    """An hour of increments, and one before. python-ins has gravity linear in height: what it lacks is added along the vertical."""
-    n = HOUR_NS // dt_ns + 1
-    ends = from_ns + np.arange(n) * dt_ns
-    angle, speed = path.increments(from_ns - dt_ns, dt_ns, n)
-    middle = path.states(ends - dt_ns // 2)
+def increments(path: flight.Flight, from_ns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of the hour and ten milliseconds before it, STEP_NS each. python-ins has gravity linear in height: what it lacks is added."""
+    n = (HOUR_NS + 4 * STEP_NS) // STEP_NS
+    begin_ns = from_ns - 4 * STEP_NS
+    angle, speed = path.increments(begin_ns, STEP_NS, n)
+    middle = path.states(begin_ns + np.arange(n) * STEP_NS + STEP_NS // 2)
     less = earth.gravity(np.degrees(middle.lat_rad), middle.h_m) - middle.g_mps2
-    speed = speed - middle.C_nb[:, 2, :] * (less * dt_ns / 1e9)[:, None]
-    return pd.DataFrame(np.hstack([angle, speed]), index=ends / 1e9, columns=GYRO_COLS + ACCEL_COLS)
+    return angle, speed - middle.C_nb[:, 2, :] * (less * STEP_NS / 1e9)[:, None]
 
 
-def miss(path: flight.Flight, from_ns: int, dt_ns: int) -> np.ndarray:
-    """After an hour: north, east, up, m; north, east, down, m/s; roll, pitch, heading, deg."""
-    found = strapdown.Integrator(pva(path, from_ns))
-    found.integrate(strapdown.compute_increments_from_imu(imu(path, from_ns, dt_ns), "increment"))
-    true = pva(path, from_ns + HOUR_NS)
-    off = (found.get_pva() - true).to_numpy(copy=True)
+def navigated(start: pd.Series, angle: np.ndarray, speed: np.ndarray, steps: int) -> pd.Series:
+    """Where python-ins ends from the sums of so many increments, the first of which lies before the start."""
+    sums = np.hstack([angle, speed])[4 - steps :].reshape(-1, steps, 6).sum(axis=1)
+    times_s = np.arange(len(sums)) * (steps * STEP_NS / 1e9)
+    found = strapdown.Integrator(start)
+    imu = pd.DataFrame(sums, index=times_s, columns=GYRO_COLS + ACCEL_COLS)
+    found.integrate(strapdown.compute_increments_from_imu(imu, "increment"))
+    return found.get_pva()
+
+
+def miss(found: pd.Series, true: pd.Series) -> np.ndarray:
+    """North, east, up, m; north, east, down, m/s; roll, pitch, heading, deg."""
+    off = (found - true).to_numpy(copy=True)
     off[0] = np.radians(off[0]) * A_M
     off[1] = np.radians(off[1]) * A_M * np.cos(np.radians(true.lat))
     return np.asarray(off)
@@ -69,7 +76,9 @@ def test_an_hour_from_take_off_closes(scenario: flight.Flight) -> None:
     """python-ins takes velocity and place of the beginning of an interval: its error is of first order in it and grows exponentially
     along the vertical. Two intervals give the limit."""
     from_ns = scenario.leg_ns[TAKEOFF]
-    ten, five, half = (miss(scenario, from_ns, dt_ns) for dt_ns in (10_000_000, 5_000_000, 2_500_000))
+    start, true = pva(scenario, from_ns), pva(scenario, from_ns + HOUR_NS)
+    angle, speed = increments(scenario, from_ns)
+    half, five, ten = (miss(navigated(start, angle, speed, steps), true) for steps in (1, 2, 4))
     assert np.abs(ten[:2]).max() < 1.0, ten
     assert np.abs(ten[3:5]).max() < 1e-3, ten
     limit = 2.0 * half - five
