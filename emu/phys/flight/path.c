@@ -7,10 +7,10 @@
 #include <stdio.h>
 
 #define STEP_S        60.0 /* between nodes at most, */
-#define TURN_STEP_RAD 0.1 /* with less turn than this, */
-#define PIECES        16u /* so many where speed or track are curves, */
-#define PERIOD        48u /* and so many a period of a swing */
-#define SUBSTEPS      16u /* of the integrator from node to node */
+#define TURN_STEP_RAD 0.1  /* with less turn than this, */
+#define PIECES        16u  /* so many where speed, track or height are curves, */
+#define PERIOD        72u  /* and so many a period of a swing */
+#define SUBSTEPS      16u  /* of the integrator from node to node */
 
 /* ---- motion without place */
 
@@ -127,8 +127,9 @@ static unsigned nodes_of(const struct flight_plan *plan, int64_t from_ns, int64_
     if (begin.speed_mps.at == 0.0 && middle.speed_mps.at == 0.0 && end.speed_mps.at == 0.0) return 1;
     const double s = sched_since_s(from_ns, to_ns);
     const double rate = fmax(fabs(begin.track_rad.d1), fmax(fabs(middle.track_rad.d1), fabs(end.track_rad.d1)));
-    const bool curved = middle.speed_mps.d2 != 0.0 || middle.track_rad.d2 != 0.0 ||
-                        begin.speed_mps.d1 != end.speed_mps.d1 || begin.track_rad.d1 != end.track_rad.d1;
+    const bool curved = middle.speed_mps.d2 != 0.0 || middle.track_rad.d2 != 0.0 || middle.up_mps.d1 != 0.0 ||
+                        begin.speed_mps.d1 != end.speed_mps.d1 || begin.track_rad.d1 != end.track_rad.d1 ||
+                        begin.up_mps.d1 != end.up_mps.d1;
     const double by_turn = s * rate / TURN_STEP_RAD, by_swing = swing_nodes(plan, from_ns, to_ns);
     return (unsigned)ceil(fmax(fmax(s / STEP_S, by_turn), fmax(by_swing, curved ? (double)PIECES : 1.0)));
 }
