@@ -3,7 +3,7 @@
  * Frames: n is north-east-down at the aircraft (earth.h); b is the aircraft's, x ahead, y to the right, z down: parked with its
  * heading along the bench's x it is the bench's level frame. Velocities and accelerations of the Earth-fixed path come as east,
  * north, up. Speed, height, track and pitch are closed forms of time (plan.h); latitude and longitude are their integral, on
- * nodes that flight_init() computes, between them a quintic of value and two derivatives: within 1e-4 m. Gravity is that
+ * nodes that flight_init() computes, between them a quintic of value and two derivatives: within 1e-5 m. Gravity is that
  * of the level ellipsoid along its normal, plus what the site's differs from it. State is a function of time alone: any order of
  * calls gives the same bits. Plain struct, about 300 kB, one thread; nothing is allocated. */
 #ifndef PSABENCH_PHYS_FLIGHT_FLIGHT_H

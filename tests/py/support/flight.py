@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[3]
 Array = NDArray[np.float64]
-KINDS = ("park_s", "taxi_m", "stop_s", "turn_deg", "takeoff_mps", "climb_m", "descend_m", "fly_s", "snake_s", "land_mps")
+KINDS = (
+    "park_s",
+    "taxi_m",
+    "stop_s",
+    "turn_deg",
+    "takeoff_mps",
+    "climb_m",
+    "descend_m",
+    "fly_s",
+    "snake_s",
+    "land_mps",
+)
 PARAMS = (
     "speed_mps",
     "accel_mps2",
