@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
+import flight
 import numpy as np
 import pytest
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, increments_of
-
-from tests.py.support import flight
 
 pytestmark = pytest.mark.host
 
@@ -30,32 +30,35 @@ LEGS: list[flight.Leg] = [
 ]
 
 
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> flight.Flight:
+    return flight.Flight(flight.build(tmp_path_factory.mktemp("flight")), LEGS, heading_deg=50.0)
+
+
 def scenario(folder: Path) -> Path:
-    path = folder / "flight.yaml"
+    file = folder / "flight.yaml"
     legs = ", ".join("{" + ", ".join(f"{k}: {v}" for k, v in leg.items()) + "}" for leg in LEGS)
-    path.write_text(f"""seed: 1
+    file.write_text(f"""seed: 1
 site: {{latitude_deg: 55.7, longitude_deg: 37.5, height_m: 150}}
 flight: {{heading_deg: 50, legs: [{legs}]}}
 units:
   - {{name: sins, board: bins, on: flight, adc_chain: direct, adc_noise_scale: 0, profile_set: {{{NO_ERRORS}}}}}
 """)
-    return path
+    return file
 
 
-def test_each_reading_is_the_increment_of_its_interval(tmp_path: Path) -> None:
-    """Angle to a count of 0.01 arcsec. Velocity to half a code of a word that is truncated, and what the converter's filter makes of
-    a force that changes within its word."""
-    path = flight.Flight(flight.build(tmp_path), LEGS, heading_deg=50.0)
+def test_each_reading_is_the_increment_of_its_interval(path: flight.Flight, tmp_path: Path) -> None:
+    """Angle to a count of 0.01 arcsec. Velocity to half a code of a word that is truncated, and what the converter's
+    filter makes of a force that changes within its word."""
     with Bench.start(scenario(tmp_path)) as bench:
         unit = bench.board(Bins)
         unit.wait_ready()
         got = increments_of(unit.stream(8500), unit.weights())
     assert got.whole.all()
     ends_ns = np.round(got.end_s * 1e9).astype(np.int64)
-    assert ends_ns[0] < 2 * 10**9 and ends_ns[-1] > path.leg_ns[5] + 5 * 10**9  # parked to banked
-    true = [
-        path.increments(int(begin), int(end - begin), 1) for begin, end in zip(ends_ns[:-1], ends_ns[1:], strict=True)
-    ]
+    assert ends_ns[0] < 2 * 10**9  # parked
+    assert ends_ns[-1] > path.leg_ns[5] + 5 * 10**9  # banked
+    true = [path.increments(int(begin), int(end - begin), 1) for begin, end in pairwise(ends_ns)]
     angle, speed = (np.vstack([t[i] for t in true]) for i in (0, 1))
     off_rad, off_mps = got.dtheta_rad[1:] - angle, got.dv_mps[1:] - speed
     assert np.abs(off_rad).max() < 0.0101 * ARCSEC + 1e-7 * np.abs(angle / 0.01).max()  # TSTAMP counts 0.1 us
@@ -66,14 +69,13 @@ def test_each_reading_is_the_increment_of_its_interval(tmp_path: Path) -> None:
     assert np.degrees(np.abs(angle[:, 0]).max()) > 0.05  # the bank: 8 deg/s
 
 
-def test_the_truth_port_has_the_aircraft(tmp_path: Path) -> None:
-    path = flight.Flight(flight.build(tmp_path), LEGS, heading_deg=50.0)
+def test_the_truth_port_has_the_aircraft(path: flight.Flight, tmp_path: Path) -> None:
     with Bench.start(scenario(tmp_path)) as bench:
         bench.run_for(60.0)
         t_ns = round(bench.time_s * 1e9)
         state = bench.truth_state()["flight"]
     true = path.states(np.array([t_ns]))
-    assert state["kind"] == list(LEGS[state["leg"]])[0]
+    assert state["kind"] == next(iter(LEGS[state["leg"]]))
     assert path.leg_ns[state["leg"]] <= t_ns < path.leg_ns[state["leg"] + 1]
     found = [
         state[k]

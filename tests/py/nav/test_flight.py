@@ -1,4 +1,4 @@
-"""An hour's flight of emu/phys/flight from its exact increments, integrated by python-ins, a third-party package: it closes."""
+"""An hour's flight of emu/phys/flight from its exact increments closes by python-ins, a third-party package."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import json
 import subprocess
 from pathlib import Path
 
+import flight
 import numpy as np
 import pandas as pd
 import pytest
-from pyins import earth, strapdown
-from pyins.util import ACCEL_COLS, GYRO_COLS, TRAJECTORY_COLS
-
-from tests.py.support import flight
+from pyins import earth, strapdown  # type: ignore[import-untyped]
+from pyins.util import ACCEL_COLS, GYRO_COLS, TRAJECTORY_COLS  # type: ignore[import-untyped]
 
 ROOT = Path(__file__).resolve().parents[3]
 HOUR_NS = 3600 * 10**9
@@ -45,7 +44,9 @@ def pva(path: flight.Flight, t_ns: int) -> pd.Series:
 
 
 def increments(path: flight.Flight, from_ns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of the hour and ten milliseconds before it, STEP_NS each. python-ins has gravity linear in height: what it lacks is added."""
+    """Of the hour and ten milliseconds before it, STEP_NS each.
+
+    python-ins has gravity linear in height: what it lacks is added."""
     n = (HOUR_NS + 4 * STEP_NS) // STEP_NS
     begin_ns = from_ns - 4 * STEP_NS
     angle, speed = path.increments(begin_ns, STEP_NS, n)
@@ -73,8 +74,8 @@ def miss(found: pd.Series, true: pd.Series) -> np.ndarray:
 
 
 def test_an_hour_from_take_off_closes(scenario: flight.Flight) -> None:
-    """python-ins takes velocity and place of the beginning of an interval: its error is of first order in it and grows exponentially
-    along the vertical. Two intervals give the limit."""
+    """python-ins takes velocity and place of the beginning of an interval: its error is of first order in it and grows
+    exponentially along the vertical. Two intervals give the limit."""
     from_ns = scenario.leg_ns[TAKEOFF]
     start, true = pva(scenario, from_ns), pva(scenario, from_ns + HOUR_NS)
     angle, speed = increments(scenario, from_ns)

@@ -56,7 +56,7 @@ def build(where: Path) -> ctypes.CDLL:
     return lib
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class States:
     """Of n instants: n is north-east-down in C_nb, velocities and accelerations are east, north, up."""
 
@@ -130,9 +130,20 @@ class Flight:
             out.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
         )
         return States(
-            *out[:, :3].T, out[:, 3:6], out[:, 6:9], *out[:, 9:12].T, out[:, 12:21].reshape(-1, 3, 3),
-            out[:, 21:24], out[:, 24:27], out[:, 27], out[:, 28],
-        )  # fmt: skip
+            lat_rad=out[:, 0],
+            lon_rad=out[:, 1],
+            h_m=out[:, 2],
+            v_enu_mps=out[:, 3:6],
+            a_enu_mps2=out[:, 6:9],
+            heading_rad=out[:, 9],
+            pitch_rad=out[:, 10],
+            roll_rad=out[:, 11],
+            C_nb=out[:, 12:21].reshape(-1, 3, 3),
+            f_b_mps2=out[:, 21:24],
+            w_ib_b_radps=out[:, 24:27],
+            baro_m=out[:, 27],
+            g_mps2=out[:, 28],
+        )
 
     def increments(self, from_ns: int, dt_ns: int, n: int) -> tuple[Array, Array]:
         """Integrals of the rate and the specific force over n intervals, (n, 3) each: rad, m/s."""

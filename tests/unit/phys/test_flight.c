@@ -40,7 +40,7 @@ static struct flight_cfg tour(void)
         leg(FLIGHT_TAKEOFF, 85.0),
         with(leg(FLIGHT_CLIMB, 900.0), FLIGHT_SPEED_MPS, 200.0),
         leg(FLIGHT_TURN, 100.0),
-        leg(FLIGHT_SNAKE, 700.0),
+        with(leg(FLIGHT_SNAKE, 250.0), FLIGHT_PERIOD_S, 200.0),
         with(leg(FLIGHT_TURN, -40.0), FLIGHT_BANK_DEG, 45.0),
         with(leg(FLIGHT_FLY, 60.0), FLIGHT_SPEED_MPS, 150.0),
         with(leg(FLIGHT_DESCEND, 700.0), FLIGHT_SPEED_MPS, 100.0),
@@ -130,7 +130,7 @@ static void place_and_velocity_are_integrals(void **state)
         for (unsigned k = 0; k < 3; k++) near(slope(v[k], h_s), s.a_enu_mps2[k], 1e-8, "acceleration", t_ns);
         taken++;
     }
-    assert_true(taken > 8000);
+    assert_true(taken > 5000);
 }
 
 /* Newton in axes that do not turn: second derivative of the place is gravitation and specific force. */
@@ -202,13 +202,13 @@ static void jerk_keeps_its_limit(void **state)
     const double limit = f->cfg.plan.jerk_mps3;
     double most = 0.0, roll_most = 0.0;
     struct flight_state was = at(f, 0);
-    for (int64_t t_ns = 2 * MS; t_ns < end_ns(f); t_ns += 2 * MS) {
+    for (int64_t t_ns = 8 * MS; t_ns < end_ns(f); t_ns += 8 * MS) {
         const struct flight_state s = at(f, t_ns);
         double square = 0.0;
-        for (unsigned k = 0; k < 3; k++) square += pow((s.a_enu_mps2[k] - was.a_enu_mps2[k]) / 0.002, 2.0);
+        for (unsigned k = 0; k < 3; k++) square += pow((s.a_enu_mps2[k] - was.a_enu_mps2[k]) / 0.008, 2.0);
         most = fmax(most, sqrt(square));
         if (f->cfg.plan.leg[s.leg].kind == FLIGHT_TURN)
-            roll_most = fmax(roll_most, fabs(s.roll_rad - was.roll_rad) / 0.002);
+            roll_most = fmax(roll_most, fabs(s.roll_rad - was.roll_rad) / 0.008);
         was = s;
     }
     assert_true(most <= limit && most > 0.45 * limit); /* of each component at most half */
