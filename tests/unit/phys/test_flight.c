@@ -183,14 +183,23 @@ static void rate_is_the_attitude_s(void **state)
         flight_turn(f, t_ns, t_ns + MS, turn);
         flight_increment(f, t_ns, t_ns + MS, angle, speed);
         for (unsigned k = 0; k < 3; k++) near(turn[k], angle[k], 2e-9, "turn in 1 ms", t_ns);
-        if (!smooth_about(f, t_ns, 10 * MS)) continue;
+        flight_increment(f, t_ns, t_ns + 80 * MS, turn, speed);
+        for (unsigned i = 0; i < 8; i++) {
+            double part[3], speed_part[3];
+            flight_increment(f, t_ns + i * 10 * MS, t_ns + (i + 1) * 10 * MS, part, speed_part);
+            for (unsigned k = 0; k < 3; k++) turn[k] -= part[k];
+            for (unsigned k = 0; k < 3; k++) speed[k] -= speed_part[k];
+        }
+        for (unsigned k = 0; k < 3; k++) near(turn[k], 0.0, 1e-12, "angle in parts", t_ns);
+        for (unsigned k = 0; k < 3; k++) near(speed[k], 0.0, 1e-9, "speed in parts", t_ns);
+        if (!smooth_about(f, t_ns, 4 * MS)) continue;
         for (unsigned i = 0; i < 6; i++) {
-            const struct flight_state s = at(f, t_ns + steps[i] * 10 * MS);
+            const struct flight_state s = at(f, t_ns + steps[i] * 4 * MS);
             for (unsigned k = 0; k < 3; k++) w[k][i] = s.pose.w_ib_b_radps[k];
         }
         const struct flight_state s = at(f, t_ns);
         for (unsigned k = 0; k < 3; k++)
-            near(slope(w[k], 0.01), s.pose.dw_ib_b_radps2[k], 1e-8, "angular acceleration", t_ns);
+            near(slope(w[k], 0.004), s.pose.dw_ib_b_radps2[k], 2e-10, "angular acceleration", t_ns);
     }
 }
 
@@ -305,6 +314,33 @@ static void the_site_s_gravity_is_kept(void **state)
     near(at(&f, 0).f_b_mps2[2], -9.8, 1e-14, "force", 0);
 }
 
+/* Short and long ones, each limit the one that binds: kept everywhere, reached somewhere. */
+static void ramps_keep_their_limits(void **state)
+{
+    (void)state;
+    static struct channel c;
+    const double reach[] = {0.01, 1.0, 100.0}, limit[] = {0.5, 3.0, 40.0};
+    for (unsigned i = 0; i < 81; i++) {
+        const struct ramp_limits l = {limit[i / 3 % 3], limit[i / 9 % 3], limit[i / 27]};
+        const double by = (i % 2 ? -1.0 : 1.0) * reach[i % 3];
+        const struct ramp r = ramp_plan(by, &l);
+        double most[3] = {0.0, 0.0, 0.0};
+        channel_init(&c, 5.0);
+        channel_ramp(&c, &r, S);
+        for (int64_t t_ns = S; t_ns <= S + ramp_ns(&r); t_ns += ramp_ns(&r) / 4096) {
+            const struct jet j = channel_at(&c, t_ns);
+            most[0] = fmax(most[0], fabs(j.d1) / l.rate);
+            most[1] = fmax(most[1], fabs(j.d2) / l.first);
+            most[2] = fmax(most[2], fabs(j.d3) / l.second);
+        }
+        const double nearest = fmax(most[0], fmax(most[1], most[2]));
+        if (nearest > 1.0 + 1e-9 || (nearest < 0.9 && r.rise_ns > 60 * MS))
+            fail_msg("ramp %u: %g of a limit", i, nearest);
+        near(channel_at(&c, S + ramp_ns(&r)).at, 5.0 + by, 1e-14 * 100.0, "end of a ramp", i);
+        near(channel_at(&c, S + ramp_ns(&r) - 1).at, 5.0 + by, 1e-12, "before its end", i);
+    }
+}
+
 /* ---- altimeter */
 
 /* The equation of the lag, integrated in steps. */
@@ -396,6 +432,7 @@ int main(void)
         cmocka_unit_test(it_begins_and_ends_at_rest),
         cmocka_unit_test(any_order_of_calls_gives_the_same_bits),
         cmocka_unit_test(the_site_s_gravity_is_kept),
+        cmocka_unit_test(ramps_keep_their_limits),
         cmocka_unit_test(altimeter_lags_and_drifts),
         cmocka_unit_test(a_list_that_cannot_be_flown_is_an_error),
     };
