@@ -17,7 +17,7 @@ static const struct field leg_rows[FLIGHT_KINDS + FLIGHT_PARAMS] = {
 #define KIND(kind, name, lo, hi, words) [kind] = {.key = #name, .type = FIELD_REAL, .offset = LEG(value), .min = (lo), .max = (hi), .what = (words)}
     KIND(FLIGHT_PARK, park_s, 0.1, 86400, "parked"),
     KIND(FLIGHT_TAXI, taxi_m, 0.1, 20000, "straight on the ground, the change of speed included"),
-    KIND(FLIGHT_STOP, stop_s, 0.1, 86400, "brakes to rest, then stands for so long"),
+    KIND(FLIGHT_STOP, stop_s, 0.1, 86400, "brakes, then is at rest for so long"),
     KIND(FLIGHT_TURN, turn_deg, -3600, 3600, "to the right; negative: to the left; coordinated in flight"),
     KIND(FLIGHT_TAKEOFF, takeoff_mps, 20, 200, "take-off run to this speed, then nose up"),
     KIND(FLIGHT_CLIMB, climb_m, 1, 20000, "up by so much"),
@@ -26,7 +26,7 @@ static const struct field leg_rows[FLIGHT_KINDS + FLIGHT_PARAMS] = {
     KIND(FLIGHT_SNAKE, snake_s, 1, 86400, "level, the track swings about its mean: змейка"),
     KIND(FLIGHT_LAND, land_mps, 20, 200, "down to the field's height, to this speed, nose down, brakes"),
 #undef KIND
-#define PARAM(param_, name, lo, hi, words) [FLIGHT_KINDS + param_] = {.key = #name, .type = FIELD_REAL, .offset = LEG(param[param_]), .min = (lo), .max = (hi), .what = (words)}
+#define PARAM(param_, name, lo, hi, words) [FLIGHT_KINDS + (param_)] = {.key = #name, .type = FIELD_REAL, .offset = LEG(param[param_]), .min = (lo), .max = (hi), .what = (words)}
     PARAM(FLIGHT_SPEED_MPS, speed_mps, 0, 400, "ground speed at the end; 8 of taxi_m and land_mps; of climb_m, descend_m, fly_s 0: as it is"),
     PARAM(FLIGHT_ACCEL_MPS2, accel_mps2, 0.05, 20, "largest acceleration along the track: taxi_m 0.8, stop_s 1, takeoff_mps 4, land_mps (brakes) 2.5; climb_m, descend_m, fly_s 1"),
     PARAM(FLIGHT_RATE_MPS, rate_mps, 0.1, 100, "largest rate of climb or descent: climb_m 10, descend_m 8, land_mps 4"),
@@ -53,11 +53,11 @@ static const struct field baro_rows[] = {
 const struct fields scenario_baro_fields = FIELDS(baro_rows);
 
 static const struct field flight_rows[] = {
-#define ROW(member, name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = FLIGHT(member.name), .min = (lo), .max = (hi), .what = (words)}
-    ROW(plan, heading_deg,         -360, 360, "heading at power-on, from north, clockwise"),
-    ROW(plan, jerk_mps3,           0.1, 100,  "largest time derivative of the acceleration (E0)"),
-    ROW(plan, roll_rate_dps,       0.5, 90,   "largest rate of bank into and out of turns (E0)"),
-    ROW(plan, angle_of_attack_deg, 0, 15,     "pitch above the path in flight, constant (E0)"),
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = FLIGHT(plan.name), .min = (lo), .max = (hi), .what = (words)}
+    ROW(heading_deg,         -360, 360, "heading at power-on, from north, clockwise"),
+    ROW(jerk_mps3,           0.1, 100,  "largest time derivative of the acceleration (E0)"),
+    ROW(roll_rate_dps,       0.5, 90,   "largest rate of bank into and out of turns (E0)"),
+    ROW(angle_of_attack_deg, 0, 15,     "pitch above the path in flight, constant (E0)"),
 #undef ROW
     {.key = "baro", .type = FIELD_SECTION, .offset = FLIGHT(baro), .sub = &scenario_baro_fields, .what = "the barometric altimeter"},
     {.key = "legs", .type = FIELD_STRUCTS, .offset = FLIGHT(plan.leg), .present = FLIGHT(plan.legs), .sub = &scenario_leg_fields, .load = load_legs, .dump = dump_legs, .what = "a sequence of up to 64 legs; the first begins parked, the last ends at rest"},

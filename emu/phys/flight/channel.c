@@ -32,7 +32,7 @@ static int64_t grains_up_ns(double t_s)
     return (int64_t)ceil(t_s / GRAIN_S - 1e-6) * GRAIN_NS;
 }
 
-static double seconds(int64_t dt_ns)
+static double ns_to_s(int64_t dt_ns)
 {
     return sched_since_s(0, dt_ns);
 }
@@ -43,8 +43,8 @@ struct ramp ramp_plan(double by, const struct ramp_limits *limits)
     if (way < 1e-12) return (struct ramp){.by = by};
     const double rate = peak_rate(way, limits);
     const int64_t rise_ns = grains_up_ns(rise_s(rate, limits));
-    const int64_t hold_ns = grains_up_ns(fmax(0.0, way / rate - seconds(rise_ns)));
-    return (struct ramp){rise_ns, hold_ns, by / seconds(rise_ns + hold_ns), by};
+    const int64_t hold_ns = grains_up_ns(fmax(0.0, way / rate - ns_to_s(rise_ns)));
+    return (struct ramp){rise_ns, hold_ns, by / ns_to_s(rise_ns + hold_ns), by};
 }
 
 int64_t ramp_ns(const struct ramp *r)
@@ -64,7 +64,7 @@ static struct channel_piece *add_piece(struct channel *c, int64_t from_ns, int64
 {
     assert(c->count < CHANNEL_PIECES);
     struct channel_piece *p = &c->piece[c->count++];
-    *p = (struct channel_piece){.from_ns = from_ns, .length_s = seconds(length_ns)};
+    *p = (struct channel_piece){.from_ns = from_ns, .length_s = ns_to_s(length_ns)};
     return p;
 }
 
@@ -72,20 +72,20 @@ static struct channel_piece *add_piece(struct channel *c, int64_t from_ns, int64
 void channel_ramp(struct channel *c, const struct ramp *r, int64_t from_ns)
 {
     const double from = channel_at(c, from_ns).at;
-    const double half = 0.5 * r->rate * seconds(r->rise_ns);
+    const double half = 0.5 * r->rate * ns_to_s(r->rise_ns);
     const int64_t fall_ns = from_ns + r->rise_ns + r->hold_ns;
     if (ramp_ns(r) == 0) return;
     assert(c->piece[c->count - 1].from_ns <= from_ns);
     *add_piece(c, from_ns, r->rise_ns) = (struct channel_piece){
-        from_ns, seconds(r->rise_ns), {from, 0.0, 0.0, 0.0, 5.0 * half, -6.0 * half, 2.0 * half}};
+        from_ns, ns_to_s(r->rise_ns), {from, 0.0, 0.0, 0.0, 5.0 * half, -6.0 * half, 2.0 * half}};
     if (r->hold_ns > 0) {
         struct channel_piece *hold = add_piece(c, from_ns + r->rise_ns, r->hold_ns);
         hold->c[0] = from + half;
-        hold->c[1] = r->rate * seconds(r->hold_ns);
+        hold->c[1] = r->rate * ns_to_s(r->hold_ns);
     }
     *add_piece(c, fall_ns, r->rise_ns) =
         (struct channel_piece){fall_ns,
-                               seconds(r->rise_ns),
+                               ns_to_s(r->rise_ns),
                                {from + r->by - half, 2.0 * half, 0.0, 0.0, -5.0 * half, 6.0 * half, -2.0 * half}};
     add_piece(c, fall_ns + r->rise_ns, NS_PER_S)->c[0] = from + r->by;
 }
@@ -102,7 +102,7 @@ static unsigned piece_at(const struct channel *c, int64_t t_ns)
 }
 
 /* The n lowest derivatives; of a constant without arithmetic on the time. */
-static unsigned derive(const struct channel *c, int64_t t_ns, double *d, unsigned n)
+static unsigned derive_piece(const struct channel *c, int64_t t_ns, double *d, unsigned n)
 {
     const unsigned i = piece_at(c, t_ns);
     const struct channel_piece *p = &c->piece[i];
@@ -124,13 +124,13 @@ static unsigned derive(const struct channel *c, int64_t t_ns, double *d, unsigne
 struct jet channel_at(const struct channel *c, int64_t t_ns)
 {
     double d[4];
-    (void)derive(c, t_ns, d, 4);
+    (void)derive_piece(c, t_ns, d, 4);
     return (struct jet){d[0], d[1], d[2], d[3]};
 }
 
 unsigned channel_derivatives(const struct channel *c, int64_t t_ns, double d[CHANNEL_ORDER + 1])
 {
-    return derive(c, t_ns, d, CHANNEL_ORDER + 1);
+    return derive_piece(c, t_ns, d, CHANNEL_ORDER + 1);
 }
 
 int64_t channel_next_ns(const struct channel *c, int64_t t_ns)

@@ -50,21 +50,21 @@ static struct jet bank_angle(const struct path *p)
     return angle_of(&force, &(struct jet){.at = G_MPS2});
 }
 
-static struct jet add(struct jet a, struct jet b)
+static struct jet add_jets(struct jet a, struct jet b)
 {
     return (struct jet){a.at + b.at, a.d1 + b.d1, a.d2 + b.d2, a.d3 + b.d3};
 }
 
-static struct jet pitch(const struct flight_plan *p, const struct path *path, int64_t t_ns)
+static struct jet pitch_angle(const struct flight_plan *p, const struct path *path, int64_t t_ns)
 {
-    const struct jet nose = add(climb_angle(path), channel_at(&p->attack_rad, t_ns));
-    return add(nose, flight_plan_swing(p, SWING_PITCH, t_ns));
+    const struct jet nose = add_jets(climb_angle(path), channel_at(&p->attack_rad, t_ns));
+    return add_jets(nose, flight_plan_swing(p, SWING_PITCH, t_ns));
 }
 
-static struct jet roll(const struct flight_plan *p, const struct path *path, unsigned leg, int64_t t_ns)
+static struct jet roll_angle(const struct flight_plan *p, const struct path *path, unsigned leg, int64_t t_ns)
 {
     const struct jet sway = flight_plan_swing(p, SWING_ROLL, t_ns);
-    return p->banked[leg] ? add(sway, bank_angle(path)) : sway;
+    return p->banked[leg] ? add_jets(sway, bank_angle(path)) : sway;
 }
 
 /* ---- rates and force */
@@ -104,7 +104,7 @@ void flight_at(const struct flight *f, int64_t t_ns, struct flight_state *out)
     double f_n_mps2[3];
     const unsigned leg = flight_plan_leg(&f->plan, t_ns);
     path_at(f, t_ns, &p);
-    const struct jet nose = pitch(&f->plan, &p, t_ns), right = roll(&f->plan, &p, leg, t_ns);
+    const struct jet nose = pitch_angle(&f->plan, &p, t_ns), right = roll_angle(&f->plan, &p, leg, t_ns);
     *out = (struct flight_state){
         .lat_rad = p.lat_rad,
         .lon_rad = det_wrap_rad(p.lon_rad),

@@ -20,7 +20,7 @@ static struct jet track_at(const struct flight_plan *p, int64_t t_ns)
     return (struct jet){mean.at + s.at, mean.d1 + s.d1, mean.d2 + s.d2, mean.d3 + s.d3};
 }
 
-static void move(const struct flight_plan *plan, int64_t t_ns, struct path *p)
+static void move_path(const struct flight_plan *plan, int64_t t_ns, struct path *p)
 {
     const struct jet h = channel_at(&plan->height_m, t_ns);
     p->speed_mps = channel_at(&plan->speed_mps, t_ns);
@@ -39,7 +39,7 @@ static void move(const struct flight_plan *plan, int64_t t_ns, struct path *p)
 
 /* ---- the same at a latitude */
 
-static void place(struct path *p, double lat_rad, double lon_rad)
+static void place_path(struct path *p, double lat_rad, double lon_rad)
 {
     p->lat_rad = lat_rad;
     p->lon_rad = lon_rad;
@@ -74,35 +74,35 @@ static void set_node(const struct path *p, int64_t t_ns, struct flight_node *n)
 /* ---- nodes */
 
 /* Rates of latitude and longitude; the longitude itself plays no part. */
-static void slope(const struct path *moved, double lat_rad, double d[2])
+static void slope_at(const struct path *moved, double lat_rad, double d[2])
 {
     struct path p = *moved;
-    place(&p, lat_rad, 0.0);
+    place_path(&p, lat_rad, 0.0);
     d[0] = p.lat_d1_radps;
     d[1] = lon_d1_radps(&p);
 }
 
 /* A step of Runge and Kutta's fourth order. */
-static void advance(const struct flight_plan *plan, int64_t from_ns, int64_t to_ns, double at[2])
+static void advance_place(const struct flight_plan *plan, int64_t from_ns, int64_t to_ns, double at[2])
 {
     const double h = sched_since_s(from_ns, to_ns);
     struct path begin, middle, end;
     double k[4][2];
-    move(plan, from_ns, &begin);
-    move(plan, from_ns + (to_ns - from_ns) / 2, &middle);
-    move(plan, to_ns, &end);
-    slope(&begin, at[0], k[0]);
-    slope(&middle, at[0] + 0.5 * h * k[0][0], k[1]);
-    slope(&middle, at[0] + 0.5 * h * k[1][0], k[2]);
-    slope(&end, at[0] + h * k[2][0], k[3]);
+    move_path(plan, from_ns, &begin);
+    move_path(plan, from_ns + (to_ns - from_ns) / 2, &middle);
+    move_path(plan, to_ns, &end);
+    slope_at(&begin, at[0], k[0]);
+    slope_at(&middle, at[0] + 0.5 * h * k[0][0], k[1]);
+    slope_at(&middle, at[0] + 0.5 * h * k[1][0], k[2]);
+    slope_at(&end, at[0] + h * k[2][0], k[3]);
     for (unsigned i = 0; i < 2; i++) at[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
 }
 
 static void add_node(struct flight *f, int64_t t_ns, const double at[2])
 {
     struct path p;
-    move(&f->plan, t_ns, &p);
-    place(&p, at[0], at[1]);
+    move_path(&f->plan, t_ns, &p);
+    place_path(&p, at[0], at[1]);
     set_node(&p, t_ns, &f->node[f->nodes++]);
 }
 
@@ -121,9 +121,9 @@ static double swing_nodes(const struct flight_plan *p, int64_t from_ns, int64_t 
 static unsigned nodes_of(const struct flight_plan *plan, int64_t from_ns, int64_t to_ns)
 {
     struct path begin, middle, end;
-    move(plan, from_ns, &begin);
-    move(plan, from_ns + (to_ns - from_ns) / 2, &middle);
-    move(plan, to_ns, &end);
+    move_path(plan, from_ns, &begin);
+    move_path(plan, from_ns + (to_ns - from_ns) / 2, &middle);
+    move_path(plan, to_ns, &end);
     if (begin.speed_mps.at == 0.0 && middle.speed_mps.at == 0.0 && end.speed_mps.at == 0.0) return 1;
     const double s = sched_since_s(from_ns, to_ns);
     const double rate = fmax(fabs(begin.track_rad.d1), fmax(fabs(middle.track_rad.d1), fabs(end.track_rad.d1)));
@@ -134,14 +134,14 @@ static unsigned nodes_of(const struct flight_plan *plan, int64_t from_ns, int64_
     return (unsigned)ceil(fmax(fmax(s / STEP_S, by_turn), fmax(by_swing, curved ? (double)PIECES : 1.0)));
 }
 
-static void cross(struct flight *f, int64_t from_ns, int64_t to_ns, double at[2])
+static void cross_step(struct flight *f, int64_t from_ns, int64_t to_ns, double at[2])
 {
     for (int64_t i = 0; i < SUBSTEPS; i++)
-        advance(&f->plan, from_ns + (to_ns - from_ns) * i / SUBSTEPS, from_ns + (to_ns - from_ns) * (i + 1) / SUBSTEPS,
-                at);
+        advance_place(&f->plan, from_ns + (to_ns - from_ns) * i / SUBSTEPS,
+                      from_ns + (to_ns - from_ns) * (i + 1) / SUBSTEPS, at);
 }
 
-static bool fail(const struct flight *f, int64_t t_ns, struct flight_error *e, const char *text)
+static bool fail_at(const struct flight *f, int64_t t_ns, struct flight_error *e, const char *text)
 {
     e->leg = flight_plan_leg(&f->plan, t_ns);
     e->key = flight_kind(f->cfg.plan.leg[e->leg].kind)->key;
@@ -153,12 +153,12 @@ static bool cross_smooth(struct flight *f, int64_t from_ns, int64_t to_ns, doubl
 {
     const unsigned n = nodes_of(&f->plan, from_ns, to_ns);
     if (f->nodes + n > FLIGHT_NODES)
-        return fail(f, from_ns, e, "expected a shorter flight, got more turns than there is room for");
+        return fail_at(f, from_ns, e, "expected a shorter flight, got more turns than there is room for");
     for (int64_t i = 0; i < n; i++) {
         const int64_t end_ns = from_ns + (to_ns - from_ns) * (i + 1) / n;
-        cross(f, from_ns + (to_ns - from_ns) * i / n, end_ns, at);
+        cross_step(f, from_ns + (to_ns - from_ns) * i / n, end_ns, at);
         if (fabs(at[0]) > FLIGHT_LATITUDE_MAX_DEG * RAD_PER_DEG)
-            return fail(f, from_ns, e, "expected a latitude within 85 deg, got a path towards a pole");
+            return fail_at(f, from_ns, e, "expected a latitude within 85 deg, got a path towards a pole");
         add_node(f, end_ns, at);
     }
     return true;
@@ -193,7 +193,7 @@ static unsigned node_at(const struct flight *f, int64_t t_ns)
 }
 
 /* The quintic through value and two derivatives at both ends of an interval of h seconds, as a + its rise. */
-static double hermite(const double a[3], const double b[3], double h, double s)
+static double hermite_at(const double a[3], const double b[3], double h, double s)
 {
     const double r = s * s * s;
     const double by_value = r * (10.0 + s * (-15.0 + 6.0 * s)) * (b[0] - a[0]);
@@ -208,12 +208,12 @@ void path_at(const struct flight *f, int64_t t_ns, struct path *p)
 {
     const unsigned i = node_at(f, t_ns);
     const struct flight_node *a = &f->node[i];
-    move(&f->plan, t_ns, p);
+    move_path(&f->plan, t_ns, p);
     if (i + 1 == f->nodes) {
-        place(p, a->lat[0], a->lon[0]);
+        place_path(p, a->lat[0], a->lon[0]);
         return;
     }
     const struct flight_node *b = a + 1;
     const double h = sched_since_s(a->t_ns, b->t_ns), s = sched_since_s(a->t_ns, t_ns) / h;
-    place(p, hermite(a->lat, b->lat, h, s), hermite(a->lon, b->lon, h, s));
+    place_path(p, hermite_at(a->lat, b->lat, h, s), hermite_at(a->lon, b->lon, h, s));
 }

@@ -60,7 +60,7 @@ struct builder {
     bool airborne;
 };
 
-__attribute__((format(printf, 3, 4))) static bool fail(struct builder *b, const char *key, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static bool fail_leg(struct builder *b, const char *key, const char *format, ...)
 {
     va_list ap;
     va_start(ap, format);
@@ -120,15 +120,15 @@ static double ramp_s(const struct ramp *r)
     return sched_since_s(0, ramp_ns(r));
 }
 
-static void rotate(struct builder *b, double by_rad)
+static void turn_nose(struct builder *b, double by_rad)
 {
     const struct ramp r = ramp_plan(by_rad, &(struct ramp_limits){ROTATION_RADPS, ROTATION_RADPS2, BOUNDLESS});
     channel_ramp(&b->p->attack_rad, &r, b->t_ns);
     b->t_ns += ramp_ns(&r);
 }
 
-static void swing(struct builder *b, enum swing_of of, double amplitude_deg, double period_s, int64_t ns,
-                  int64_t edge_ns)
+static void add_swing(struct builder *b, enum swing_of of, double amplitude_deg, double period_s, int64_t ns,
+                      int64_t edge_ns)
 {
     if (amplitude_deg == 0.0) return;
     b->p->swing[b->p->swings++] =
@@ -140,19 +140,19 @@ static void swing(struct builder *b, enum swing_of of, double amplitude_deg, dou
 static bool at_rest(struct builder *b)
 {
     return (!b->airborne && b->speed_mps == 0.0) ||
-           fail(b, NULL, "expected an aircraft at rest (a stop_s before it), got one at %.10g m/s", b->speed_mps);
+           fail_leg(b, NULL, "expected an aircraft at rest (a stop_s before it), got one at %.10g m/s", b->speed_mps);
 }
 
 static bool on_ground(struct builder *b)
 {
     return !b->airborne ||
-           fail(b, NULL, "expected an aircraft on the ground (a land_mps before it), got one in flight");
+           fail_leg(b, NULL, "expected an aircraft on the ground (a land_mps before it), got one in flight");
 }
 
 static bool in_flight(struct builder *b)
 {
     return b->airborne ||
-           fail(b, NULL, "expected an aircraft in flight (a takeoff_mps before it), got one on the ground");
+           fail_leg(b, NULL, "expected an aircraft in flight (a takeoff_mps before it), got one on the ground");
 }
 
 /* ---- legs */
@@ -161,37 +161,38 @@ static bool sway_fits(struct builder *b, const struct flight_leg *l, enum flight
                       enum flight_param period, const char *key)
 {
     return l->param[amplitude] == 0.0 || 2.0 * l->param[period] <= l->value ||
-           fail(b, key, "expected up to half of park_s (%.10g), got %.10g", 0.5 * l->value, l->param[period]);
+           fail_leg(b, key, "expected up to half of park_s (%.10g), got %.10g", 0.5 * l->value, l->param[period]);
 }
 
-static bool park(struct builder *b, const struct flight_leg *l)
+static bool make_park(struct builder *b, const struct flight_leg *l)
 {
     const double *p = l->param;
     const int64_t ns = whole_ns(l->value);
     if (!at_rest(b) || !sway_fits(b, l, FLIGHT_ROLL_DEG, FLIGHT_ROLL_S, "roll_s") ||
         !sway_fits(b, l, FLIGHT_PITCH_DEG, FLIGHT_PITCH_S, "pitch_s"))
         return false;
-    swing(b, SWING_ROLL, p[FLIGHT_ROLL_DEG], p[FLIGHT_ROLL_S], ns, whole_ns(p[FLIGHT_ROLL_S]));
-    swing(b, SWING_PITCH, p[FLIGHT_PITCH_DEG], p[FLIGHT_PITCH_S], ns, whole_ns(p[FLIGHT_PITCH_S]));
+    add_swing(b, SWING_ROLL, p[FLIGHT_ROLL_DEG], p[FLIGHT_ROLL_S], ns, whole_ns(p[FLIGHT_ROLL_S]));
+    add_swing(b, SWING_PITCH, p[FLIGHT_PITCH_DEG], p[FLIGHT_PITCH_S], ns, whole_ns(p[FLIGHT_PITCH_S]));
     b->t_ns += ns;
     return true;
 }
 
-static bool taxi(struct builder *b, const struct flight_leg *l)
+static bool make_taxi(struct builder *b, const struct flight_leg *l)
 {
     const double to_mps = l->param[FLIGHT_SPEED_MPS];
     const struct ramp r = speed_ramp(b, to_mps, l->param[FLIGHT_ACCEL_MPS2]);
     const double least_m = mean_mps(b, to_mps) * ramp_s(&r);
     if (!on_ground(b)) return false;
-    if (to_mps <= 0.0) return fail(b, "speed_mps", "expected more than 0, got %.10g (stop_s comes to rest)", to_mps);
+    if (to_mps <= 0.0)
+        return fail_leg(b, "speed_mps", "expected more than 0, got %.10g (stop_s comes to rest)", to_mps);
     if (l->value < least_m)
-        return fail(b, NULL, "expected %.4g or more, the way to %.10g m/s, got %.10g", least_m, to_mps, l->value);
+        return fail_leg(b, NULL, "expected %.4g or more, the way to %.10g m/s, got %.10g", least_m, to_mps, l->value);
     change_speed(b, &r);
     b->t_ns += ramp_ns(&r) + whole_ns((l->value - least_m) / to_mps);
     return true;
 }
 
-static bool stop(struct builder *b, const struct flight_leg *l)
+static bool make_stop(struct builder *b, const struct flight_leg *l)
 {
     const struct ramp r = speed_ramp(b, 0.0, l->param[FLIGHT_ACCEL_MPS2]);
     if (!on_ground(b)) return false;
@@ -207,18 +208,19 @@ static double turn_radps(struct builder *b, const struct flight_leg *l)
     const double bank_rad = l->param[FLIGHT_BANK_DEG] * RAD_PER_DEG;
     const double radius_m = l->param[FLIGHT_RADIUS_M], least_m = v * v / TAXI_LATERAL_MPS2;
     if (!b->airborne && radius_m < least_m)
-        return (double)fail(b, "radius_m", "expected %.4g or more at %.10g m/s, got %.10g", least_m, v, radius_m);
+        return (double)fail_leg(b, "radius_m", "expected %.4g or more at %.10g m/s, got %.10g", least_m, v, radius_m);
     const double rate = b->airborne ? G_MPS2 * det_sin(bank_rad) / det_cos(bank_rad) / v : v / radius_m;
     if (v * rate * rate > 0.8 * jerk)
-        return (double)fail(b, b->airborne ? "bank_deg" : "radius_m",
-                            "expected a turn whose jerk of %.4g m/s3 is within 0.8 of jerk_mps3 %.10g, got %.10g",
-                            v * rate * rate, jerk, l->param[b->airborne ? FLIGHT_BANK_DEG : FLIGHT_RADIUS_M]);
+        return (double)fail_leg(b, b->airborne ? "bank_deg" : "radius_m",
+                                "expected a turn whose jerk of %.4g m/s3 is within 0.8 of jerk_mps3 %.10g, got %.10g",
+                                v * rate * rate, jerk, l->param[b->airborne ? FLIGHT_BANK_DEG : FLIGHT_RADIUS_M]);
     return rate;
 }
 
-static bool turn(struct builder *b, const struct flight_leg *l)
+static bool make_turn(struct builder *b, const struct flight_leg *l)
 {
-    if (b->speed_mps == 0.0) return fail(b, NULL, "expected a moving aircraft (a taxi_m before it), got one at rest");
+    if (b->speed_mps == 0.0)
+        return fail_leg(b, NULL, "expected a moving aircraft (a taxi_m before it), got one at rest");
     const double rate = turn_radps(b, l);
     if (rate == 0.0) return false;
     const double roll_radps = b->airborne ? b->p->cfg.roll_rate_dps * RAD_PER_DEG : BOUNDLESS;
@@ -229,19 +231,19 @@ static bool turn(struct builder *b, const struct flight_leg *l)
     return true;
 }
 
-static bool takeoff(struct builder *b, const struct flight_leg *l)
+static bool make_takeoff(struct builder *b, const struct flight_leg *l)
 {
     const struct ramp r = speed_ramp(b, l->value, l->param[FLIGHT_ACCEL_MPS2]);
     if (!on_ground(b)) return false;
     change_speed(b, &r);
     b->t_ns += ramp_ns(&r);
-    rotate(b, b->p->cfg.angle_of_attack_deg * RAD_PER_DEG);
+    turn_nose(b, b->p->cfg.angle_of_attack_deg * RAD_PER_DEG);
     b->airborne = true;
     return true;
 }
 
 /* Height and speed change together; the leg lasts as long as the longer. */
-static bool change(struct builder *b, const struct flight_leg *l, double by_m)
+static bool change_both(struct builder *b, const struct flight_leg *l, double by_m)
 {
     const double asked_mps = l->param[FLIGHT_SPEED_MPS], to_mps = asked_mps > 0.0 ? asked_mps : b->speed_mps;
     const struct ramp up = height_ramp(b, by_m, l->param[FLIGHT_RATE_MPS]);
@@ -252,54 +254,56 @@ static bool change(struct builder *b, const struct flight_leg *l, double by_m)
     return true;
 }
 
-static bool climb(struct builder *b, const struct flight_leg *l)
+static bool make_climb(struct builder *b, const struct flight_leg *l)
 {
-    return in_flight(b) && change(b, l, l->value);
+    return in_flight(b) && change_both(b, l, l->value);
 }
 
-static bool descend(struct builder *b, const struct flight_leg *l)
+static bool make_descend(struct builder *b, const struct flight_leg *l)
 {
     const double most_m = b->height_m - b->field_m;
     if (!in_flight(b)) return false;
     if (l->value > most_m)
-        return fail(b, NULL, "expected up to %.10g, the height above the field, got %.10g", most_m, l->value);
-    return change(b, l, -l->value);
+        return fail_leg(b, NULL, "expected up to %.10g, the height above the field, got %.10g", most_m, l->value);
+    return change_both(b, l, -l->value);
 }
 
-static bool fly(struct builder *b, const struct flight_leg *l)
+static bool make_fly(struct builder *b, const struct flight_leg *l)
 {
     const double asked_mps = l->param[FLIGHT_SPEED_MPS], to_mps = asked_mps > 0.0 ? asked_mps : b->speed_mps;
     const struct ramp r = speed_ramp(b, to_mps, l->param[FLIGHT_ACCEL_MPS2]);
     if (!in_flight(b)) return false;
     if (l->value < ramp_s(&r))
-        return fail(b, NULL, "expected %.4g or more, the time to %.10g m/s, got %.10g", ramp_s(&r), to_mps, l->value);
+        return fail_leg(b, NULL, "expected %.4g or more, the time to %.10g m/s, got %.10g", ramp_s(&r), to_mps,
+                        l->value);
     change_speed(b, &r);
     b->t_ns += whole_ns(l->value);
     return true;
 }
 
-static bool snake(struct builder *b, const struct flight_leg *l)
+static bool make_snake(struct builder *b, const struct flight_leg *l)
 {
     const double period_s = l->param[FLIGHT_PERIOD_S], amplitude_deg = l->param[FLIGHT_AMPLITUDE_DEG];
     const double w = TURN_RAD / period_s, swing_radps = amplitude_deg * RAD_PER_DEG * w;
     const double jerk_mps3 = b->speed_mps * swing_radps * w * SNAKE_ACCEL;
     const double bank_rad = det_atan2(b->speed_mps * swing_radps * SNAKE_RATE, G_MPS2);
     if (!in_flight(b)) return false;
-    if (l->value < period_s) return fail(b, NULL, "expected period_s (%.10g) or more, got %.10g", period_s, l->value);
+    if (l->value < period_s)
+        return fail_leg(b, NULL, "expected period_s (%.10g) or more, got %.10g", period_s, l->value);
     if (bank_rad > FLIGHT_BANK_MAX_DEG * RAD_PER_DEG)
-        return fail(b, "amplitude_deg", "expected a bank of up to %g deg, got %.4g", FLIGHT_BANK_MAX_DEG,
-                    bank_rad / RAD_PER_DEG);
+        return fail_leg(b, "amplitude_deg", "expected a bank of up to %g deg, got %.4g", FLIGHT_BANK_MAX_DEG,
+                        bank_rad / RAD_PER_DEG);
     if (jerk_mps3 > half_jerk(b))
-        return fail(b, "period_s", "expected a jerk of up to half of jerk_mps3 (%.10g), got %.4g", half_jerk(b),
-                    jerk_mps3);
+        return fail_leg(b, "period_s", "expected a jerk of up to half of jerk_mps3 (%.10g), got %.4g", half_jerk(b),
+                        jerk_mps3);
     const int64_t ns = whole_ns(l->value);
-    swing(b, SWING_TRACK, amplitude_deg, period_s, ns, whole_ns(0.5 * period_s));
+    add_swing(b, SWING_TRACK, amplitude_deg, period_s, ns, whole_ns(0.5 * period_s));
     b->t_ns += ns;
     return true;
 }
 
 /* Approach, touchdown without a bump, nose down, brakes. */
-static bool land(struct builder *b, const struct flight_leg *l)
+static bool make_land(struct builder *b, const struct flight_leg *l)
 {
     const struct ramp down = height_ramp(b, b->field_m - b->height_m, l->param[FLIGHT_RATE_MPS]);
     const struct ramp slower = speed_ramp(b, l->value, APPROACH_MPS2);
@@ -308,7 +312,7 @@ static bool land(struct builder *b, const struct flight_leg *l)
     change_speed(b, &slower);
     b->t_ns += longer_ns(&down, &slower);
     b->height_m = b->field_m;
-    rotate(b, -b->p->cfg.angle_of_attack_deg * RAD_PER_DEG);
+    turn_nose(b, -b->p->cfg.angle_of_attack_deg * RAD_PER_DEG);
     const struct ramp brake = speed_ramp(b, l->param[FLIGHT_SPEED_MPS], l->param[FLIGHT_ACCEL_MPS2]);
     change_speed(b, &brake);
     b->t_ns += ramp_ns(&brake);
@@ -317,9 +321,10 @@ static bool land(struct builder *b, const struct flight_leg *l)
 }
 
 static bool (*const make[FLIGHT_KINDS])(struct builder *b, const struct flight_leg *l) = {
-    [FLIGHT_PARK] = park,       [FLIGHT_TAXI] = taxi,   [FLIGHT_STOP] = stop,       [FLIGHT_TURN] = turn,
-    [FLIGHT_TAKEOFF] = takeoff, [FLIGHT_CLIMB] = climb, [FLIGHT_DESCEND] = descend, [FLIGHT_FLY] = fly,
-    [FLIGHT_SNAKE] = snake,     [FLIGHT_LAND] = land};
+    [FLIGHT_PARK] = make_park,       [FLIGHT_TAXI] = make_taxi,       [FLIGHT_STOP] = make_stop,
+    [FLIGHT_TURN] = make_turn,       [FLIGHT_TAKEOFF] = make_takeoff, [FLIGHT_CLIMB] = make_climb,
+    [FLIGHT_DESCEND] = make_descend, [FLIGHT_FLY] = make_fly,         [FLIGHT_SNAKE] = make_snake,
+    [FLIGHT_LAND] = make_land};
 
 bool flight_plan_make(struct flight_plan *p, const struct flight_plan_cfg *cfg, double height_m, struct flight_error *e)
 {
@@ -338,7 +343,7 @@ bool flight_plan_make(struct flight_plan *p, const struct flight_plan_cfg *cfg, 
     p->leg_ns[cfg->legs] = b.t_ns;
     if (cfg->legs) b.leg = cfg->legs - 1;
     return b.speed_mps == 0.0 ||
-           fail(&b, NULL, "expected a last leg that ends at rest (stop_s), got %.10g m/s", b.speed_mps);
+           fail_leg(&b, NULL, "expected a last leg that ends at rest (stop_s), got %.10g m/s", b.speed_mps);
 }
 
 /* ---- questions */
@@ -361,10 +366,10 @@ static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
 
 int64_t flight_plan_next_ns(const struct flight_plan *p, int64_t t_ns)
 {
-    const struct channel *const all[] = {&p->speed_mps, &p->height_m, &p->track_rad, &p->attack_rad};
+    enum { CHANNELS = 4 };
+    const struct channel *const all[CHANNELS] = {&p->speed_mps, &p->height_m, &p->track_rad, &p->attack_rad};
     int64_t next_ns = INT64_MAX;
-    for (unsigned i = 0; i < sizeof all / sizeof *all; i++)
-        next_ns = earlier_ns(next_ns, channel_next_ns(all[i], t_ns));
+    for (unsigned i = 0; i < CHANNELS; i++) next_ns = earlier_ns(next_ns, channel_next_ns(all[i], t_ns));
     for (unsigned i = 0; i < p->swings; i++) next_ns = earlier_ns(next_ns, swing_next_ns(&p->swing[i], t_ns));
     return next_ns;
 }

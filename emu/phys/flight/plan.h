@@ -1,6 +1,6 @@
 /* The list of legs, and what it becomes: speed, height, track and angle of attack as functions of time.
  *
- * The aircraft stands at the site, on the ground, and stands again when the last leg is over. Its nose is along its track: no wind
+ * The aircraft begins parked at the site, and is at rest again when the last leg is over. Its nose is along its track: no wind
  * in flight, no sideslip. Angles clockwise from above, nose up, right side down. */
 #ifndef PSABENCH_PHYS_FLIGHT_PLAN_H
 #define PSABENCH_PHYS_FLIGHT_PLAN_H

@@ -6,7 +6,7 @@
 #include <math.h>
 
 /* The septic and its derivatives by s. */
-static struct jet septic(double s)
+static struct jet septic_at(double s)
 {
     const double r = 1.0 - s;
     return (struct jet){
@@ -20,12 +20,12 @@ static struct jet septic(double s)
 /* sign: -1 where the envelope falls. */
 static struct jet edge_at(double s, double edge_s, double sign)
 {
-    const struct jet e = septic(s);
+    const struct jet e = septic_at(s);
     const double rate = sign / edge_s;
     return (struct jet){e.at, e.d1 * rate, e.d2 * rate * rate, e.d3 * rate * rate * rate};
 }
 
-static struct jet envelope(const struct swing *s, int64_t t_ns)
+static struct jet envelope_at(const struct swing *s, int64_t t_ns)
 {
     const double edge_s = sched_since_s(0, s->edge_ns);
     if (t_ns < s->from_ns + s->edge_ns) return edge_at(sched_since_s(s->from_ns, t_ns) / edge_s, edge_s, 1.0);
@@ -39,7 +39,7 @@ struct jet swing_at(const struct swing *s, int64_t t_ns)
     const double turns = sched_since_s(s->from_ns, t_ns) / s->period_s;
     const struct det_pair at = det_sin_cos(TURN_RAD * (turns - floor(turns)));
     const double a = s->amplitude_rad, w = TURN_RAD / s->period_s;
-    const struct jet e = envelope(s, t_ns);
+    const struct jet e = envelope_at(s, t_ns);
     const struct jet u = {a * at.sin, a * w * at.cos, -a * w * w * at.sin, -a * w * w * w * at.cos};
     return (struct jet){
         .at = e.at * u.at,
