@@ -14,6 +14,9 @@
 #define ROTATION_RADPS2   (3.0 * RAD_PER_DEG)
 #define APPROACH_MPS2     1.0 /* of the change to the speed of touchdown (E0) */
 #define TAXI_LATERAL_MPS2 2.0 /* in a turn on the ground (E0) */
+#define TAXI_MIN_MPS      0.5 /* slower a turn would take for ever */
+#define TAXI_MAX_MPS      50.0
+#define FLY_MIN_MPS       20.0
 #define SNAKE_ACCEL       3.2 /* largest d2 of a snake by A w^2, and */
 #define SNAKE_RATE        1.7 /* largest d1 by A w, while the envelope rises over half a period */
 
@@ -155,6 +158,19 @@ static bool in_flight(struct builder *b)
            fail_leg(b, NULL, "expected an aircraft in flight (a takeoff_mps before it), got one on the ground");
 }
 
+static bool speed_taxies(struct builder *b, double speed_mps)
+{
+    return (speed_mps >= TAXI_MIN_MPS && speed_mps <= TAXI_MAX_MPS) ||
+           fail_leg(b, "speed_mps", "expected %g to %g on the ground, got %.10g (stop_s comes to rest)", TAXI_MIN_MPS,
+                    TAXI_MAX_MPS, speed_mps);
+}
+
+static bool speed_flies(struct builder *b, double speed_mps)
+{
+    return speed_mps >= FLY_MIN_MPS ||
+           fail_leg(b, "speed_mps", "expected %g or more in flight, got %.10g", FLY_MIN_MPS, speed_mps);
+}
+
 /* ---- legs */
 
 static bool sway_fits(struct builder *b, const struct flight_leg *l, enum flight_param amplitude,
@@ -183,8 +199,7 @@ static bool make_taxi(struct builder *b, const struct flight_leg *l)
     const struct ramp r = speed_ramp(b, to_mps, l->param[FLIGHT_ACCEL_MPS2]);
     const double least_m = mean_mps(b, to_mps) * ramp_s(&r);
     if (!on_ground(b)) return false;
-    if (to_mps <= 0.0)
-        return fail_leg(b, "speed_mps", "expected more than 0, got %.10g (stop_s comes to rest)", to_mps);
+    if (!speed_taxies(b, to_mps)) return false;
     if (l->value < least_m)
         return fail_leg(b, NULL, "expected %.4g or more, the way to %.10g m/s, got %.10g", least_m, to_mps, l->value);
     change_speed(b, &r);
@@ -248,6 +263,7 @@ static bool change_both(struct builder *b, const struct flight_leg *l, double by
     const double asked_mps = l->param[FLIGHT_SPEED_MPS], to_mps = asked_mps > 0.0 ? asked_mps : b->speed_mps;
     const struct ramp up = height_ramp(b, by_m, l->param[FLIGHT_RATE_MPS]);
     const struct ramp faster = speed_ramp(b, to_mps, l->param[FLIGHT_ACCEL_MPS2]);
+    if (!speed_flies(b, to_mps)) return false;
     change_height(b, &up);
     change_speed(b, &faster);
     b->t_ns += longer_ns(&up, &faster);
@@ -273,6 +289,7 @@ static bool make_fly(struct builder *b, const struct flight_leg *l)
     const double asked_mps = l->param[FLIGHT_SPEED_MPS], to_mps = asked_mps > 0.0 ? asked_mps : b->speed_mps;
     const struct ramp r = speed_ramp(b, to_mps, l->param[FLIGHT_ACCEL_MPS2]);
     if (!in_flight(b)) return false;
+    if (!speed_flies(b, to_mps)) return false;
     if (l->value < ramp_s(&r))
         return fail_leg(b, NULL, "expected %.4g or more, the time to %.10g m/s, got %.10g", ramp_s(&r), to_mps,
                         l->value);
@@ -307,7 +324,8 @@ static bool make_land(struct builder *b, const struct flight_leg *l)
 {
     const struct ramp down = height_ramp(b, b->field_m - b->height_m, l->param[FLIGHT_RATE_MPS]);
     const struct ramp slower = speed_ramp(b, l->value, APPROACH_MPS2);
-    if (!in_flight(b)) return false;
+    if (!in_flight(b) || (l->param[FLIGHT_SPEED_MPS] > 0.0 && !speed_taxies(b, l->param[FLIGHT_SPEED_MPS])))
+        return false;
     change_height(b, &down);
     change_speed(b, &slower);
     b->t_ns += longer_ns(&down, &slower);

@@ -391,7 +391,13 @@ static void a_list_that_cannot_be_flown_is_an_error(void **state)
     WRONG(1, "expected an aircraft at rest (a stop_s before it), got one at 8 m/s", roll, leg(FLIGHT_PARK, 10.0));
     WRONG(0, "expected up to half of park_s (2), got 3", with(leg(FLIGHT_PARK, 4.0), FLIGHT_ROLL_DEG, 0.1));
     WRONG(0, "expected 43 or more, the way to 8 m/s, got 40", leg(FLIGHT_TAXI, 40.0));
-    WRONG(0, "expected more than 0, got 0 (stop_s comes to rest)", with(roll, FLIGHT_SPEED_MPS, 0.0));
+    WRONG(0, "expected 0.5 to 50 on the ground, got 0 (stop_s comes to rest)", with(roll, FLIGHT_SPEED_MPS, 0.0));
+    WRONG(0, "expected 0.5 to 50 on the ground, got 60 (stop_s comes to rest)",
+          with(leg(FLIGHT_TAXI, 9000.0), FLIGHT_SPEED_MPS, 60.0));
+    WRONG(1, "expected 0.5 to 50 on the ground, got 0.1 (stop_s comes to rest)", up,
+          with(leg(FLIGHT_LAND, 70.0), FLIGHT_SPEED_MPS, 0.1));
+    WRONG(1, "expected 20 or more in flight, got 1", up, with(leg(FLIGHT_FLY, 900.0), FLIGHT_SPEED_MPS, 1.0));
+    WRONG(1, "expected 20 or more in flight, got 1", up, with(leg(FLIGHT_CLIMB, 900.0), FLIGHT_SPEED_MPS, 1.0));
     WRONG(1, "expected an aircraft on the ground (a land_mps before it), got one in flight", up, roll);
     WRONG(1, "expected an aircraft on the ground (a land_mps before it), got one in flight", up, up);
     WRONG(1, "expected an aircraft on the ground (a land_mps before it), got one in flight", up, leg(FLIGHT_STOP, 1.0));
