@@ -14,7 +14,7 @@
 #define ROTATION_RADPS2   (3.0 * RAD_PER_DEG)
 #define APPROACH_MPS2     1.0 /* of the change to the speed of touchdown (E0) */
 #define TAXI_LATERAL_MPS2 2.0 /* in a turn on the ground (E0) */
-#define TAXI_MIN_MPS      0.5 /* slower a turn would take for ever */
+#define TAXI_MIN_MPS      0.5 /* slower ones turn almost without end */
 #define TAXI_MAX_MPS      50.0
 #define FLY_MIN_MPS       20.0
 #define SNAKE_ACCEL       3.2 /* largest d2 of a snake by A w^2, and */
