@@ -22,7 +22,8 @@ from psabench.sins.live import LivePass
 from psabench.sins.plan import RotationPlan, read_plan
 from psabench.sins.readers import read_increments
 from psabench.sins.table import AXES, attitudes, moves_of
-from psabench.sins.table_run import TableData, TableRun, parts_of, table_axes
+from psabench.sins.table_drive import parts_of, table_axes
+from psabench.sins.table_run import TableData, TableRun
 from psabench.sins.table_store import read_angles, write_data
 
 SCENARIO, COARSE = "sins_table", "sins_coarse"

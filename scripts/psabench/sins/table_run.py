@@ -1,4 +1,4 @@
-"""A plan of rotations on the bench: the table's moves and angles over SCPI, the unit's increments over CAN."""
+"""A plan of rotations on the bench: the table's angles over SCPI, the unit's increments over CAN."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ import numpy as np
 
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, Weights, increments_of
-from psabench.errors import BenchError, DeviceError, InstrumentError, expected
+from psabench.errors import BenchError, DeviceError, expected
 from psabench.native.nav import Floats
 from psabench.progress import Advance
 from psabench.sins.correction import rows_later
 from psabench.sins.increments import Increments
 from psabench.sins.table import AXES, Move, attitudes
+from psabench.sins.table_drive import PlanDrive
 
-PART_S = 30.0  # of bench time between two looks at what has come
 REST_S = 1.0  # before the first turn and after the last: the interval before, and the table's log
-STEP_DEG = 180.0  # a turn of at most this is a position: it ends where it should
 LOG_LATE_S = 0.2  # the readout's delay and more: a log ends this long ago
 STAND_S = 0.1
 
@@ -55,15 +54,15 @@ class TableRun:
     """One run of a plan. Raises BenchError with what was lost."""
 
     def __init__(self, bench: Bench, moves: Sequence[Move], advance: Advance, live: Follower | None = None) -> None:
-        """advance: after each part of a move, of `parts_of`."""
-        self._bench, self._moves, self._advance, self._live = bench, moves, advance, live
+        """advance: after each part of a move, of `table_drive.parts_of`."""
+        self._bench, self._advance, self._live = bench, advance, live
+        self._drive = PlanDrive(bench, moves, self._look)
         self._unit = bench.board(Bins)
         self._weights: Weights | None = None
         self._taken: list[tuple[Floats, Floats, Floats]] = []
         self._stand: list[tuple[Floats, Floats]] = []
         self._axes = 0
         self._stand_wanted = False
-        self._set_deg = [0.0] * AXES  # as commanded: a coarse table shows no angles
         self._logged_s = 0.0
 
     def measure(self, stand: bool) -> TableData:
@@ -71,44 +70,17 @@ class TableRun:
         self._stand_wanted = stand
         self._unit.wait_ready()
         self._weights = self._unit.weights()  # before the converters are set up they are others
-        self._axes = table_axes(self._bench)
-        for axis in range(1, self._axes + 1):
-            self._bench.table.position(0.0, axis=axis)
+        self._axes = self._drive.go_home()
         self._unit.frames.forget()
         self._unit.start()
         self._bench.run_for(REST_S)
         self._logged_s = self._bench.time_s
-        for number, move in enumerate(self._moves, start=1):
-            self._make(move, self._following(number))
-            self._set_deg[move.axis - 1] += move.angle_deg
-            self._collect()
+        self._drive.make_all()
+        self._collect()
         self._bench.run_for(REST_S)
         self._take()
         self._unit.stop()
         return self.data()
-
-    def _following(self, number: int) -> Move | None:
-        return self._moves[number] if number < len(self._moves) else None
-
-    def _make(self, move: Move, following: Move | None) -> None:
-        """Long turns end by their time, on a whole turn or not: what counts is what was measured."""
-        table, angle = self._bench.table, move.angle_deg
-        if move.rate_dps == 0.0:
-            self._pass(move.duration_s)
-        elif _is_position(move):
-            table.position(self._set_deg[move.axis - 1] + angle, abs(move.rate_dps), axis=move.axis)
-            self._look()
-        else:
-            table.rate(move.rate_dps, axis=move.axis)
-            self._pass(move.duration_s)
-            if following is None or following.axis != move.axis or following.rate_dps == 0.0:
-                table.stop(axis=move.axis)
-
-    def _pass(self, duration_s: float) -> None:
-        parts = _parts(duration_s)
-        for _ in range(parts):
-            self._bench.run_for(duration_s / parts)
-            self._look()
 
     def _look(self) -> None:
         self._collect()
@@ -170,26 +142,3 @@ class TableRun:
         lost = math.ceil(self._weights.age_s / i.dt_s)
         later = replace(i, dv_mps=rows_later(i.dv_mps, self._weights.age_s / i.dt_s))
         return later.part(0, len(i) - lost)
-
-
-def _parts(duration_s: float) -> int:
-    return max(1, round(duration_s / PART_S))
-
-
-def parts_of(moves: Sequence[Move]) -> int:
-    """How often a run of them reports."""
-    return sum(1 if _is_position(m) else _parts(m.duration_s) for m in moves)
-
-
-def _is_position(move: Move) -> bool:
-    return move.rate_dps != 0.0 and abs(move.angle_deg) <= STEP_DEG
-
-
-def table_axes(bench: Bench) -> int:
-    """How many axes the table has: the first that it refuses ends the count."""
-    for axis in range(1, AXES + 1):
-        try:
-            bench.table.read(axis=axis)
-        except InstrumentError:
-            return axis - 1
-    return AXES

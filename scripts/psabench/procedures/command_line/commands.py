@@ -128,6 +128,7 @@ _EXAMPLES: Mapping[str, str] = {
     SECONDARY[0]: """\
   psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
   psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+  psabench run sins-calibration-secondary --scenario sins_secondary --latitude-deg 55.7 --longitude-deg 37.5
 """,
     SNAKE[0]: """\
   psabench run sins-snake
@@ -238,7 +239,7 @@ _SINS = (
     _command(
         SECONDARY,
         handlers.calibrate_secondary,
-        common=(*FROM_OUTPUTS, "--out"),
+        common=(*FROM_OUTPUTS, "--scenario", "--can", "--table", "--control", "--seed", "--out"),
         load=partial(_of_outputs, SECONDARY[0]),
         notes=NOTES_OUTPUTS,
     ),
