@@ -82,28 +82,31 @@ class Bins(BusUnit):
             age_s=float(self.node.read(OD.TIMING, 4)) * 1e-9,
         )
 
-    def navigate(self, lat_deg: float, lon_deg: float, h_m: float, alignment_s: int) -> ReadingReader:
+    def navigate(
+        self, lat_deg: float, lon_deg: float, h_m: float, alignment_s: int, *, increments: bool = False
+    ) -> ReadingReader:
         """Align at rest, then navigate from this place: what the unit gives out comes to the reader returned.
 
-        The increments are switched off. Raises DeviceError before the first reading.
+        increments: whether they are sent as well. Raises DeviceError before the first reading.
         """
-        for sub, value in enumerate(
-            (round(lat_deg * 1e7), round(lon_deg * 1e7), round(h_m * 1e3), alignment_s), start=1
-        ):
+        start = (round(lat_deg * 1e7), round(lon_deg * 1e7), round(h_m * 1e3), alignment_s)
+        for sub, value in enumerate(start, start=1):
             self.node.write(OD.NAV_START, sub, value)
+        self.node.write(OD.NAV_MODE, 1, 1)
         for name in MESSAGES:
-            self.node.write(self._tpdo(name), 1, int(self.node.read(self._tpdo(name), 1)) | TPDO_OFF)
+            self._switch(name, on=increments)
         for name in NAV_MESSAGES:
-            self.node.write(self._tpdo(name), 1, int(self.node.read(self._tpdo(name), 1)) & ~TPDO_OFF)
+            self._switch(name, on=True)
         layout = ReadingLayout(board=self.board, messages=NAV_MESSAGES, counter="NSEQ", stamp="NTIME")
         outputs = ReadingReader(layout, self.node.node_id)
         self.host.listeners.append(outputs.on_message)
-        self.node.write(OD.NAV_MODE, 1, 1)
         return outputs
 
     def navigation(self) -> NavState:
         """What the unit's own navigation does."""
         return NavState(int(self.node.read(OD.NAV_MODE, 2)))
 
-    def _tpdo(self, message: str) -> int:
-        return tpdos_of(self.node)[message]
+    def _switch(self, message: str, *, on: bool) -> None:
+        index = tpdos_of(self.node)[message]
+        bits = int(self.node.read(index, 1)) & ~TPDO_OFF
+        self.node.write(index, 1, bits if on else bits | TPDO_OFF)
