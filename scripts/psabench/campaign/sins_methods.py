@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from psabench.campaign.sins_table import BASES, FILTER, SAMPLE_S, Base, Recording, draw_unit, platform_at, record
+from psabench.campaign.sins_table import BASES, FILTER, SAMPLE_S, Base, Recording, draw_unit, platform_at, record_run
 from psabench.campaign.sins_unit import UnitErrors
 from psabench.native.nav import ARCMIN, DEGPH, Floats
 from psabench.native.sins import Params, calibrate_unit
@@ -100,7 +100,7 @@ def run_methods(units: int, seed: int, progress: Progress) -> list[Row]:
             drawn = draw_unit(seed, unit)
             for base in BASES:
                 runs = {
-                    name: record(plan, drawn, base, draw_source(seed, f"{name} {base.name} {unit}"))
+                    name: record_run(plan, drawn, base, draw_source(seed, f"{name} {base.name} {unit}"))
                     for name, plan in plans.items()
                 }
                 for m in METHODS:

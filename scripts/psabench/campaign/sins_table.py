@@ -65,12 +65,12 @@ def draw_unit(seed: int, unit: int) -> UnitErrors:
     )
 
 
-def record(plan: RotationPlan, errors: UnitErrors, base: Base, source: np.random.Generator) -> Recording:
+def record_run(plan: RotationPlan, errors: UnitErrors, base: Base, source: np.random.Generator) -> Recording:
     """Increments and angles of a run. The unit is mounted off the platform's axes by 1 deg on each, one sigma."""
     e = Experiment(sample_s=SAMPLE_S)
-    mounted = _turned(source.normal(size=3) * FILTER.delta_sd_rad)  # platform to b
+    mounted = _turned_by(source.normal(size=3) * FILTER.delta_sd_rad)  # platform to b
     tilt = source.normal(size=3) * [base.tilt_rad, base.tilt_rad, base.azimuth_rad]
-    off = _turned(tilt)  # what the table calls n, to n
+    off = _turned_by(tilt)  # what the table calls n, to n
     turns = [replace(t, axis_b=tuple(mounted @ np.array(t.axis_b))) for t in plan.turns]
     ideal = list(ideal_increments(e, off @ plan.start_c_nb @ mounted.T, turns))
     w, f = (np.vstack([part[k] for part in ideal]) for k in (0, 1))
@@ -99,7 +99,7 @@ def _table_side(e: Experiment, plan: RotationPlan, source: np.random.Generator) 
         gravity_n_mps2=gravity_force(e),
         earth_n_radps=earth_rate_n(math.radians(e.latitude_deg)),
         t_s=t_s,
-        c_st=platform_at(plan, t_s) @ _turned(noise),
+        c_st=platform_at(plan, t_s) @ _turned_by(noise),
         angle_sd_rad=ANGLE_SD_RAD,
         gyro_noise_radps_rts=FILTER.gyro_noise_radps_rts,
     )
@@ -110,17 +110,17 @@ def platform_at(plan: RotationPlan, t_s: Floats) -> Floats:
     edges = np.concatenate([[0.0], np.cumsum([t.duration_s for t in plan.turns])])
     starts = [plan.start_c_nb]
     for turn in plan.turns:
-        starts.append(starts[-1] @ _turned(_rate_of(turn) * turn.duration_s))
+        starts.append(starts[-1] @ _turned_by(_rate_of(turn) * turn.duration_s))
     at = np.clip(np.searchsorted(edges, t_s, side="right") - 1, 0, len(plan.turns) - 1)
     rates = np.array([_rate_of(t) for t in plan.turns])
-    return np.asarray(np.array(starts)[at] @ _turned(rates[at] * (t_s - edges[at])[:, None]))
+    return np.asarray(np.array(starts)[at] @ _turned_by(rates[at] * (t_s - edges[at])[:, None]))
 
 
 def _rate_of(turn: Turn) -> Floats:
     return np.asarray(np.array(turn.axis_b) * turn.rate_radps)
 
 
-def _turned(v: Floats) -> Floats:
+def _turned_by(v: Floats) -> Floats:
     """exp([v x]) of one vector or of rows."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     k = np.cross(v[..., None, :], np.eye(3)).swapaxes(-1, -2)

@@ -12,7 +12,7 @@ from psabench.boards.bins.device import Bins, NavState, UnitIncrements, incremen
 from psabench.errors import DeviceError, InstrumentError
 from psabench.link.vcd import read_vcd
 from psabench.native.strapdown import State, Strapdown
-from psabench.sins.outputs import matrices_of
+from psabench.sins.secondary.outputs import matrices_of
 
 pytestmark = pytest.mark.host
 

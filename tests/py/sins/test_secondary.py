@@ -21,12 +21,13 @@ from psabench.native.nav_errors import ErrorsConfig
 from psabench.native.sins import Turn
 from psabench.progress import Bar
 from psabench.quartz.draws import draw_source
-from psabench.sins import secondary, secondary_page
 from psabench.sins.alignment import aligned_state
-from psabench.sins.outputs import Outputs, read_outputs, write_outputs
 from psabench.sins.plan import read_plan
-from psabench.sins.secondary import Secondary, calibrate_outputs, compensate_outputs, errors_of
-from psabench.sins.secondary_run import SecondaryOptions, SecondaryParams, run_secondary
+from psabench.sins.secondary import estimate as secondary
+from psabench.sins.secondary import page as secondary_page
+from psabench.sins.secondary.estimate import Secondary, calibrate_outputs, compensate_outputs, errors_of
+from psabench.sins.secondary.outputs import Outputs, read_outputs, write_outputs
+from psabench.sins.secondary.run import SecondaryOptions, SecondaryParams, run_secondary
 
 Floats = np.ndarray
 # Eight minutes, for what needs no accuracy.

@@ -15,7 +15,7 @@ from command_line import mistake_line
 from psabench import cli
 from psabench.campaign import sins_methods, sins_table
 from psabench.campaign.sins_methods import METHODS, Row
-from psabench.campaign.sins_table import BASES, Base, Recording, draw_unit, record
+from psabench.campaign.sins_table import BASES, Base, Recording, draw_unit, record_run
 from psabench.campaign.sins_unit import UnitErrors
 from psabench.errors import BadInput
 from psabench.native.nav import ARCMIN, DEGPH
@@ -38,7 +38,7 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def recorded(plan: str, unit: int = 0, base: Base = BASES[0]) -> tuple[UnitErrors, Recording]:
     drawn = draw_unit(SEED, unit)
-    return drawn, record(read_plan(plan), drawn, base, draw_source(SEED, f"{plan} {base.name} {unit}"))
+    return drawn, record_run(read_plan(plan), drawn, base, draw_source(SEED, f"{plan} {base.name} {unit}"))
 
 
 def worst(found: Params, truth: UnitErrors) -> dict[str, float]:

@@ -187,7 +187,8 @@ def _of_the_covariance() -> Parameters:
 
 
 def _of_outputs(name: str) -> Parameters:
-    from psabench.sins import secondary_run, snake
+    from psabench.sins import snake
+    from psabench.sins.secondary import run as secondary_run
 
     kind: type[Any] = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
     return Parameters(fields=kind.__dataclass_fields__)

@@ -67,12 +67,12 @@ def calibrate_by_fourier(data: Increments, cycles: Sequence[Cycle], gravity_mps2
     for _ in range(PASSES):
         w = found.gyros(data.dtheta_rad / data.dt_s)
         f = found.accelerometers(data.dv_mps / data.dt_s)
-        left = _gather([_cycle_errors(c, w, f, data.dt_s, gravity_mps2) for c in cycles])
-        found = _composed(found, left)
+        left = _gather_cycles([_cycle_errors(c, w, f, data.dt_s, gravity_mps2) for c in cycles])
+        found = _composed_errors(found, left)
     return found
 
 
-def _composed(before: Params, left: Params) -> Params:
+def _composed_errors(before: Params, left: Params) -> Params:
     """Errors of the data, whose correction by `before` leaves `left`."""
     return Params(
         nu_radps=before.nu_radps + (np.eye(3) + before.theta) @ left.nu_radps,
@@ -108,9 +108,9 @@ def _cycle_errors(c: Cycle, w: Floats, f: Floats, dt_s: float, gravity_mps2: flo
     going = np.exp(-1j * psi) * np.sinc(rate * dt_s / (2.0 * np.pi))  # a sample is a mean over its turn
     z = f_a[:, k] + 1j * f_a[:, m]
     slopes = [(x - x.mean()) * going for x in (psi, t_s)]  # about the middle: |Z| does not hang on them
-    one, on, round_, by_psi, by_t = _fit(z, [np.ones(len(z)), going, going.conj(), *slopes])
+    one, on, round_, by_psi, by_t = _fit_basis(z, [np.ones(len(z)), going, going.conj(), *slopes])
     towards = on / abs(on)
-    along = [_along(f_a[part], w_a[part], going[part] * on, c.axes) for part in _parts(halves)]
+    along = [_along_axis(f_a[part], w_a[part], going[part] * on, c.axes) for part in _parts(halves)]
     mean = 0.5 * (along[0] + along[1])
     return _Seen(
         axes=c.axes,
@@ -128,7 +128,7 @@ def _parts(halves: tuple[slice, slice]) -> tuple[slice, slice]:
     return slice(0, first), slice(first, None)
 
 
-def _fit(z: Complexes, basis: Sequence[npt.NDArray[np.generic]]) -> Complexes:
+def _fit_basis(z: Complexes, basis: Sequence[npt.NDArray[np.generic]]) -> Complexes:
     """Coefficients by least squares; each of the basis to its own size."""
     a = np.stack([np.asarray(b, np.complex128) for b in basis], axis=1)
     size = np.abs(a).max(axis=0)
@@ -136,7 +136,7 @@ def _fit(z: Complexes, basis: Sequence[npt.NDArray[np.generic]]) -> Complexes:
     return np.asarray(np.linalg.solve(normal, (a / size).conj().T @ z) / size)
 
 
-def _along(f: Floats, w: Floats, z: Complexes, axes: tuple[int, int, int]) -> Floats:
+def _along_axis(f: Floats, w: Floats, z: Complexes, axes: tuple[int, int, int]) -> Floats:
     """What f_j has of f_k and f_m, and where gyros k and m see the axis; the Earth's rate across it is left out."""
     j, k, m = axes
     a = np.stack([np.ones(len(z)), z.real, z.imag], axis=1)
@@ -152,7 +152,7 @@ def _rotation_onto(axis: Floats, v: Floats) -> Floats:
     return np.asarray(np.eye(3) + m + m @ m / (1.0 + n @ axis))
 
 
-def _gather(cycles: Sequence[_Seen]) -> Params:
+def _gather_cycles(cycles: Sequence[_Seen]) -> Params:
     """Means over the cycles that see the same; Gamma_12, Gamma_13 and Gamma_32 are 0."""
     nu, df, scale = np.zeros(3), np.zeros((2, 3)), np.zeros((2, 3))
     theta, gamma, turns = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)

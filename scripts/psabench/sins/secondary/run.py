@@ -13,9 +13,15 @@ from typing import TYPE_CHECKING
 from psabench.errors import BadInput, expected
 from psabench.native.nav import DEGPH
 from psabench.procedures.result import option
-from psabench.sins.outputs import Outputs, Point, read_outputs, write_outputs
 from psabench.sins.plan import read_plan
-from psabench.sins.secondary import Compensated, Secondary, SecondaryConfig, calibrate_outputs, compensate_outputs
+from psabench.sins.secondary.estimate import (
+    Compensated,
+    Secondary,
+    SecondaryConfig,
+    calibrate_outputs,
+    compensate_outputs,
+)
+from psabench.sins.secondary.outputs import Outputs, Point, read_outputs, write_outputs
 
 if TYPE_CHECKING:
     from psabench.bench import Bench
@@ -127,7 +133,7 @@ def run_secondary(params: SecondaryParams, options: SecondaryOptions, progress: 
 
 def record_first(params: SecondaryParams, options: SecondaryOptions, progress: Progress) -> Path:
     """A run on the bench, as OUT/first.csv. Raises BadInput, BenchError."""
-    from psabench.sins.outputs_run import record_outputs
+    from psabench.sins.secondary.on_bench import record_outputs
     from psabench.sins.table import moves_of
     from psabench.sins.table_drive import parts_of, table_axes
 

@@ -11,7 +11,7 @@ from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, NavState
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import DeviceError, expected
-from psabench.sins.outputs import Outputs, Point, matrices_of
+from psabench.sins.secondary.outputs import Outputs, Point, matrices_of
 from psabench.sins.table import Move
 from psabench.sins.table_drive import PlanDrive
 
@@ -33,10 +33,10 @@ def record_outputs(
     drive.make_all()
     bench.run_for(REST_S)
     unit.stop()
-    return outputs_of(_whole(reader))
+    return outputs_of(_whole_run(reader))
 
 
-def _whole(reader: ReadingReader) -> Readings:
+def _whole_run(reader: ReadingReader) -> Readings:
     got_all = reader.take()  # counts what is missing
     if reader.counters.lost or reader.counters.torn:
         got = f"{reader.counters.lost} missing, {reader.counters.torn} torn"
