@@ -2,9 +2,10 @@
  *
  * Axes n are east, north, up at the present place; q turns b to n. The height is held. Rotation vector and velocity of a reading
  * from its increments and those before it (coning and sculling of two readings), the turn of n by its mean rate. */
-#include "board/bins/bins.h"
+#include "board/bins/navigate.h"
 
 #include "base/detmath.h"
+#include "board/bins/bins.h"
 #include "phys/motion/earth.h"
 
 #include <math.h>
