@@ -164,7 +164,7 @@ RULES = {
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 61_681, 61_681),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 62_237, 62_237),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 62_258, 62_258),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_053, 2_053),
 }
 
