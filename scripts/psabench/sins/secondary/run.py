@@ -37,7 +37,7 @@ class SecondaryParams:
     latitude_deg: float | None = option(None, "deg", "latitude of the table; none: where the recording starts")
     longitude_deg: float | None = option(None, "deg", "longitude of the table; none: where the recording starts")
     height_m: float = option(0.0, "m", "height of the table over the ellipsoid")
-    plan: str | None = option(None, "", "plan of rotations on a bench: a name or a YAML file (none: secondary)")
+    plan: str = option("secondary", "", "plan of rotations on a bench: a name or a YAML file")
     alignment_s: float = option(600.0, "s", "alignment at rest before the unit navigates")
     gyro_noise_degph_rts: float = option(0.1, "deg/h", "noise of the gyros, mean over 1 s")
     accel_noise_mps2_rts: float = option(1e-3, "m/s2", "noise of the accelerometers, mean over 1 s")
@@ -130,7 +130,7 @@ def record_first(params: SecondaryParams, options: SecondaryOptions, progress: P
     point = Point(
         lat_rad=math.radians(params.latitude_deg), lon_rad=math.radians(params.longitude_deg), h_m=params.height_m
     )
-    plan = read_plan(params.plan or "secondary")
+    plan = read_plan(params.plan)
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "first.csv"
     with options.open_bench(SCENARIO) as bench:
