@@ -86,60 +86,112 @@ double kf_variance(const nav_kf *kf, int i)
 static void move_state(struct nav_kf *kf)
 {
     double moved[KF_MAX];
-    kf_move(kf, kf->x, kf->phi.count, moved);
+    for (int i = 0; i < kf->dynamic; i++) {
+        const struct kf_used *used = &kf->phi.group[i / KF_GROUP];
+        moved[i] = 0.0;
+        for (int k = 0; k < used->count; k++) moved[i] += kf->phi.rows[i * kf->n + used->at[k]] * kf->x[used->at[k]];
+    }
     memcpy(kf->x, moved, sizeof *moved * (size_t)kf->dynamic);
 }
 
 int nav_kf_predict(nav_kf *kf, const double *phi, const double *q)
 {
     if (!all_finite(phi, kf->dynamic * kf->n) || !all_finite(q, kf->dynamic * kf->dynamic)) return NAV_NOT_FINITE;
-    kf->phi.rows = phi;
-    kf->phi.count = kf_list_used(kf->dynamic, kf->n, phi, kf->phi.at);
+    kf_take_phi(kf, phi);
     if (kf->form == NAV_KF_JOSEPH) kf_full_predict(kf, q);
     else if (!kf_ud_predict(kf, q)) return NAV_SINGULAR;
     move_state(kf);
     return NAV_OK;
 }
 
-static int find_gain(const nav_kf *kf, const double *h, double z, double r, struct kf_gain *g,
-                     struct nav_kf_innovation *out)
+static int check_measurement(const nav_kf *kf, const double *h, double z, double r)
 {
     if (!all_finite(h, kf->n) || !std::isfinite(z) || !std::isfinite(r)) return NAV_NOT_FINITE;
-    if (!(r > 0.0)) return NAV_RANGE;
-    (kf->form == NAV_KF_UD ? kf_ud_gain : kf_full_gain)(kf, h, r, g);
+    return r > 0.0 ? NAV_OK : NAV_RANGE;
+}
+
+static int innovation(const nav_kf *kf, const double *h, double z, const struct kf_gain *g,
+                      struct nav_kf_innovation *out)
+{
     if (!(g->variance > 0.0)) return NAV_SINGULAR;
     out->variance = g->variance;
-    out->value = z;
-    for (int i = 0; i < kf->n; i++) out->value -= h[i] * kf->x[i];
+    out->value = z - kf_dot(kf->n, h, kf->x);
     return NAV_OK;
+}
+
+static void step_state(nav_kf *kf, const struct kf_gain *g, const struct nav_kf_innovation *found)
+{
+    const double step = found->value / found->variance;
+    for (int i = 0; i < kf->n; i++) kf->x[i] += g->w[i] * step;
 }
 
 int nav_kf_innovate(const nav_kf *kf, const double *h, double z, double r, struct nav_kf_innovation *out)
 {
     struct kf_gain g;
     struct nav_kf_innovation found;
-    g.of = NULL;
-    const int status = find_gain(kf, h, z, r, &g, &found);
+    int status = check_measurement(kf, h, z, r);
+    if (status != NAV_OK) return status;
+    if (kf->form == NAV_KF_UD) kf_ud_gain(kf, h, r, &g);
+    else {
+        kf_full_products(kf, h, 1, &g);
+        kf_full_gain(kf, h, r, &g, 0);
+    }
+    status = innovation(kf, h, z, &g, &found);
     if (status == NAV_OK) *out = found;
+    return status;
+}
+
+static int update_ud(nav_kf *kf, const double *h, double z, double r, struct nav_kf_innovation *out)
+{
+    struct kf_gain g;
+    struct nav_kf_innovation found;
+    int status = check_measurement(kf, h, z, r);
+    if (status != NAV_OK) return status;
+    kf_ud_gain(kf, h, r, &g);
+    status = innovation(kf, h, z, &g, &found);
+    if (status != NAV_OK) return status;
+    step_state(kf, &g, &found);
+    kf_ud_update(kf, r, &g);
+    if (out) *out = found;
+    return NAV_OK;
+}
+
+/* KF_GROUP measurements at most; those before a bad one are taken. */
+static int update_full(nav_kf *kf, const double *h, const double *z, const double *r, int count,
+                       struct nav_kf_innovation *out)
+{
+    struct kf_gain g[KF_GROUP];
+    struct nav_kf_innovation found;
+    int status = NAV_OK;
+    int done = 0;
+    kf_full_products(kf, h, count, g);
+    for (; done < count; done++) {
+        const double *row = h + done * kf->n;
+        status = check_measurement(kf, row, z[done], r[done]);
+        if (status != NAV_OK) break;
+        kf_full_gain(kf, row, r[done], g, done);
+        status = innovation(kf, row, z[done], &g[done], &found);
+        if (status != NAV_OK) break;
+        step_state(kf, &g[done], &found);
+        kf_full_take(kf, &g[done]);
+        if (out) out[done] = found;
+    }
+    kf_full_subtract(kf, g, done);
     return status;
 }
 
 int nav_kf_update(nav_kf *kf, const double *h, const double *z, const double *r, int count,
                   struct nav_kf_innovation *out)
 {
-    struct kf_gain g;
-    struct nav_kf_innovation found;
-    g.of = NULL;
-    for (int m = 0; m < count; m++) {
-        const int status = find_gain(kf, h + m * kf->n, z[m], r[m], &g, &found);
-        if (status != NAV_OK) return status;
-        const double step = found.value / found.variance;
-        for (int i = 0; i < kf->n; i++) kf->x[i] += g.w[i] * step;
-        if (kf->form == NAV_KF_UD) kf_ud_update(kf, h + m * kf->n, r[m], &g);
-        else kf_full_update(kf, &g, m + 1 < count ? h + (m + 1) * kf->n : NULL);
-        if (out) out[m] = found;
+    const int most = kf->form == NAV_KF_UD ? 1 : KF_GROUP;
+    int status = NAV_OK;
+    for (int m = 0; m < count && status == NAV_OK; m += most) {
+        const int group = count - m < most ? count - m : most;
+        struct nav_kf_innovation *found = out ? out + m : NULL;
+        if (kf->form == NAV_KF_UD) status = update_ud(kf, h + m * kf->n, z[m], r[m], found);
+        else status = update_full(kf, h + m * kf->n, z + m, r + m, group, found);
     }
-    return NAV_OK;
+    return status;
 }
 
 double nav_kf_nees(int n, const double *error, const double *p)

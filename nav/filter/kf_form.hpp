@@ -17,11 +17,16 @@ inline uint64_t kf_bits(double x)
     return bits;
 }
 
-/* Phi's moving rows, dynamic x n, the caller's, and the columns of it that are not zero. */
-struct kf_phi {
-    const double *rows;
+struct kf_used { /* columns of some rows that are not zero */
     int count;
     int at[KF_MAX];
+};
+
+/* Phi's moving rows, dynamic x n, the caller's; what all of them use, and what each group of rows does. */
+struct kf_phi {
+    const double *rows;
+    struct kf_used all;
+    struct kf_used group[(KF_MAX + KF_GROUP - 1) / KF_GROUP];
 };
 
 struct nav_kf {
@@ -35,28 +40,33 @@ struct nav_kf {
     double store[2 * KF_MAX * KF_MAX + KF_LANES];
 };
 
-/* w: gain times s, innovation variance s = h w + r. u is what the form wants again in the update. */
+/* w: gain times s, innovation variance s = h w + r. u is what the UD form needs again in the update. */
 struct kf_gain {
     alignas(KF_ALIGN_BYTES) double w[KF_MAX];
     double u[KF_MAX];
     double variance;
-    const double *of; /* h, where w = P h is there before it is asked for; or NULL */
 };
 
 /* P = U D U': ut row j holds column j of U. False: an eigenvalue is negative. p and ut may be the same. */
 bool kf_factor(int n, const double *p, double *ut, double *d);
 
-int kf_list_used(int rows, int n, const double *a, int *at); /* columns of a, rows of n, that are not zero */
-void kf_move(const struct nav_kf *kf, const double *a, int count, double *y); /* Phi a of `count` columns of phi.at */
+void kf_list_used(int rows, int n, const double *a, struct kf_used *used);
+double kf_dot(int n, const double *a, const double *b);
+void kf_take_phi(struct nav_kf *kf, const double *rows);
+void kf_move(const struct nav_kf *kf, const double *a, int count, double *y); /* Phi a of the first `count` of phi.all */
 
-void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
-void kf_full_update(struct nav_kf *kf, struct kf_gain *g, const double *next_h); /* next_h: or NULL */
+/* Measurements by groups of KF_GROUP, so that P is read once and written once: products of all, then for each what the ones
+ * before it leave of its gain and, once it is taken, its part of P; then the parts are subtracted. */
+void kf_full_products(const struct nav_kf *kf, const double *h, int count, struct kf_gain *g);
+void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g, int before);
+void kf_full_take(const struct nav_kf *kf, struct kf_gain *g);
+void kf_full_subtract(struct nav_kf *kf, const struct kf_gain *g, int count);
 void kf_full_predict(struct nav_kf *kf, const double *q);
 void kf_full_set(struct nav_kf *kf, const double *p);
 void kf_full_get(const struct nav_kf *kf, double *p);
 
 void kf_ud_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
-void kf_ud_update(struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
+void kf_ud_update(struct nav_kf *kf, double r, const struct kf_gain *g);
 bool kf_ud_predict(struct nav_kf *kf, const double *q);
 double kf_variance(const struct nav_kf *kf, int i); /* P_ii */
 void kf_ud_full(const struct nav_kf *kf, double *p);

@@ -8,29 +8,49 @@ static void add_rows(const struct nav_kf *kf, const struct kf_sum &s)
     kf->kernels->add_rows(&s);
 }
 
-/* w = P h. */
-void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g)
+/* w = P h of each. */
+void kf_full_products(const struct nav_kf *kf, const double *h, int count, struct kf_gain *g)
 {
-    const int n = kf->n;
-    if (g->of != h) {
-        int at[KF_MAX];
-        const int count = kf_list_used(1, n, h, at);
-        memset(g->w, 0, sizeof *g->w * (size_t)kf->stride);
-        add_rows(kf, {1, kf->stride, count, at, h, kf->p, g->w, 0, kf->stride, 0});
-    }
-    g->variance = r;
-    for (int k = 0; k < n; k++) g->variance += h[k] * g->w[k];
+    constexpr int GAIN_STRIDE = sizeof *g / sizeof *g->w;
+    struct kf_used used;
+    kf_list_used(count, kf->n, h, &used);
+    for (int m = 0; m < count; m++) memset(g[m].w, 0, sizeof *g->w * (size_t)kf->stride);
+    add_rows(kf, {count, kf->stride, used.count, used.at, h, kf->p, g->w, kf->n, kf->stride, GAIN_STRIDE});
 }
 
-/* P - w w'/s as (w/sqrt s)(w/sqrt s)'. */
-void kf_full_update(struct nav_kf *kf, struct kf_gain *g, const double *next_h)
+/* (P - v v') h = w - v (v h), v of the measurements before; s = h w + r. */
+void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g, int before)
+{
+    struct kf_gain *last = g + before;
+    for (int m = 0; m < before; m++) {
+        const double part = kf_dot(kf->n, g[m].w, h);
+        for (int i = 0; i < kf->stride; i++) last->w[i] -= g[m].w[i] * part;
+    }
+    last->variance = r + kf_dot(kf->n, h, last->w);
+}
+
+/* w w'/s is v v' of v = w/sqrt s. */
+void kf_full_take(const struct nav_kf *kf, struct kf_gain *g)
 {
     const double scale = 1.0 / std::sqrt(g->variance);
-    alignas(KF_ALIGN_BYTES) double v[KF_MAX];
-    for (int i = 0; i < kf->stride; i++) v[i] = g->w[i] * scale;
-    const struct kf_square square = {kf->n, kf->stride, v, next_h, kf->p, g->w};
-    kf->kernels->subtract_square(&square);
-    g->of = next_h;
+    for (int i = 0; i < kf->stride; i++) g->w[i] *= scale;
+}
+
+void kf_full_subtract(struct nav_kf *kf, const struct kf_gain *g, int count)
+{
+    const struct kf_squares squares = {kf->n, kf->stride, count, sizeof *g / sizeof *g->w, g->w, kf->p};
+    kf->kernels->subtract_squares(&squares);
+}
+
+/* y += Phi p of so many columns; rows of p and of y that far apart. */
+static void add_moving(const struct nav_kf *kf, const double *p, int columns, double *y, int y_stride)
+{
+    for (int i = 0; i < kf->dynamic; i += KF_GROUP) {
+        const struct kf_used *used = &kf->phi.group[i / KF_GROUP];
+        const int rows = kf->dynamic - i < KF_GROUP ? kf->dynamic - i : KF_GROUP;
+        add_rows(kf, {rows, columns, used->count, used->at, kf->phi.rows + i * kf->n, p, y + i * y_stride, kf->n,
+                      kf->stride, y_stride});
+    }
 }
 
 /* N = Phi P and its transpose as the moving rows and columns; in the square where they meet, Q + Phi N'. */
@@ -40,16 +60,15 @@ void kf_full_predict(struct nav_kf *kf, const double *q)
     const int nd = kf->dynamic;
     const int stride = kf->stride;
     const int side = KF_PADDED(nd);
-    const struct kf_phi *phi = &kf->phi;
     double *rows = kf->work;
     alignas(KF_ALIGN_BYTES) double square[KF_MAX * KF_MAX];
     memset(rows, 0, sizeof *rows * (size_t)(nd * stride));
-    add_rows(kf, {nd, stride, phi->count, phi->at, phi->rows, kf->p, rows, n, stride, stride});
+    add_moving(kf, kf->p, stride, rows, stride);
     for (int k = 0; k < n; k++)
         for (int i = 0; i < nd; i++) kf->p[k * stride + i] = rows[i * stride + k];
     for (int i = 0; i < nd; i++)
         for (int j = 0; j < side; j++) square[i * side + j] = j < nd ? q[i * nd + j] : 0.0;
-    add_rows(kf, {nd, side, phi->count, phi->at, phi->rows, kf->p, square, n, stride, side});
+    add_moving(kf, kf->p, side, square, side);
     memcpy(kf->p, rows, sizeof *rows * (size_t)(nd * stride));
     for (int i = 0; i < nd; i++)
         for (int j = 0; j <= i; j++) kf->p[i * stride + j] = kf->p[j * stride + i] = square[i * side + j];

@@ -43,48 +43,43 @@ template <int LANES> INLINE void add_rows(const struct kf_sum *s)
 }
 
 /* -v_i v_j and -v_j v_i are the same number: p stays symmetric to the last bit. Half and a mirror would cost more. */
-template <int LANES, int VECTORS, bool NEXT> INLINE void subtract_tile(const struct kf_square *s, int column)
+template <int LANES, int COUNT, int VECTORS> INLINE void subtract_tile(const struct kf_squares *s, int column)
 {
     using vec = typename lanes<LANES>::v;
-    vec v[VECTORS];
-    vec sum[VECTORS];
-    for (int j = 0; j < VECTORS; j++) {
-        v[j] = ((const vec *)(s->v + column))[j];
-        sum[j] = vec{};
-    }
+    vec v[COUNT][VECTORS];
+    for (int m = 0; m < COUNT; m++)
+        for (int j = 0; j < VECTORS; j++) v[m][j] = ((const vec *)(s->v + m * s->v_stride + column))[j];
     for (int k = 0; k < s->n; k++) {
         vec *p = (vec *)(s->p + k * s->stride + column);
-        const double a = -s->v[k];
-        const double h = NEXT ? s->h[k] : 0.0;
-        for (int j = 0; j < VECTORS; j++) {
-            const vec left = p[j] + a * v[j];
-            p[j] = left;
-            if (NEXT) sum[j] += h * left;
-        }
+        vec left[VECTORS];
+        for (int j = 0; j < VECTORS; j++) left[j] = p[j];
+        for (int m = 0; m < COUNT; m++)
+            for (int j = 0; j < VECTORS; j++) left[j] -= s->v[m * s->v_stride + k] * v[m][j];
+        for (int j = 0; j < VECTORS; j++) p[j] = left[j];
     }
-    for (int j = 0; NEXT && j < VECTORS; j++) ((vec *)(s->y + column))[j] = sum[j];
 }
 
-template <int LANES, bool NEXT> INLINE void subtract_columns(const struct kf_square *s)
+template <int LANES, int COUNT> INLINE void subtract_columns(const struct kf_squares *s)
 {
     constexpr int TILE = LANES * TILE_VECTORS;
     int column = 0;
-    for (; column + TILE <= s->stride; column += TILE) subtract_tile<LANES, TILE_VECTORS, NEXT>(s, column);
-    for (; column < s->stride; column += LANES) subtract_tile<LANES, 1, NEXT>(s, column);
+    for (; column + TILE <= s->stride; column += TILE) subtract_tile<LANES, COUNT, TILE_VECTORS>(s, column);
+    for (; column < s->stride; column += LANES) subtract_tile<LANES, COUNT, 1>(s, column);
 }
 
-template <int LANES> INLINE void subtract_square(const struct kf_square *s)
+template <int LANES> INLINE void subtract_squares(const struct kf_squares *s)
 {
-    if (s->h) subtract_columns<LANES, true>(s);
-    else subtract_columns<LANES, false>(s);
+    if (s->count == 3) subtract_columns<LANES, 3>(s);
+    if (s->count == 2) subtract_columns<LANES, 2>(s);
+    if (s->count == 1) subtract_columns<LANES, 1>(s);
 }
 
 BY_WIDTH(add, (const struct kf_sum *s), add_rows<WIDTH>(s))
-BY_WIDTH(square, (const struct kf_square *s), subtract_square<WIDTH>(s))
+BY_WIDTH(squares, (const struct kf_squares *s), subtract_squares<WIDTH>(s))
 
-const struct kf_kernels kf_kernels[KF_WIDTHS] = {{add_by_width[0], square_by_width[0]},
-                                                 {add_by_width[1], square_by_width[1]},
-                                                 {add_by_width[2], square_by_width[2]}};
+const struct kf_kernels kf_kernels[KF_WIDTHS] = {{add_by_width[0], squares_by_width[0]},
+                                                 {add_by_width[1], squares_by_width[1]},
+                                                 {add_by_width[2], squares_by_width[2]}};
 
 int kf_width(void)
 {

@@ -23,16 +23,18 @@ struct kf_sum {
     int a_stride, p_stride, y_stride;
 };
 
-/* p -= v v', n rows; then y = p h, where there is an h: the next measurement's, while the rows are at hand. */
-struct kf_square {
+/* p -= v v' of each v, up to KF_GROUP of them one after the other; p has n rows. */
+#define KF_GROUP 3
+struct kf_squares {
     int n, stride;
-    const double *v, *h;
-    double *p, *y;
+    int count, v_stride;
+    const double *v;
+    double *p;
 };
 
 struct kf_kernels {
     void (*add_rows)(const struct kf_sum *s);
-    void (*subtract_square)(const struct kf_square *s);
+    void (*subtract_squares)(const struct kf_squares *s);
 };
 
 /* This processor runs kf_kernels[0] to kf_kernels[kf_width()]; the last is the quickest. */

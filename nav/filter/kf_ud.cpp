@@ -57,7 +57,7 @@ void kf_ud_gain(const struct nav_kf *kf, const double *h, double r, struct kf_ga
 }
 
 /* Bierman's update; b becomes P h, and a the variance of the innovation. */
-void kf_ud_update(struct nav_kf *kf, const double *, double r, struct kf_gain *g)
+void kf_ud_update(struct nav_kf *kf, double r, const struct kf_gain *g)
 {
     const int n = kf->n;
     double b[KF_MAX];
@@ -111,7 +111,7 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
     for (int j = 0; j < n; j++) {
         double *col = kf->p + j * n;
         double moved[KF_MAX];
-        while (used < kf->phi.count && kf->phi.at[used] <= j) used++;
+        while (used < kf->phi.all.count && kf->phi.all.at[used] <= j) used++;
         kf_move(kf, col, used, moved);
         for (int i = 0; i < nd; i++) (j < nd ? w[i][j] : col[i]) = moved[i];
     }

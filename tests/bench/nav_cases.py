@@ -10,16 +10,26 @@ import numpy as np
 N, MOVING, M, TURNS = 45, 6, 3, 16  # as bench_kf.cpp has them
 
 
+def calibration_pattern() -> tuple[np.ndarray, np.ndarray]:
+    """Phi's moving rows and rows of measurements, 1 where keep_pattern() of bench_kf.cpp leaves a number."""
+    phi, h = np.zeros((MOVING, N)), np.zeros((M, N))
+    phi[:3, :18] = 1.0
+    phi[3:, 3:MOVING] = np.eye(3)
+    h[:, 18:40] = 1.0
+    h[[0, 1], [1, 0]] = 1.0
+    return phi, h
+
+
 def filterpy(count: int) -> str:
     """Steps of filterpy's KalmanFilter: prediction and three measurements at once."""
     from filterpy.kalman import KalmanFilter  # type: ignore[import-untyped]
 
-    rng = np.random.default_rng(1)
+    rng, (phi, h) = np.random.default_rng(1), calibration_pattern()
     f = KalmanFilter(dim_x=N, dim_z=M)
-    f.F[:MOVING] += 0.01 * rng.uniform(-0.5, 0.5, (MOVING, N))
+    f.F[:MOVING] += 0.01 * rng.uniform(-0.5, 0.5, (MOVING, N)) * phi
     f.Q = np.diag([1e-6] * MOVING + [0.0] * (N - MOVING))
     f.R = 0.01 * np.eye(M)
-    rows, z = rng.uniform(-0.5, 0.5, (TURNS, M, N)), np.array([0.1, -0.2, 0.3])
+    rows, z = rng.uniform(-0.5, 0.5, (TURNS, M, N)) * h, np.array([0.1, -0.2, 0.3])
     began_ns = time.process_time_ns()
     for k in range(count):
         f.predict()

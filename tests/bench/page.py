@@ -62,9 +62,11 @@ MONTE_CARLO = {
 
 NAV = {  # label, unit of work, ms or us of one
     "kf-joseph": ("filter step, 45 states of which 6 move, 3 measurements: `NAV_KF_JOSEPH`", "µs", "kf-joseph"),
-    "kf-ud": ("the same, `NAV_KF_UD`", "µs", "kf-joseph"),
-    "kf-dense": ("the same, dense Joseph formulas in Eigen, vectorised", "µs", "kf-joseph"),
-    "kf-filterpy": ("the same, filterpy", "µs", "kf-joseph"),
+    "kf-joseph-full": ("the same with no zero in the matrices", "µs", "kf-joseph"),
+    "kf-ud": ("the first, `NAV_KF_UD`", "µs", "kf-joseph"),
+    "kf-ud-full": ("the same with no zero in the matrices", "µs", "kf-joseph"),
+    "kf-dense": ("the first, dense Joseph formulas in Eigen, vectorised", "µs", "kf-joseph"),
+    "kf-filterpy": ("the first, filterpy", "µs", "kf-joseph"),
     "sins-plan": ("covariance of the article's three cycles, 2718 s at 100 Hz, 24 states", "ms", "sins-plan"),
     "strapdown": ("strapdown, an hour at 100 Hz, path given back", "ms", "strapdown"),
     "strapdown-python-ins": ("the same, python-ins", "ms", "strapdown"),

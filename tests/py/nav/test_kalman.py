@@ -102,6 +102,27 @@ def test_innovations_are_those_before_each_scalar(form: Form) -> None:
     assert sum(i.value**2 / i.variance for i in out) == pytest.approx(want, rel=1e-9)
 
 
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("bad", range(7))
+def test_scalars_before_a_bad_one_are_taken_and_no_other(form: Form, bad: int) -> None:
+    """Seven at once, of which the `bad`th has no variance; the filter takes them by groups."""
+    n, f = 9, Filter(9, 2, form)
+    x, p = np.zeros(n), start_covariance(n)
+    f.set(x, p)
+    steps = list(random_steps(n, 2, 3))
+    h, z, r = (np.concatenate(rows)[:7] for rows in zip(*((s.h, s.z, s.r) for s in steps), strict=True))
+    r[bad] = 0.0
+    out = (InnovationStruct * 7)()
+    assert f.update(h, z, r, out) == RANGE
+    for k in range(bad):
+        assert out[k].value == pytest.approx(z[k] - h[k] @ x, rel=1e-9)
+        x, p = joseph(x, p, h[k : k + 1], z[k : k + 1], r[k : k + 1])
+    assert [i.variance for i in out[bad:]] == [0.0] * (7 - bad)
+    got_x, got_p = f.get()
+    assert relative(got_p, p) < 1e-9
+    assert np.max(np.abs(got_x - x) / np.sqrt(np.diag(p))) < 1e-9
+
+
 def test_ud_keeps_a_positive_covariance_where_the_other_form_may_lose_it() -> None:
     """Bierman's example: measurements far better than the prior, nearly alike."""
     e = 1e-9
