@@ -43,6 +43,28 @@ struct board_platform {
                             int64_t t_ns); /* enum gyro_mode; NULL, or why it is rejected */
 };
 
+/* What is wrong with a receiver: the sum of the faults that are active (fault/receiver.c). East, north. */
+struct board_receiver_faults {
+    bool outage, frozen_time;
+    double checksum_probability; /* of a message */
+    int32_t weeks;               /* by which the date is off */
+    double rate_mps[2];          /* the position runs away, and the velocity says so */
+    double base_m[2];            /* how far it has, when this is set */
+    double jump_m[2];
+};
+
+/* Operations on a satellite receiver. */
+struct board_receiver {
+    void (*set_faults)(struct board *b, const struct board_receiver_faults *f, int64_t t_ns);
+};
+
+/* A serial port, bytes out of the board at their bit rate. */
+struct board_serial {
+    uint32_t (*baud)(const struct board *b);
+    /* Each byte from now on, when its stop bit ends; NULL: to no one. */
+    void (*connect)(struct board *b, void (*sent)(void *ctx, uint8_t byte, int64_t t_ns), void *ctx);
+};
+
 typedef void board_truth_fn(void *ctx, const char *name, double value);
 
 struct board_type {
@@ -82,6 +104,8 @@ struct board_type {
     const struct board_can *can;
     const struct board_bus *bus;           /* NULL: no parallel bus */
     const struct board_platform *platform; /* NULL: it controls none */
+    const struct board_receiver *receiver; /* NULL: it is none */
+    const struct board_serial *serial;     /* NULL: it has no serial port */
     /* life */
     void (*init)(struct board *b, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
                  struct sched *s);

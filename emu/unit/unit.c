@@ -211,6 +211,14 @@ static int64_t smooth_ns(void *ctx, int64_t t_ns)
     return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
 }
 
+/* The antenna of a unit stands at the site, whatever instrument carries the unit. */
+static void place_at(void *ctx, int64_t t_ns, struct place *out)
+{
+    const struct site *s = &((const struct unit *)ctx)->lab->site;
+    (void)t_ns;
+    *out = (struct place){.lat_rad = s->latitude_rad, .lon_rad = s->longitude_rad, .h_m = s->height_m};
+}
+
 /* To what the scenario has it at power-on. */
 static double supply_ratio(void *ctx, int64_t t_ns)
 {
@@ -307,6 +315,7 @@ static void init_board(struct unit *u, struct sched *s)
     io.skip_accel = skip_accel;
     io.kinematics = case_kinematics;
     io.smooth_ns = smooth_ns;
+    io.place = place_at;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;

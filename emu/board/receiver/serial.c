@@ -1,0 +1,83 @@
+/* The serial port: messages into the transmit buffer, bytes out of it at the bit rate. */
+#include "board/receiver/receiver.h"
+#include "board/receiver/ubx.h"
+
+#define BITS_A_BYTE 10 /* start, eight of data, stop */
+#define UNIFORM(u)  (((double)((u) >> 11) + 0.5) * 0x1p-53) /* (0, 1) */
+
+static void send_byte(void *ctx, int64_t t_ns)
+{
+    struct receiver *b = ctx;
+    struct receiver_tx *tx = &b->tx;
+    const uint8_t byte = tx->ring[tx->first];
+    tx->first = (tx->first + 1) % RECEIVER_TX_BYTES;
+    tx->count--;
+    tx->bytes++;
+    if (tx->count) sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, (tx->bytes + 1) * BITS_A_BYTE));
+    if (tx->sent) tx->sent(tx->ctx, byte, t_ns);
+}
+
+void receiver_tx_init(struct receiver_tx *tx, const struct receiver_profile *p, struct receiver *b)
+{
+    tx->clock = (struct clk){.hz = p->baud, .div = 1};
+    sched_ev_inner(&tx->ev, send_byte, b);
+}
+
+void receiver_tx_clear(struct receiver *b)
+{
+    sched_cancel(b->base.sched, &b->tx.ev);
+    b->tx.count = 0;
+}
+
+/* The whole message or nothing. A burst begins with an idle line: its bits are counted from there. */
+static void put_message(struct receiver *b, const uint8_t *bytes, unsigned n, int64_t t_ns)
+{
+    struct receiver_tx *tx = &b->tx;
+    if (tx->count + n > RECEIVER_TX_BYTES) {
+        b->counters.lost_messages++;
+        return;
+    }
+    const bool idle = tx->count == 0;
+    for (unsigned i = 0; i < n; i++) tx->ring[(tx->first + tx->count++) % RECEIVER_TX_BYTES] = bytes[i];
+    b->counters.messages++;
+    if (!idle) return;
+    tx->clock.t0_ns = t_ns;
+    tx->bytes = 0;
+    sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, BITS_A_BYTE));
+}
+
+/* A fault: the checksum of the message is wrong. Draws by the number of the message. */
+static bool is_spoilt(const struct receiver *b)
+{
+    const int64_t number = (int64_t)b->counters.messages + b->counters.lost_messages;
+    const double p = b->wrong.checksum_probability;
+    return p > 0.0 && UNIFORM(draws_u64(&b->checksum, number)) < p;
+}
+
+static void put_sentence(struct receiver *b, const struct report *r, enum nmea_kind kind, int64_t t_ns)
+{
+    struct nmea s;
+    nmea_write(r, kind, &s);
+    if (is_spoilt(b)) {
+        char *digit = &s.text[s.len - 3]; /* last of the checksum, before CR LF */
+        *digit = *digit == '0' ? '1' : '0';
+    }
+    put_message(b, (const uint8_t *)s.text, s.len, t_ns);
+}
+
+static void put_pvt(struct receiver *b, const struct report *r, int64_t t_ns)
+{
+    uint8_t packet[UBX_PVT_LEN];
+    ubx_write_pvt(r, packet);
+    if (is_spoilt(b)) packet[UBX_PVT_LEN - 1] ^= 1;
+    put_message(b, packet, UBX_PVT_LEN, t_ns);
+}
+
+void receiver_tx_report(struct receiver *b, const struct report *r, int64_t t_ns)
+{
+    for (unsigned i = 0; i < b->profile.message_count; i++) {
+        const enum receiver_message m = b->profile.message[i];
+        if (m == RECEIVER_PVT) put_pvt(b, r, t_ns);
+        else put_sentence(b, r, (enum nmea_kind)m, t_ns);
+    }
+}
