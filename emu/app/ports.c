@@ -20,7 +20,7 @@ static bool fail_pty(char *why, size_t cap, const char *option, const char *arg,
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
-                                     2 * OPTIONS_BUS_MAX + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
+                                     2 * OPTIONS_BUS_MAX + 2 * OPTIONS_SERIAL_MAX + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
                                      OPTIONS_MAVLINK_MAX * (MAV_PEERS_MAX + 1) + 3,
                "LOOP_LINKS_MAX");
 
@@ -341,14 +341,14 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && logic_check(b, o, why, cap) &&
+    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && serial_check(b, o, why, cap) && logic_check(b, o, why, cap) &&
            mavlink_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
-           logic_open(&p->logic, &p->links, b, o, why, cap) && open_mavlinks(p, b, o, why, cap) &&
+           serial_open(&p->serial, &p->links, b, o, why, cap) && logic_open(&p->logic, &p->links, b, o, why, cap) && open_mavlinks(p, b, o, why, cap) &&
            open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
            open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
@@ -369,6 +369,7 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
     for (unsigned i = 0; i < p->bus_count; i++) close_bus_port(p->bus[i]);
+    serial_close(&p->serial);
     logic_close(&p->logic);
     for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_close(p->mavlink[i]);
     instruments_close(&p->scpi);
@@ -380,6 +381,7 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->bus_count; i++) free(p->bus[i]);
     for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_free(p->mavlink[i]);
     instruments_free(&p->scpi);
+    serial_free(&p->serial);
     logic_free(&p->logic);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
@@ -402,6 +404,7 @@ void ports_abandon(struct ports *p)
     for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
     if (p->line) p->line->pty.name = NULL;
     for (unsigned i = 0; i < p->bus_count; i++) p->bus[i]->pty.pty.name = NULL;
+    for (unsigned i = 0; i < p->serial.count; i++) p->serial.port[i]->pty.pty.name = NULL;
     for (unsigned i = 0; i < p->mavlink_count; i++) p->mavlink[i]->port.pty.name = NULL;
     p->control.path = p->truth.path = "";
     close_all(p);

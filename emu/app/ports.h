@@ -5,6 +5,7 @@
 #include "app/instruments.h"
 #include "app/logic.h"
 #include "app/options.h"
+#include "app/serial.h"
 #include "bench/bench.h"
 #include "link/can/can_hub.h"
 #include "link/can/can_log.h"
@@ -51,6 +52,7 @@ struct ports {
     struct line_pty *line;
     struct bus_port *bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
+    struct serial_ports serial;
     struct logic_ports logic;
     struct mavlink *mavlink[OPTIONS_MAVLINK_MAX];
     unsigned mavlink_count;

@@ -216,7 +216,7 @@ static void place_at(void *ctx, int64_t t_ns, struct place *out)
 {
     const struct site *s = &((const struct unit *)ctx)->lab->site;
     (void)t_ns;
-    *out = (struct place){.lat_rad = s->latitude_rad, .lon_rad = s->longitude_rad, .h_m = s->height_m};
+    *out = (struct place){.lat_rad = s->latitude_rad, .lon_rad = det_wrap_rad(s->longitude_rad), .h_m = s->height_m};
 }
 
 /* To what the scenario has it at power-on. */

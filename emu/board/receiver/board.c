@@ -39,13 +39,18 @@ static uint32_t baud_of(const struct board *board)
     return ((const struct receiver *)board)->profile.baud;
 }
 
+static void list_unfit(const struct board *board, char *unfit, size_t cap)
+{
+    receiver_profile_unfit(&((const struct receiver *)board)->profile, unfit, cap);
+}
+
 static void connect_serial(struct board *board, void (*sent)(void *ctx, uint8_t byte, int64_t t_ns), void *ctx)
 {
     struct receiver_tx *tx = &((struct receiver *)board)->tx;
     tx->sent = sent;
     tx->ctx = ctx;
 }
-static const struct board_serial serial = {.baud = baud_of, .connect = connect_serial};
+static const struct board_serial serial = {.baud = baud_of, .unfit = list_unfit, .connect = connect_serial};
 
 /* ---- life ---- */
 
