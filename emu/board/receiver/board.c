@@ -26,7 +26,7 @@ static const struct board_controller_fault controller_faults[] = {
     {"controller.frozen_words", RECEIVER_FAULT_FROZEN_WORDS},
     {NULL, 0},
 };
-static const char *const port_lines[] = {"PPS", "SOL", NULL};
+static const char *const port_lines[] = {"PPS", "SOL", "TXD", NULL};
 
 static void set_receiver_faults(struct board *board, const struct board_receiver_faults *f, int64_t t_ns)
 {

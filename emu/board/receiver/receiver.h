@@ -15,7 +15,7 @@
 #define RECEIVER_TX_BYTES 1024u     /* E0: several solutions' messages at a bit rate that carries them */
 #define RECEIVER_PPS_NS   100000000 /* high after each whole second of UTC */
 
-enum receiver_line { RECEIVER_LINE_PPS, RECEIVER_LINE_SOL, RECEIVER_LINES };
+enum receiver_line { RECEIVER_LINE_PPS, RECEIVER_LINE_SOL, RECEIVER_LINE_TXD, RECEIVER_LINES };
 extern const struct board_line receiver_lines[RECEIVER_LINES];
 
 enum receiver_event {
@@ -50,6 +50,8 @@ struct receiver_tx {
     uint8_t ring[RECEIVER_TX_BYTES];
     unsigned first, count;
     struct sched_ev ev; /* end of the stop bit under way */
+    unsigned bit;       /* on TXD, of the byte under way: 0 start, 1 ... 8 data, 9 stop; while TXD is watched */
+    struct sched_ev bit_ev;
     void (*sent)(void *ctx, uint8_t byte, int64_t t_ns); /* NULL: nothing is connected */
     void *ctx;
 };

@@ -5,6 +5,28 @@
 #define BITS_A_BYTE 10 /* start, eight of data, stop */
 #define UNIFORM(u)  (((double)((u) >> 11) + 0.5) * 0x1p-53) /* (0, 1) */
 
+/* ---- TXD: edges only while someone watches them; who comes in the middle of a byte sees the next one */
+
+static void put_bit(void *ctx, int64_t t_ns)
+{
+    struct receiver *b = ctx;
+    struct receiver_tx *tx = &b->tx;
+    const unsigned frame = 0x200u | (unsigned)tx->ring[tx->first] << 1; /* stop, data, start: least significant first */
+    trace_set(&b->base.trace, RECEIVER_LINE_TXD, frame >> tx->bit & 1, t_ns);
+    if (++tx->bit == BITS_A_BYTE) return;
+    sched_at(b->base.sched, &tx->bit_ev, clk_edge_ns(&tx->clock, tx->bytes * BITS_A_BYTE + tx->bit));
+}
+
+static void begin_byte(struct receiver *b, int64_t t_ns)
+{
+    struct receiver_tx *tx = &b->tx;
+    sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, (tx->bytes + 1) * BITS_A_BYTE));
+    tx->bit = 0;
+    if (trace_watched(&b->base.trace, TRACE_BIT(RECEIVER_LINE_TXD))) put_bit(b, t_ns);
+}
+
+/* ---- the buffer */
+
 static void send_byte(void *ctx, int64_t t_ns)
 {
     struct receiver *b = ctx;
@@ -13,7 +35,7 @@ static void send_byte(void *ctx, int64_t t_ns)
     tx->first = (tx->first + 1) % RECEIVER_TX_BYTES;
     tx->count--;
     tx->bytes++;
-    if (tx->count) sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, (tx->bytes + 1) * BITS_A_BYTE));
+    if (tx->count) begin_byte(b, t_ns);
     if (tx->sent) tx->sent(tx->ctx, byte, t_ns);
 }
 
@@ -21,11 +43,13 @@ void receiver_tx_init(struct receiver_tx *tx, const struct receiver_profile *p, 
 {
     tx->clock = (struct clk){.hz = p->baud, .div = 1};
     sched_ev_inner(&tx->ev, send_byte, b);
+    sched_ev_inner(&tx->bit_ev, put_bit, b);
 }
 
 void receiver_tx_clear(struct receiver *b)
 {
     sched_cancel(b->base.sched, &b->tx.ev);
+    sched_cancel(b->base.sched, &b->tx.bit_ev);
     b->tx.count = 0;
 }
 
@@ -43,7 +67,7 @@ static void put_message(struct receiver *b, const uint8_t *bytes, unsigned n, in
     if (!idle) return;
     tx->clock.t0_ns = t_ns;
     tx->bytes = 0;
-    sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, BITS_A_BYTE));
+    begin_byte(b, t_ns);
 }
 
 /* A fault: the checksum of the message is wrong. Draws by the number of the message. */

@@ -17,6 +17,7 @@
 const struct board_line receiver_lines[RECEIVER_LINES] = {
     [RECEIVER_LINE_PPS] = {"PPS", false},
     [RECEIVER_LINE_SOL] = {"SOL", false},
+    [RECEIVER_LINE_TXD] = {"TXD", true},
 };
 const char *const receiver_events[RECEIVER_EVENTS] = {"RES", "SOLUTION", "FIX", "FIX_LOST", "POWER_DOWN", "POWER_UP"};
 
@@ -114,7 +115,7 @@ static void toggle_pps(void *ctx, int64_t t_ns)
 
 static void rest_lines(struct receiver *b, int64_t t_ns)
 {
-    trace_put(&b->base.trace, TRACE_FIRST(RECEIVER_LINES), 0, t_ns);
+    trace_put(&b->base.trace, TRACE_FIRST(RECEIVER_LINES), b->on ? TRACE_BIT(RECEIVER_LINE_TXD) : 0, t_ns);
 }
 
 /* ---- faults */
@@ -171,6 +172,7 @@ static void stop(struct receiver *b, int64_t t_ns)
 
 static void start(struct receiver *b, int64_t t_ns)
 {
+    rest_lines(b, t_ns);
     b->solved = b->latest = nothing_yet(b);
     b->from_ns = t_ns + (int64_t)(b->profile.first_fix_s * (double)NS_PER_S);
     receiver_errors_restart(&b->errors);

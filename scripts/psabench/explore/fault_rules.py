@@ -72,6 +72,11 @@ RULES: Mapping[str, Rule] = {
     "platform.torquer": Rule(READINGS, {}),
     "platform.drift_step": Rule(READINGS, {"drift_degph": (0.1, 100.0)}),
     "platform.encoder_stuck": Rule(READINGS, {}),
+    "receiver.outage": Rule(READINGS, {}),
+    "receiver.spoof": Rule(VALUES, {"ramp_mps": (0.5, 30.0)}),
+    "receiver.jump": Rule(VALUES, {"jump_m": (5.0, 1000.0)}),
+    "receiver.frozen_time": Rule(READINGS, {}),
+    "receiver.wrong_week": Rule(READINGS, {"weeks": (1, -1024)}),
 }
 
 # Kinds that are not tried, and why.
@@ -89,6 +94,7 @@ LEFT_OUT: Mapping[str, str] = {
     "scpi.silent": "the host speaks to no instrument by SCPI",
     "scpi.late": "the host speaks to no instrument by SCPI",
     "scpi.garbled": "the host speaks to no instrument by SCPI",
+    "receiver.bad_checksum": "no requirement is about the serial port",
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from psabench.boards.board import Beat, Board
 
-LINES = ("PPS", "SOL")
+LINES = ("PPS", "SOL", "TXD")
 
 BOARD = Board(
     name="receiver",

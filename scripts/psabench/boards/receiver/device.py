@@ -53,5 +53,5 @@ class Receiver(BusUnit):
     """One unit on the bus."""
 
     board = "receiver"
-    title = "Receiver"
+    title = "RECEIVER"
     layout = ReadingLayout(board="receiver", messages=MESSAGES, counter="SEQ")

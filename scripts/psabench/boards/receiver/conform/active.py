@@ -15,6 +15,7 @@ from psabench.conform.verdict import conclusive, expect, known
 SOLUTIONS = (OD.COUNTERS, 12)
 SIGNALS = ("LAT", "LON", "VE", "VN", "H", "VU")
 TRIES = 20
+ONE_SENT_S = 0.25  # the latest reading then is one that the log has
 
 
 @active("RECEIVER-CAN-04", needs={"can"}, before=until_ready)
@@ -33,8 +34,8 @@ def the_board_says_what_it_is(s: Dut) -> str:
 def objects_show_the_latest_reading(s: Dut) -> str:
     """Read TOW, the solution and TOW again while readings come, and find the reading in the log."""
     with s.take(lines=False) as take, while_streaming(s):
+        s.run_for(ONE_SENT_S)
         shown = _shown_reading(s)
-        s.run_for(0.5)
     e = s.capture("objects", take)
     tow, values = known(shown, "no look at 2200h lay within one reading")
     raw = {k: v for name in MESSAGES for k, v in e.frames_of(name).raw(name).items()}
@@ -49,7 +50,6 @@ def _shown_reading(s: Dut) -> tuple[int, list[int]] | None:
         tow = int(s.unit.node.read(OD.READING, 1))
         values = [int(s.unit.node.read(OD.SOLUTION, k)) for k in range(1, 7)]
         if int(s.unit.node.read(OD.READING, 1)) == tow:
-            s.run_for(0.2)  # the reading itself may have come before the log began
             return tow, values
     return None
 
