@@ -244,6 +244,21 @@ static void the_same_seed_gives_the_same_solutions_and_a_restart_others(void **s
     assert_false(solve(&one, &still, 100).place.lat_rad == solve(&two, &still, 100).place.lat_rad);
 }
 
+/* With a time constant much shorter than the period each slow error is the draw of its solution. */
+static void no_draw_is_used_twice(void **state)
+{
+    (void)state;
+    struct receiver_errors_cfg c = quiet();
+    struct truth still = {0.0, 0.0};
+    c.slow_s = 1e-3;
+    struct receiver_errors e = begin(&c);
+    (void)solve(&e, &still, 0);
+    receiver_errors_restart(&e);
+    const double at_start = e.slow_unit[0];
+    (void)solve(&e, &still, 1);
+    assert_false(e.slow_unit[0] == at_start);
+}
+
 /* ---- displacement */
 
 static void metres_are_those_of_the_ellipsoid(void **state)
@@ -288,6 +303,7 @@ int main(void)
         cmocka_unit_test(outages_have_their_rate_and_length),
         cmocka_unit_test(an_offset_is_added_and_shifts_no_noise),
         cmocka_unit_test(the_same_seed_gives_the_same_solutions_and_a_restart_others),
+        cmocka_unit_test(no_draw_is_used_twice),
         cmocka_unit_test(metres_are_those_of_the_ellipsoid),
         cmocka_unit_test(over_a_pole_and_the_antimeridian),
     };

@@ -178,6 +178,15 @@ static void the_antimeridian_and_a_pole_stay_on_the_earth(void **state)
     }
 }
 
+static void what_rounds_to_the_antimeridian_is_east(void **state)
+{
+    (void)state;
+    prepare();
+    power_up_at(10.0, -179.99999999);
+    run_to(NS_PER_S / 2);
+    assert_int_equal(w.position[0].lon, 1800000000);
+}
+
 static void reset_and_power_begin_anew(void **state)
 {
     (void)state;
@@ -259,7 +268,10 @@ static void what_does_not_fit_is_lost_whole_and_named(void **state)
     struct receiver_profile *p = prepare();
     receiver_profile_unfit(p, unfit, sizeof unfit);
     assert_string_equal(unfit, "");
-    p->baud = 9600; /* 96 bytes in a period */
+    p->baud = 38400; /* 384 bytes in a period: four sentences */
+    receiver_profile_unfit(p, unfit, sizeof unfit);
+    assert_string_equal(unfit, "ZDA, PVT");
+    p->baud = 9600; /* 96 bytes */
     receiver_profile_unfit(p, unfit, sizeof unfit);
     assert_string_equal(unfit, "GSA, RMC, VTG, ZDA, PVT");
     p->message_count = 5; /* without the packet, so that lines are all there is */
@@ -442,6 +454,7 @@ int main(void)
         cmocka_unit_test(solutions_lie_on_the_grid_of_the_bench_s_time),
         cmocka_unit_test(a_reading_on_can_is_the_report),
         cmocka_unit_test(the_antimeridian_and_a_pole_stay_on_the_earth),
+        cmocka_unit_test(what_rounds_to_the_antimeridian_is_east),
         cmocka_unit_test(reset_and_power_begin_anew),
         cmocka_unit_test(the_first_fix_takes_its_time),
         cmocka_unit_test(bytes_leave_at_the_bit_rate),
