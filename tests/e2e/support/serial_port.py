@@ -50,7 +50,10 @@ class SerialPort:
             got += chunk
 
     def close(self) -> None:
-        os.close(self._fd)
+        """Harmless once more."""
+        if self._fd >= 0:
+            os.close(self._fd)
+        self._fd = -1
 
 
 @contextmanager
