@@ -180,7 +180,7 @@ def test_bytes_before_a_program_opens_the_port_are_gone(tmp_path: Path) -> None:
     with serial_port(receiver_scenario(tmp_path)) as (port, emulator):
         pty = emulator.endpoint(serial="8n1")["pty"]
         port.run(1.05)
-        port.control.call("run", for_s=1.5)  # 7 kB that no one reads: more than the kernel takes
+        port.control.call("run", for_s=1.5)  # 7 kB that no one reads
         port.close()
         port.control.call("run", for_s=7.5)  # no one has it open: time does not wait
         later = SerialPort(port.control, pty)
@@ -188,6 +188,14 @@ def test_bytes_before_a_program_opens_the_port_are_gone(tmp_path: Path) -> None:
         later.close()
         assert "too slow" not in emulator.messages()
     assert first.time == datetime.time(0, 0, 10, 100_000)
+
+
+def test_in_wall_pace_rare_solutions_come_in_time(tmp_path: Path) -> None:
+    """A bench whose next event is a second away: the sleep until then is no falling behind."""
+    path = receiver_scenario(tmp_path, "rate_hz: 1, messages: [GGA]", site="start: false\n")
+    path.write_text(path.read_text().replace("start: true\n", ""))
+    done = psa_emu(path, "--can", "none", "--pace", "wall", "--for", "2.3s")
+    assert "2.300000 s simulated in wall pace" in done.stderr and "slips: 0" in done.stderr
 
 
 # ---- faults
