@@ -28,7 +28,7 @@ from psabench.places import find_emulator
 
 SEED = 23
 SCHEDULE_S = 2 * 3600 / 10_000  # of one core
-COUNT = {"psa2": 25, "psd1": 15, "pik": 15, "pmka": 15, "gyro": 5, "bins": 10}
+COUNT = {"psa2": 25, "psd1": 15, "pik": 15, "pmka": 15, "gyro": 5, "bins": 10, "receiver": 8}
 
 
 def search(board: str = "psa2", seed: int = SEED) -> Search:
