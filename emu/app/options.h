@@ -11,11 +11,11 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define OPTIONS_CAN_MAX   8u
-#define OPTIONS_SCPI_MAX  8u
-#define OPTIONS_BUS_MAX   8u
+#define OPTIONS_CAN_MAX    8u
+#define OPTIONS_SCPI_MAX   8u
+#define OPTIONS_BUS_MAX    8u
 #define OPTIONS_SERIAL_MAX 8u
-#define OPTIONS_LOGIC_MAX 4u
+#define OPTIONS_LOGIC_MAX  4u
 
 #define OPTIONS_MAVLINK_MAX 4u
 

@@ -20,7 +20,8 @@ static bool fail_pty(char *why, size_t cap, const char *option, const char *arg,
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
-                                     2 * OPTIONS_BUS_MAX + 2 * OPTIONS_SERIAL_MAX + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
+                                     2 * OPTIONS_BUS_MAX + 2 * OPTIONS_SERIAL_MAX +
+                                     OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
                                      OPTIONS_MAVLINK_MAX * (MAV_PEERS_MAX + 1) + 3,
                "LOOP_LINKS_MAX");
 
@@ -341,15 +342,15 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && serial_check(b, o, why, cap) && logic_check(b, o, why, cap) &&
-           mavlink_check(b, o, why, cap);
+    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) &&
+           serial_check(b, o, why, cap) && logic_check(b, o, why, cap) && mavlink_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
-           serial_open(&p->serial, &p->links, b, o, why, cap) && logic_open(&p->logic, &p->links, b, o, why, cap) && open_mavlinks(p, b, o, why, cap) &&
-           open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
+           serial_open(&p->serial, &p->links, b, o, why, cap) && logic_open(&p->logic, &p->links, b, o, why, cap) &&
+           open_mavlinks(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
            open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }

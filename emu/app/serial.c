@@ -92,8 +92,9 @@ static void notice_unfit(struct serial_port *p)
     char unfit[120];
     serial->unfit(p->unit->board, unfit, sizeof unfit);
     if (!unfit[0]) return;
-    snprintf(p->notice, sizeof p->notice, "messages of %s that do not fit into the period at %u bit/s, and may be lost: %s",
-             p->unit->cfg.name, serial->baud(p->unit->board), unfit);
+    snprintf(p->notice, sizeof p->notice,
+             "messages of %s that do not fit into the period at %u bit/s, and may be lost: %s", p->unit->cfg.name,
+             serial->baud(p->unit->board), unfit);
     p->pty.link.notice = p->notice;
 }
 

@@ -70,8 +70,7 @@ static bool has_whole_weeks(const struct control_bench *b, const struct fault *f
 {
     const double weeks = f->value[FAULT_WEEKS];
     if (!is_receiver(b, f, why)) return false;
-    return weeks == nearbyint(weeks) ||
-           why_fail(why, CONTROL_WHY_MAX, "weeks: expected whole weeks, got %.10g", weeks);
+    return weeks == nearbyint(weeks) || why_fail(why, CONTROL_WHY_MAX, "weeks: expected whole weeks, got %.10g", weeks);
 }
 
 // clang-format off

@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MINUTES_E5_A_DEG 6000000 /* 60 minutes of 1e-5 */
-#define KNOT_UM          514444444 /* in 1e-9 m/s: 1852 m an hour */
-#define COURSE_LEAST_MMPS 100u /* below it the course is noise, and stays empty */
+#define MINUTES_E5_A_DEG  6000000   /* 60 minutes of 1e-5 */
+#define KNOT_UM           514444444 /* in 1e-9 m/s: 1852 m an hour */
+#define COURSE_LEAST_MMPS 100u      /* below it the course is noise, and stays empty */
 
 __attribute__((format(printf, 2, 3))) static void add(struct nmea *s, const char *format, ...)
 {

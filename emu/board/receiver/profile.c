@@ -132,8 +132,7 @@ bool receiver_profile_check(const void *profile, char *why, size_t cap)
     const struct receiver_profile *p = profile;
     int64_t utc_ms;
     if (!fields_check(&receiver_fields, p, why, cap)) return false;
-    if (100 % p->rate_hz != 0)
-        return why_expected(why, cap, "rate_hz", WHY_REAL(p->rate_hz), "1, 2, 4, 5 or 10");
+    if (100 % p->rate_hz != 0) return why_expected(why, cap, "rate_hz", WHY_REAL(p->rate_hz), "1, 2, 4, 5 or 10");
     if (!is_baud(p->baud))
         return why_expected(why, cap, "baud", WHY_REAL(p->baud), "4800 times 1, 2, 4, 8, 12, 24, 48 or 96");
     if (!calendar_parse(p->start_utc, &utc_ms))

@@ -64,9 +64,9 @@ struct receiver {
     struct draws checksum; /* which messages are spoilt, by number */
     int64_t start_utc_ms;
     struct sched_ev solve_ev, output_ev, pps_ev, sol_ev;
-    int64_t from_ns;                /* no fix before */
-    struct receiver_reading solved; /* for output_ev */
-    struct receiver_reading latest; /* put out */
+    int64_t from_ns;                                                               /* no fix before */
+    struct receiver_reading solved;                                                /* for output_ev */
+    struct receiver_reading latest;                                                /* put out */
     void (*on_reading)(void *can, const struct receiver_reading *r, int64_t t_ns); /* NULL: not on a bus */
     void *can;
     struct receiver_counters counters;

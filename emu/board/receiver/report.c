@@ -5,13 +5,13 @@
 #include <math.h>
 #include <stdio.h>
 
-#define MS_A_DAY        INT64_C(86400000)
-#define MS_A_WEEK       (7 * MS_A_DAY)
-#define GPS_EPOCH_MS    (3657 * MS_A_DAY) /* 1980-01-06: IS-GPS-200, 20.3.3.5.2.4 */
-#define DAYS_400_YEARS  146097
-#define DAYS_TO_1970    719468 /* from 0000-03-01 */
-#define FIRST_YEAR      1980
-#define LAST_YEAR       2099
+#define MS_A_DAY       INT64_C(86400000)
+#define MS_A_WEEK      (7 * MS_A_DAY)
+#define GPS_EPOCH_MS   (3657 * MS_A_DAY) /* 1980-01-06: IS-GPS-200, 20.3.3.5.2.4 */
+#define DAYS_400_YEARS 146097
+#define DAYS_TO_1970   719468 /* from 0000-03-01 */
+#define FIRST_YEAR     1980
+#define LAST_YEAR      2099
 
 static int64_t floor_div(int64_t a, int64_t b)
 {

@@ -13,14 +13,14 @@ enum report_fix { REPORT_NO_FIX = 0, REPORT_FIX_3D = 3 }; /* as fixType of UBX *
 
 struct report {
     enum report_fix fix;
-    int64_t utc_ms;              /* since 1970-01-01, without leap seconds */
-    int leap_s;                  /* GPS time less UTC */
-    int32_t lat_e7, lon_e7;      /* 1e-7 deg: -900000000 ... 900000000, -1799999999 ... 1800000000 */
-    int32_t h_mm, geoid_mm;      /* above the ellipsoid; of the geoid above it */
-    int32_t v_n_mmps[3];         /* east, north, up */
+    int64_t utc_ms;         /* since 1970-01-01, without leap seconds */
+    int leap_s;             /* GPS time less UTC */
+    int32_t lat_e7, lon_e7; /* 1e-7 deg: -900000000 ... 900000000, -1799999999 ... 1800000000 */
+    int32_t h_mm, geoid_mm; /* above the ellipsoid; of the geoid above it */
+    int32_t v_n_mmps[3];    /* east, north, up */
     uint32_t h_acc_mm, v_acc_mm, s_acc_mmps, t_acc_ns; /* believed, standard deviation */
-    unsigned sats;               /* used, 0 ... REPORT_SATS_MAX: numbers 1 ... */
-    unsigned hdop_e2, vdop_e2;   /* 0.01 */
+    unsigned sats;                                     /* used, 0 ... REPORT_SATS_MAX: numbers 1 ... */
+    unsigned hdop_e2, vdop_e2;                         /* 0.01 */
 };
 
 struct calendar {

@@ -2,7 +2,7 @@
 #include "board/receiver/receiver.h"
 #include "board/receiver/ubx.h"
 
-#define BITS_A_BYTE 10 /* start, eight of data, stop */
+#define BITS_A_BYTE 10                                      /* start, eight of data, stop */
 #define UNIFORM(u)  (((double)((u) >> 11) + 0.5) * 0x1p-53) /* (0, 1) */
 
 /* ---- TXD: edges only while someone watches them; who comes in the middle of a byte sees the next one */

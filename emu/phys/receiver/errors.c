@@ -10,7 +10,15 @@
 
 /* Draws of a solution: so many numbers of each source belong to it. */
 enum { NOISE_DRAWS = 6, SLOW_DRAWS = 6 };
-enum event_draw { DRAW_OUTLIER, DRAW_OUTLIER_AZIMUTH, DRAW_JUMP, DRAW_JUMP_BY, DRAW_OUTAGE = 6, DRAW_OUTAGE_S, EVENT_DRAWS };
+enum event_draw {
+    DRAW_OUTLIER,
+    DRAW_OUTLIER_AZIMUTH,
+    DRAW_JUMP,
+    DRAW_JUMP_BY,
+    DRAW_OUTAGE = 6,
+    DRAW_OUTAGE_S,
+    EVENT_DRAWS
+};
 
 void receiver_errors_init(struct receiver_errors *e, const struct receiver_errors_cfg *cfg, uint64_t seed,
                           uint32_t serial)

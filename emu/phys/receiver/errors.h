@@ -14,12 +14,12 @@
 struct receiver_errors_cfg {
     /* standard deviations: of each horizontal axis; of the vertical one they are vertical_ratio times as large */
     double white_m, slow_m, white_mps, slow_mps, vertical_ratio;
-    double slow_s;                              /* time constant of the slow ones, Gauss-Markov of first order; above 0 */
-    double outliers_per_h, outlier_m;           /* one solution off by outlier_m in a random direction of the horizon */
-    double jumps_per_h, jump_m;                 /* a step of the position that stays, standard deviation of each axis */
-    double outages_per_h, outage_s;             /* mean duration, exponentially distributed */
+    double slow_s;                    /* time constant of the slow ones, Gauss-Markov of first order; above 0 */
+    double outliers_per_h, outlier_m; /* one solution off by outlier_m in a random direction of the horizon */
+    double jumps_per_h, jump_m;       /* a step of the position that stays, standard deviation of each axis */
+    double outages_per_h, outage_s;   /* mean duration, exponentially distributed */
     int64_t position_delay_ns, velocity_delay_ns; /* dt1; dt2 of the velocity behind the position */
-    int64_t period_ns;                          /* of the solutions */
+    int64_t period_ns;                            /* of the solutions */
 };
 
 /* From outside: a spoofed position that runs away, consistent with its velocity, and a step. East, north; metres. */
@@ -32,15 +32,15 @@ struct receiver_offset {
 struct receiver_errors {
     struct receiver_errors_cfg cfg;
     struct draws noise, slow, event;
-    int64_t number;           /* of the next solution */
-    double slow_unit[6];      /* position and velocity, each of standard deviation 1 */
-    double jump_m[3];         /* the sum so far */
+    int64_t number;      /* of the next solution */
+    double slow_unit[6]; /* position and velocity, each of standard deviation 1 */
+    double jump_m[3];    /* the sum so far */
     int64_t outage_until_ns;
     struct receiver_offset offset;
 };
 
 struct receiver_solution {
-    bool valid;             /* false: outage, place is not written */
+    bool valid; /* false: outage, place is not written */
     struct place place;
 };
 

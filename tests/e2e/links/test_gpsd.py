@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from serial_port import QUIET, receiver_scenario
-
 from psabench.emulator import Emulator
 from psabench.link.control import Control
+from serial_port import QUIET, receiver_scenario
 
 GPSD = shutil.which("gpsd", path=f"{os.environ['PATH']}:/usr/sbin")
 
@@ -84,7 +83,8 @@ def gpsd_on(scenario: Path) -> Iterator[tuple[Gpsd, Control]]:
     """gpsd in the foreground (-N), reading at once (-n), with no other set-up."""
     port = free_port()
     with Emulator(scenario, cans=["none"], extra=["--serial", "-"]) as emulator:
-        assert emulator.control_path is not None and GPSD is not None
+        assert emulator.control_path is not None
+        assert GPSD is not None
         pty = emulator.endpoint(serial="8n1")["pty"]
         with (
             Control(emulator.control_path) as control,
@@ -118,8 +118,10 @@ def test_gpsd_follows_the_receiver(tmp_path: Path, fields: str, driver: str) -> 
         first = gpsd.until(has_fix)
         later = gpsd.until(lambda r: has_fix(r) and r["time"] > first["time"])
     for tpv in (first, later):
-        assert tpv["lat"] == pytest.approx(55.75, abs=1e-6) and tpv["lon"] == pytest.approx(37.61, abs=1e-6)
-        assert tpv["altHAE"] == pytest.approx(150.0, abs=0.06) and tpv["speed"] == pytest.approx(0.0, abs=0.01)
+        assert tpv["lat"] == pytest.approx(55.75, abs=1e-6)
+        assert tpv["lon"] == pytest.approx(37.61, abs=1e-6)
+        assert tpv["altHAE"] == pytest.approx(150.0, abs=0.06)
+        assert tpv["speed"] == pytest.approx(0.0, abs=0.01)
         assert tpv["time"].startswith("2026-01-05T00:0")
 
 
@@ -138,7 +140,8 @@ def test_gpsd_takes_the_spoofed_position(tmp_path: Path) -> None:
         gpsd.until(has_fix)
         control.call("fault.add", kind="receiver.spoof", point="gps.solver", ramp_mps=50.0, azimuth_deg=90.0)
         tpv = gpsd.until(lambda r: has_fix(r) and r["lon"] > 37.62)
-    assert tpv["speed"] == pytest.approx(50.0, abs=0.01) and tpv["track"] == pytest.approx(90.0, abs=0.01)
+    assert tpv["speed"] == pytest.approx(50.0, abs=0.01)
+    assert tpv["track"] == pytest.approx(90.0, abs=0.01)
     assert tpv["lat"] == pytest.approx(55.75, abs=1e-5)
 
 

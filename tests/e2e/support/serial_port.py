@@ -18,7 +18,9 @@ QUIET = "white_m: 0, slow_m: 0, white_mps: 0, slow_mps: 0"
 def receiver_scenario(folder: Path, fields: str = "", site: str = SITE) -> Path:
     """One receiver, `gps`, with these fields of its profile."""
     path = folder / "receiver.yaml"
-    path.write_text(f"seed: 5\n{site}start: true\nunits:\n  - {{name: gps, board: receiver, profile_set: {{{fields}}}}}\n")
+    path.write_text(
+        f"seed: 5\n{site}start: true\nunits:\n  - {{name: gps, board: receiver, profile_set: {{{fields}}}}}\n"
+    )
     return path
 
 

@@ -9,8 +9,8 @@
 
 #define PERIOD_NS INT64_C(100000000)
 #define NS_A_S    INT64_C(1000000000)
-#define RUN       36000 /* an hour of solutions */
-#define LONG      72000 /* twenty hours, one a second */
+#define RUN       36000       /* an hour of solutions */
+#define LONG      72000       /* twenty hours, one a second */
 #define M_PER_RAD 6335439.327 /* meridian radius of WGS 84 at the equator: a (1 - e^2) */
 #define N_PER_RAD 6378137.0
 
@@ -30,7 +30,8 @@ static void place_at(void *ctx, int64_t t_ns, struct place *out)
 
 static struct receiver_errors_cfg quiet(void)
 {
-    return (struct receiver_errors_cfg){.vertical_ratio = 1.5, .slow_s = 100.0, .outage_s = 1.0, .period_ns = PERIOD_NS};
+    return (struct receiver_errors_cfg){
+        .vertical_ratio = 1.5, .slow_s = 100.0, .outage_s = 1.0, .period_ns = PERIOD_NS};
 }
 
 static struct receiver_errors_cfg quiet_and_slow(void)
@@ -87,7 +88,7 @@ static void record(struct receiver_errors *e, int n)
 #define assert_near(a, b, within)                                                                                      \
     do {                                                                                                               \
         const double a_ = (a), b_ = (b);                                                                               \
-        if (!(fabs(a_ - b_) <= (within))) fail_msg("%s: %.9g, expected %.9g +- %.3g", #a, a_, b_, (double)(within));     \
+        if (!(fabs(a_ - b_) <= (within))) fail_msg("%s: %.9g, expected %.9g +- %.3g", #a, a_, b_, (double)(within));   \
     } while (0)
 
 static void an_ideal_receiver_says_where_it_was(void **state)

@@ -90,8 +90,8 @@ static void each_board_says_what_it_is(void **state)
         const char *board, *name;
         uint32_t product;
     } row[] = {
-        {"psa2", "PSA-2", 0x50534132}, {"psd1", "PSD-1", 0x50534431}, {"pmka", "PMKA", 0x504D4B41},
-        {"pik", "PIK", 0x50494B30},    {"gyro", "GYRO", 0x4759524F},  {"bins", "BINS", 0x42494E53},
+        {"psa2", "PSA-2", 0x50534132},        {"psd1", "PSD-1", 0x50534431}, {"pmka", "PMKA", 0x504D4B41},
+        {"pik", "PIK", 0x50494B30},           {"gyro", "GYRO", 0x4759524F},  {"bins", "BINS", 0x42494E53},
         {"receiver", "RECEIVER", 0x474E5353},
     };
     for (size_t i = 0; i < COUNT(row); i++) {

@@ -59,7 +59,8 @@ static void checksums_are_those_of_published_sentences(void **state)
 /* UBX-CFG-RATE for 5 Hz, as it stands in many a driver. */
 static void the_checksum_of_a_packet_is_that_of_a_published_one(void **state)
 {
-    static const uint8_t packet[] = {0xB5, 0x62, 0x06, 0x08, 0x06, 0x00, 0xC8, 0x00, 0x01, 0x00, 0x01, 0x00, 0xDE, 0x6A};
+    static const uint8_t packet[] = {0xB5, 0x62, 0x06, 0x08, 0x06, 0x00, 0xC8,
+                                     0x00, 0x01, 0x00, 0x01, 0x00, 0xDE, 0x6A};
     uint8_t ck[2];
     (void)state;
     ubx_checksum(packet + 2, sizeof packet - 4, ck);
@@ -190,8 +191,8 @@ static void gps_time_counts_from_its_epoch(void **state)
         uint32_t week, tow_ms;
     } rows[] = {
         {"1980-01-06T00:00:00", 0, 0, 0},
-        {"1999-08-21T23:59:47", 13, 1024, 0},         /* first rollover */
-        {"2019-04-06T23:59:42", 18, 2048, 0},         /* second */
+        {"1999-08-21T23:59:47", 13, 1024, 0}, /* first rollover */
+        {"2019-04-06T23:59:42", 18, 2048, 0}, /* second */
         {"2019-04-06T23:59:41", 18, 2047, 604799000},
         {"2024-02-29T12:00:00", 18, 2303, 388818000}, /* a Thursday */
         {"2026-01-05T00:00:00", 18, 2400, 86418000},

@@ -235,7 +235,8 @@ static void bytes_leave_at_the_bit_rate(void **state)
         power_up();
         run_to(NS_PER_S + 900 * MS);
         assert_true(w.bytes > 100);
-        for (unsigned i = 0; i < w.bytes; i++) { /* a start bit, eight, a stop bit each, from 20 ms after the second on */
+        for (unsigned i = 0; i < w.bytes;
+             i++) { /* a start bit, eight, a stop bit each, from 20 ms after the second on */
             const double due_ns = 1e9 + 20e6 + (i + 1) * 10.0 * 1e9 / bauds[k];
             assert_true(fabs((double)w.byte_ns[i] - due_ns) <= 1.0);
         }
@@ -371,9 +372,7 @@ static void faults_do_what_they_say(void **state)
         assert_int_equal(w.time[i].fix, i >= 10 && i < 20 ? 0 : 3);
         assert_int_equal(w.time[i].week, i >= 30 && i < 40 ? 1376 : 2400);
         assert_int_equal(w.time[i].tow, 86418000 + 100 * (frozen ? 20 : i + 1));
-        const double due_m = i >= 40 && i < 50   ? 100.0
-                             : i >= 50 && i < 70 ? 10.0 * (0.1 * (i + 1) - 5.05)
-                                                 : 0.0;
+        const double due_m = i >= 40 && i < 50 ? 100.0 : i >= 50 && i < 70 ? 10.0 * (0.1 * (i + 1) - 5.05) : 0.0;
         if (fabs(north_m(i) - due_m) > 0.05) fail_msg("%u: %.3f m north, expected %.3f", i, north_m(i), due_m);
     }
 }
