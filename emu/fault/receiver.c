@@ -63,7 +63,8 @@ static void refresh_receiver(struct fault *f, int64_t t_ns)
 static bool is_receiver(const struct control_bench *b, const struct fault *f, char *why)
 {
     return b->unit[f->point.unit]->type->receiver ||
-           why_fail(why, CONTROL_WHY_MAX, "%s: this board is no satellite receiver", f->name);
+           why_fail(why, CONTROL_WHY_MAX, "%s: expected a satellite receiver, got a %s", f->name,
+                    b->unit[f->point.unit]->type->title);
 }
 
 static bool has_whole_weeks(const struct control_bench *b, const struct fault *f, char *why)

@@ -435,7 +435,7 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
                                   "%s: expected a section %s to mount it on, got none", u->name, on);
         if (u->cfg.type->receiver && u->cfg.mounting.on == LAB_PLATFORM)
             return yaml_file_fail(f, yaml_get(root, "units"), "units",
-                                  "%s: expected a receiver that stands at the site, got one on the platform, whose "
+                                  "%s: expected a receiver at rest at the site, got one on the platform, whose "
                                   "vehicle has no longitude",
                                   u->name);
     }

@@ -211,7 +211,7 @@ static int64_t smooth_ns(void *ctx, int64_t t_ns)
     return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
 }
 
-/* The antenna of a unit stands at the site, whatever instrument carries the unit. */
+/* The antenna of a unit is at the site, whatever instrument carries the unit. */
 static void place_at(void *ctx, int64_t t_ns, struct place *out)
 {
     const struct site *s = &((const struct unit *)ctx)->lab->site;

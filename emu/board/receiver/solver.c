@@ -23,31 +23,31 @@ const char *const receiver_events[RECEIVER_EVENTS] = {"RES", "SOLUTION", "FIX", 
 
 /* ---- a solution as it is reported */
 
-static int32_t rounded(double x, double most)
+static int32_t round_within(double x, double most)
 {
     return (int32_t)floor(fmin(fmax(x, -most), most) + 0.5);
 }
 
-static uint32_t accuracy(double sd)
+static uint32_t accuracy_mm(double sd)
 {
     return (uint32_t)(sd * 1000.0 + 0.5);
 }
 
 static void report_place(struct report *r, const struct place *p)
 {
-    r->lat_e7 = rounded(p->lat_rad / RAD_PER_DEG * E7_A_DEG, 90.0 * E7_A_DEG);
-    r->lon_e7 = rounded(p->lon_rad / RAD_PER_DEG * E7_A_DEG, 180.0 * E7_A_DEG);
+    r->lat_e7 = round_within(p->lat_rad / RAD_PER_DEG * E7_A_DEG, 90.0 * E7_A_DEG);
+    r->lon_e7 = round_within(p->lon_rad / RAD_PER_DEG * E7_A_DEG, 180.0 * E7_A_DEG);
     if (r->lon_e7 == LON_WEST_MOST) r->lon_e7 = -LON_WEST_MOST;
-    r->h_mm = rounded(p->h_m * 1000.0, H_MOST_MM);
-    for (unsigned i = 0; i < 3; i++) r->v_n_mmps[i] = rounded(p->v_n_mps[i] * 1000.0, V_MOST_MMPS);
+    r->h_mm = round_within(p->h_m * 1000.0, H_MOST_MM);
+    for (unsigned i = 0; i < 3; i++) r->v_n_mmps[i] = round_within(p->v_n_mps[i] * 1000.0, V_MOST_MMPS);
 }
 
 static void report_accuracy(struct report *r, const struct receiver_errors_cfg *c)
 {
     const double sqrt_2 = 1.4142135623730951; /* hAcc is of two axes */
-    r->h_acc_mm = accuracy(receiver_errors_sd_m(c) * sqrt_2);
-    r->v_acc_mm = accuracy(receiver_errors_sd_m(c) * c->vertical_ratio);
-    r->s_acc_mmps = accuracy(receiver_errors_sd_mps(c) * sqrt_2);
+    r->h_acc_mm = accuracy_mm(receiver_errors_sd_m(c) * sqrt_2);
+    r->v_acc_mm = accuracy_mm(receiver_errors_sd_m(c) * c->vertical_ratio);
+    r->s_acc_mmps = accuracy_mm(receiver_errors_sd_mps(c) * sqrt_2);
     r->t_acc_ns = TIME_ACC_NS;
 }
 
@@ -57,7 +57,7 @@ static int64_t time_of(const struct receiver *b, int64_t t_ns)
     return b->start_utc_ms + t_ns / NS_A_MS + (int64_t)b->wrong.weeks * MS_A_WEEK;
 }
 
-static void solve(struct receiver *b, int64_t t_ns)
+static void solve_at(struct receiver *b, int64_t t_ns)
 {
     struct receiver_solution s;
     struct report *r = &b->solved.report;
@@ -90,7 +90,7 @@ static int64_t next_ns(int64_t period_ns, int64_t t_ns)
 static void solve_periodically(void *ctx, int64_t t_ns)
 {
     struct receiver *b = ctx;
-    solve(b, t_ns);
+    solve_at(b, t_ns);
     trace_set(&b->base.trace, RECEIVER_LINE_SOL, true, t_ns);
     sched_at(b->base.sched, &b->sol_ev, t_ns + SOL_PULSE_NS);
     sched_at(b->base.sched, &b->output_ev, t_ns + (int64_t)b->profile.compute_ms * NS_A_MS);
@@ -154,7 +154,7 @@ static struct receiver_reading nothing_yet(const struct receiver *b)
     struct receiver_reading r = {.seq = 0};
     r.report = (struct report){.leap_s = (int)p->leap_s,
                                .utc_ms = b->start_utc_ms,
-                               .geoid_mm = rounded(p->geoid_m * 1000.0, H_MOST_MM),
+                               .geoid_mm = round_within(p->geoid_m * 1000.0, H_MOST_MM),
                                .sats = p->sats,
                                .hdop_e2 = (unsigned)(p->hdop * 100.0 + 0.5),
                                .vdop_e2 = (unsigned)(p->vdop * 100.0 + 0.5)};
@@ -162,15 +162,17 @@ static struct receiver_reading nothing_yet(const struct receiver *b)
     return r;
 }
 
-static void stop(struct receiver *b, int64_t t_ns)
+static void stop_solutions(struct receiver *b, int64_t t_ns)
 {
-    struct sched_ev *const all[] = {&b->solve_ev, &b->output_ev, &b->pps_ev, &b->sol_ev};
-    for (unsigned i = 0; i < sizeof all / sizeof *all; i++) sched_cancel(b->base.sched, all[i]);
+    sched_cancel(b->base.sched, &b->solve_ev);
+    sched_cancel(b->base.sched, &b->output_ev);
+    sched_cancel(b->base.sched, &b->pps_ev);
+    sched_cancel(b->base.sched, &b->sol_ev);
     receiver_tx_clear(b);
     rest_lines(b, t_ns);
 }
 
-static void start(struct receiver *b, int64_t t_ns)
+static void start_solutions(struct receiver *b, int64_t t_ns)
 {
     rest_lines(b, t_ns);
     b->solved = b->latest = nothing_yet(b);
@@ -183,14 +185,14 @@ static void start(struct receiver *b, int64_t t_ns)
 void receiver_power_up(struct receiver *b, int64_t t_ns)
 {
     b->on = true;
-    start(b, t_ns);
+    start_solutions(b, t_ns);
     board_notify(&b->base, RECEIVER_EV_POWER_UP, t_ns);
 }
 
 void receiver_power_down(struct receiver *b, int64_t t_ns)
 {
     b->on = false;
-    stop(b, t_ns);
+    stop_solutions(b, t_ns);
     board_notify(&b->base, RECEIVER_EV_POWER_DOWN, t_ns);
 }
 
@@ -198,8 +200,8 @@ void receiver_reset(struct receiver *b, int64_t t_ns)
 {
     if (!b->on) return;
     b->counters.resets++;
-    stop(b, t_ns);
-    start(b, t_ns);
+    stop_solutions(b, t_ns);
+    start_solutions(b, t_ns);
     board_notify(&b->base, RECEIVER_EV_RES, t_ns);
 }
 

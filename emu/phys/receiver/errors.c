@@ -55,7 +55,7 @@ static double draw_event(const struct receiver_errors *e, enum event_draw draw)
 }
 
 /* Whether what happens so often an hour happens between this solution and the one before. */
-static bool happens(const struct receiver_errors *e, enum event_draw draw, double per_h)
+static bool event_happens(const struct receiver_errors *e, enum event_draw draw, double per_h)
 {
     const double mean = per_h * (double)e->cfg.period_ns / (NS_A_S * S_AN_HOUR);
     return draw_event(e, draw) < 1.0 - det_exp(-mean);
@@ -63,7 +63,7 @@ static bool happens(const struct receiver_errors *e, enum event_draw draw, doubl
 
 static void step_jump(struct receiver_errors *e)
 {
-    if (!happens(e, DRAW_JUMP, e->cfg.jumps_per_h)) return;
+    if (!event_happens(e, DRAW_JUMP, e->cfg.jumps_per_h)) return;
     for (unsigned i = 0; i < 3; i++) {
         const int64_t n = e->number * EVENT_DRAWS + DRAW_JUMP_BY + (int64_t)i;
         e->jump_m[i] += e->cfg.jump_m * (i == 2 ? e->cfg.vertical_ratio : 1.0) * draws_gauss(&e->event, n);
@@ -72,7 +72,7 @@ static void step_jump(struct receiver_errors *e)
 
 static void step_outage(struct receiver_errors *e, int64_t t_ns)
 {
-    if (!happens(e, DRAW_OUTAGE, e->cfg.outages_per_h)) return;
+    if (!event_happens(e, DRAW_OUTAGE, e->cfg.outages_per_h)) return;
     const double last_s = -e->cfg.outage_s * det_log(draw_event(e, DRAW_OUTAGE_S));
     const int64_t until_ns = t_ns + (int64_t)(last_s * NS_A_S);
     if (until_ns > e->outage_until_ns) e->outage_until_ns = until_ns;
@@ -80,7 +80,7 @@ static void step_outage(struct receiver_errors *e, int64_t t_ns)
 
 static void add_outlier(const struct receiver_errors *e, double by_m[3])
 {
-    if (!happens(e, DRAW_OUTLIER, e->cfg.outliers_per_h)) return;
+    if (!event_happens(e, DRAW_OUTLIER, e->cfg.outliers_per_h)) return;
     const struct det_pair azimuth = det_sin_cos(TURN_RAD * draw_event(e, DRAW_OUTLIER_AZIMUTH));
     by_m[0] += e->cfg.outlier_m * azimuth.sin;
     by_m[1] += e->cfg.outlier_m * azimuth.cos;

@@ -47,7 +47,7 @@ struct receiver_solution {
 void receiver_errors_init(struct receiver_errors *e, const struct receiver_errors_cfg *cfg, uint64_t seed,
                           uint32_t serial);
 
-/* From power-up: solution 0 again, slow errors drawn anew, as after a start of the receiver. */
+/* From power-up: solution 0 again, other slow errors, as after a start of the receiver. */
 void receiver_errors_restart(struct receiver_errors *e);
 
 /* The next solution, at t_ns. Looks at the truth at t_ns less the delays, not before 0. */

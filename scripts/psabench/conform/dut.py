@@ -321,7 +321,7 @@ def scenario(
 
     clock_ppm: by how much the board's clocks are fast; still: the specimen's crystal adds nothing to it. A gyro unit
     has no inputs: it has its platform, on a parked vehicle, and the PSA-2 on it that it reads the level from. A
-    receiver has none, either: it stands at the bench's site.
+    receiver has none, either: it is at the bench's site.
     """
     axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
     unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}

@@ -291,7 +291,7 @@ def test_a_fault_of_a_receiver_is_rejected_elsewhere(tmp_path: Path) -> None:
     path.write_text("units:\n  - {name: a, board: bins}\nfaults:\n  - {kind: receiver.outage, point: a.computer}\n")
     done = psa_emu(path, "--can", "none", "--pace", "free", "--for", "0s")
     assert done.returncode == 2
-    assert "no satellite receiver" in done.stderr
+    assert "expected a satellite receiver, got a BINS" in done.stderr
 
 
 # ---- the same again

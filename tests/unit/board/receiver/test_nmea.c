@@ -56,7 +56,7 @@ static void checksums_are_those_of_published_sentences(void **state)
     }
 }
 
-/* UBX-CFG-RATE for 5 Hz, as it stands in many a driver. */
+/* UBX-CFG-RATE for 5 Hz, as many drivers send it. */
 static void the_checksum_of_a_packet_is_that_of_a_published_one(void **state)
 {
     static const uint8_t packet[] = {0xB5, 0x62, 0x06, 0x08, 0x06, 0x00, 0xC8,
