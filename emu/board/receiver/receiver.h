@@ -84,6 +84,7 @@ void receiver_set_faults(struct receiver *b, const struct board_receiver_faults 
 
 /* ---- receiver/serial.c */
 void receiver_tx_init(struct receiver_tx *tx, const struct receiver_profile *p, struct receiver *b);
+void receiver_tx_wake(void *ctx, uint64_t mask); /* trace_source.wake */
 void receiver_tx_clear(struct receiver *b);
 void receiver_tx_report(struct receiver *b, const struct report *r, int64_t t_ns); /* the profile's messages */
 

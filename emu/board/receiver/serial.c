@@ -5,22 +5,47 @@
 #define BITS_A_BYTE 10                                      /* start, eight of data, stop */
 #define UNIFORM(u)  (((double)((u) >> 11) + 0.5) * 0x1p-53) /* (0, 1) */
 
-/* ---- TXD: edges only while someone watches them; who comes in the middle of a byte sees the next one */
+/* ---- TXD: edges only while someone watches them */
+
+/* Of the byte under way: start, data from the least significant bit on, stop. */
+static bool level_of(const struct receiver_tx *tx, unsigned bit)
+{
+    return (0x200u | (unsigned)tx->ring[tx->first] << 1) >> bit & 1;
+}
+
+/* When it begins. */
+static int64_t bit_ns(const struct receiver_tx *tx, unsigned bit)
+{
+    return clk_edge_ns(&tx->clock, tx->bytes * BITS_A_BYTE + bit);
+}
 
 static void put_bit(void *ctx, int64_t t_ns)
 {
     struct receiver *b = ctx;
     struct receiver_tx *tx = &b->tx;
-    const unsigned frame = 0x200u | (unsigned)tx->ring[tx->first] << 1; /* stop, data, start: least significant first */
-    trace_set(&b->base.trace, RECEIVER_LINE_TXD, frame >> tx->bit & 1, t_ns);
-    if (++tx->bit == BITS_A_BYTE) return;
-    sched_at(b->base.sched, &tx->bit_ev, clk_edge_ns(&tx->clock, tx->bytes * BITS_A_BYTE + tx->bit));
+    trace_set(&b->base.trace, RECEIVER_LINE_TXD, level_of(tx, tx->bit), t_ns);
+    if (++tx->bit < BITS_A_BYTE) sched_at(b->base.sched, &tx->bit_ev, bit_ns(tx, tx->bit));
+}
+
+/* A client begins to watch: it gets what is left of the byte under way. */
+void receiver_tx_wake(void *ctx, uint64_t mask)
+{
+    struct receiver *b = ctx;
+    struct receiver_tx *tx = &b->tx;
+    const uint64_t txd = TRACE_BIT(RECEIVER_LINE_TXD);
+    const int64_t from_ns = b->base.trace.done_ns;
+    if (!(mask & txd) || trace_watched(&b->base.trace, txd) || tx->count == 0 || tx->bit_ev.queued) return;
+    for (tx->bit = 0; tx->bit < BITS_A_BYTE && bit_ns(tx, tx->bit) <= b->base.sched->now_ns; tx->bit++) {
+        const struct trace_step step = {ns_later(bit_ns(tx, tx->bit), from_ns), txd, level_of(tx, tx->bit) ? txd : 0};
+        if (bit_ns(tx, tx->bit + 1) > from_ns) trace_steps(&b->base.trace, &step, 1);
+    }
+    if (tx->bit < BITS_A_BYTE) sched_at(b->base.sched, &tx->bit_ev, bit_ns(tx, tx->bit));
 }
 
 static void begin_byte(struct receiver *b, int64_t t_ns)
 {
     struct receiver_tx *tx = &b->tx;
-    sched_at(b->base.sched, &tx->ev, clk_edge_ns(&tx->clock, (tx->bytes + 1) * BITS_A_BYTE));
+    sched_at(b->base.sched, &tx->ev, bit_ns(tx, BITS_A_BYTE));
     tx->bit = 0;
     if (trace_watched(&b->base.trace, TRACE_BIT(RECEIVER_LINE_TXD))) put_bit(b, t_ns);
 }

@@ -145,6 +145,7 @@ void receiver_init(struct receiver *b, const struct receiver_profile *p, const s
     sched_ev(&b->output_ev, put_out, b);
     sched_ev_inner(&b->pps_ev, toggle_pps, b);
     sched_ev_inner(&b->sol_ev, end_sol, b);
+    b->base.trace.source = (struct trace_source){.wake = receiver_tx_wake, .ctx = b};
     receiver_tx_init(&b->tx, p, b);
 }
 
