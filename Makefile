@@ -113,6 +113,7 @@ $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#            
 $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer
 $(BUILD)/tests/test_nav $(BUILD)/tests/test_sins: $(BUILD)/libpsabench-nav.a
+$(BUILD)/tests/test_kf_kernels: $(BUILD)/obj/nav/filter/kf_kernels.o
 $(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach t,$(FUZZ_SRC),$(eval $(BUILD)/fuzz/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach c,ads1282 ads1256 ad7712,$(eval $(filter $(BUILD)/fuzz/fuzz_$(c)_%,$(FUZZ_BIN)): $(BUILD)/obj/tests/fuzz/support/$(c)_world.o))

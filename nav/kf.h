@@ -27,7 +27,7 @@ enum nav_kf_form { NAV_KF_JOSEPH, NAV_KF_UD };
 typedef struct nav_kf nav_kf;
 
 NAV_API size_t nav_kf_bytes(void);
-/* In memory of nav_kf_bytes(), aligned as malloc() does; x = 0, P = 0. */
+/* In memory of nav_kf_bytes(), aligned as malloc() does, which must not be moved; x = 0, P = 0. */
 NAV_API int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_kf **out);
 
 /* x (NULL: 0) and P. NAV_SINGULAR: P is not symmetric or has a negative eigenvalue; zero ones are taken. */

@@ -31,6 +31,16 @@ static void on_readouts(void *ctx, struct mav_readouts *out, int64_t t_ns)
     out->head_deg = head_read_deg(&l->head, t_ns);
 }
 
+static void put_aircraft(const struct flight_state *s, struct mav_world *out)
+{
+    out->latitude_deg = s->lat_rad * deg_of_rad;
+    out->longitude_deg = s->lon_rad * deg_of_rad;
+    out->height_m = s->h_m;
+    out->east_mps = s->v_enu_mps[0];
+    out->north_mps = s->v_enu_mps[1];
+    out->down_mps = -s->v_enu_mps[2];
+}
+
 static void on_world(void *ctx, struct mav_world *out, int64_t t_ns)
 {
     const struct mavlink *m = ctx;
@@ -42,6 +52,7 @@ static void on_world(void *ctx, struct mav_world *out, int64_t t_ns)
     out->latitude_deg = l->site.latitude_rad * deg_of_rad;
     out->longitude_deg = l->site.longitude_rad * deg_of_rad;
     out->height_m = l->site.height_m;
+    if (m->unit->cfg.mounting.on == LAB_FLIGHT) put_aircraft(lab_aircraft(l, t_ns), out);
     if (m->unit->cfg.mounting.on != LAB_PLATFORM) return;
     struct vehicle_state v;
     vehicle_at(&l->platform.vehicle, t_ns, &v);

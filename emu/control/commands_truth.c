@@ -129,6 +129,30 @@ static void add_platform(struct lab *l, cJSON *to, int64_t t_ns)
     cJSON_AddItemToObject(vehicle, "accel_l_mps2", cJSON_CreateDoubleArray(v.accel_l_mps2, 3));
 }
 
+static void add_triple(cJSON *to, const char *name, const double v[3])
+{
+    cJSON_AddItemToObject(to, name, cJSON_CreateDoubleArray(v, 3));
+}
+
+/* As in phys/flight/flight.h; velocities and accelerations east, north, up. */
+static void add_flight(struct lab *l, cJSON *to, int64_t t_ns)
+{
+    const struct flight_state *s = lab_aircraft(l, t_ns);
+    const struct flight_leg *leg = &l->flight.cfg.plan.leg[s->leg];
+    cJSON *j = cJSON_AddObjectToObject(to, "flight");
+    add_count(j, "leg", s->leg);
+    cJSON_AddStringToObject(j, "kind", flight_kind(leg->kind)->key);
+    add_real(j, "latitude_deg", s->lat_rad * deg_of_rad);
+    add_real(j, "longitude_deg", s->lon_rad * deg_of_rad);
+    add_real(j, "height_m", s->h_m);
+    add_triple(j, "v_enu_mps", s->v_enu_mps);
+    add_triple(j, "a_enu_mps2", s->a_enu_mps2);
+    add_real(j, "heading_deg", s->heading_rad * deg_of_rad);
+    add_real(j, "pitch_deg", s->pitch_rad * deg_of_rad);
+    add_real(j, "roll_deg", s->roll_rad * deg_of_rad);
+    add_real(j, "baro_m", flight_baro_m(&l->flight, t_ns));
+}
+
 /* Of the quartz sensors whose pendulum is known: what their phase-sensitive amplifiers have before them. */
 static void add_pickoffs(const struct unit *u, cJSON *to)
 {
@@ -185,6 +209,7 @@ static enum control_outcome do_state(const struct control_call *call)
     add_table(b->lab, to, t_ns);
     if (b->lab->chamber.cfg.present) add_real(to, "air_degc", chamber_air_degc(&b->lab->chamber, t_ns));
     if (b->lab->platform.cfg.present) add_platform(b->lab, to, t_ns);
+    if (b->lab->flight.cfg.present) add_flight(b->lab, to, t_ns);
     if (b->lab->supply.cfg.present) add_real(to, "supply_v", supply_volts(&b->lab->supply, t_ns));
     if (b->units) add_unit_state(b->unit[call->v[0].unit], cJSON_AddObjectToObject(to, "unit"), t_ns);
     return CONTROL_DONE;

@@ -1,5 +1,6 @@
 #include "phys/lab.h"
 
+#include <assert.h>
 #include <string.h>
 
 struct lab_cfg lab_default(void)
@@ -11,6 +12,7 @@ struct lab_cfg lab_default(void)
         .supply = supply_default(),
         .platform = platform_default(),
         .vehicle = vehicle_default(),
+        .flight = flight_default(),
     };
 }
 
@@ -28,6 +30,17 @@ static const struct pose *tilt_of(struct lab *l, const struct lab_mounting *moun
     return &l->tilt.pose;
 }
 
+/* The scenario has proved that the legs can be flown. */
+static void init_flight(struct lab *l, const struct lab_cfg *cfg)
+{
+    struct flight_error e;
+    l->aircraft.t_ns = -1;
+    if (!cfg->flight.present) return;
+    const bool flies = flight_init(&l->flight, &cfg->flight, &cfg->site, &e);
+    assert(flies);
+    (void)flies;
+}
+
 void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
 {
     *l = (struct lab){.site = cfg->site};
@@ -38,6 +51,7 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
     pose_start(&l->bench, &cfg->site);
     set_tilt(&l->tilt, (const double[3]){0.0, 0.0, 0.0});
     platform_init(&l->platform, &cfg->platform, &cfg->vehicle, &cfg->site, seed);
+    init_flight(l, cfg);
 }
 
 void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns)
@@ -61,7 +75,7 @@ bool lab_is_centred(const struct lab_mounting *mounting, const double at_m[3])
 static struct pose case_in_mount(struct lab *l, const struct lab_mounting *mounting, int64_t t_ns)
 {
     struct pose p;
-    if (mounting->on == LAB_TABLE || mounting->on == LAB_FIXED) return *tilt_of(l, mounting);
+    if (mounting->on != LAB_PLATFORM && mounting->on != LAB_HEAD) return *tilt_of(l, mounting);
     pose_start(&p, &(struct site){0});
     if (mounting->on == LAB_PLATFORM) p = *platform_level(&l->platform, t_ns);
     if (mounting->on == LAB_HEAD) pose_turn(&p, POSE_X, head_face_rad(head_face(&l->head, t_ns)), 0.0, 0.0);
@@ -89,6 +103,20 @@ static void platform_kinematics(struct platform *platform, const double r_m[3], 
     memcpy(out->w_radps, p.w_ib_b_radps, sizeof out->w_radps);
 }
 
+const struct flight_state *lab_aircraft(struct lab *l, int64_t t_ns)
+{
+    if (t_ns != l->aircraft.t_ns) flight_at(&l->flight, t_ns, &l->aircraft.at);
+    l->aircraft.t_ns = t_ns;
+    return &l->aircraft.at;
+}
+
+static void aircraft_kinematics(const struct flight_state *s, const double r_m[3], struct kinematics *out)
+{
+    pose_force_mps2(&s->pose, 0.0, r_m, out->f_mps2);
+    for (unsigned k = 0; k < 3; k++) out->f_mps2[k] += s->f_b_mps2[k];
+    memcpy(out->w_radps, s->pose.w_ib_b_radps, sizeof out->w_radps);
+}
+
 /* In the mount's axes, at r_m from the instrument's centre. */
 static void mount_kinematics(struct lab *l, enum lab_mount on, const double r_m[3], int64_t t_ns,
                              struct kinematics *out)
@@ -97,6 +125,10 @@ static void mount_kinematics(struct lab *l, enum lab_mount on, const double r_m[
     const struct pose *p = &l->bench;
     if (on == LAB_PLATFORM) {
         platform_kinematics(&l->platform, r_m, t_ns, out);
+        return;
+    }
+    if (on == LAB_FLIGHT) {
+        aircraft_kinematics(lab_aircraft(l, t_ns), r_m, out);
         return;
     }
     if (on == LAB_TABLE) p = table_pose(&l->table, t_ns);
@@ -137,6 +169,8 @@ int64_t lab_smooth_ns(const struct lab *l, const struct lab_mounting *mounting, 
         return head_smooth_ns(&l->head, t_ns);
     case LAB_PLATFORM:
         return platform_smooth_ns(&l->platform, t_ns);
+    case LAB_FLIGHT:
+        return flight_smooth_ns(&l->flight, t_ns);
     case LAB_FIXED:
         break;
     }
@@ -226,8 +260,11 @@ void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const d
     memcpy(a_mps2, row[0], sizeof row[0]);
 }
 
-static const char *const mounts[] = {
-    [LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed", [LAB_PLATFORM] = "platform"};
+static const char *const mounts[] = {[LAB_HEAD] = "head",
+                                     [LAB_TABLE] = "table",
+                                     [LAB_FIXED] = "fixed",
+                                     [LAB_PLATFORM] = "platform",
+                                     [LAB_FLIGHT] = "flight"};
 
 const char *lab_mount_name(enum lab_mount on)
 {

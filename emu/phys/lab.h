@@ -1,22 +1,23 @@
 /* Everything around the boards: the Earth, the instruments, and the kinematics of a unit on one of them.
  *
- * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform or on the bench itself. Its mounting says
+ * A unit sits on the dividing head, on the rate table, on the gyro-stabilised platform, in an aircraft or on the bench itself. Its mounting says
  * where: the lever arm from the instrument's centre (where the axes meet) to the unit's origin, in the mount's axes, and how
  * its case is askew there. Mount's axes: of the head x and y in the plane of turning, z its axis (head.h); of the table t
  * (table.h); of the bench x towards the site's azimuth and z down; of the platform p (platform.h), where the case is turned by
- * the tilt errors of the level sensors first. Sensors get the exact specific force and inertial rate at their own point; of a
+ * the tilt errors of the level sensors first; of the aircraft b (flight/flight.h). Sensors get the exact specific force and inertial rate at their own point; of a
  * lever arm on the platform the centripetal part alone.
  * Plain struct, one thread; never moved once bodies are in the chamber. */
 #ifndef PSABENCH_PHYS_LAB_H
 #define PSABENCH_PHYS_LAB_H
 
 #include "phys/chamber.h"
+#include "phys/flight/flight.h"
 #include "phys/motion/head.h"
 #include "phys/motion/platform.h"
 #include "phys/motion/table.h"
 #include "phys/supply.h"
 
-enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED, LAB_PLATFORM };
+enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED, LAB_PLATFORM, LAB_FLIGHT };
 
 struct lab_cfg {
     struct site site;
@@ -26,6 +27,7 @@ struct lab_cfg {
     struct supply_cfg supply;
     struct platform_cfg platform;
     struct vehicle_cfg vehicle; /* under the platform */
+    struct flight_cfg flight;   /* can be flown: flight_init() */
 };
 
 #define LAB_ROW 32u /* instants of a row that are kept */
@@ -45,6 +47,12 @@ struct lab_tilt {
     struct pose pose;
 };
 
+/* The aircraft as it was asked for last. */
+struct lab_aircraft {
+    int64_t t_ns; /* negative: not yet */
+    struct flight_state at;
+};
+
 struct lab {
     struct site site;
     struct head head;
@@ -53,6 +61,8 @@ struct lab {
     struct supply supply;
     struct pose bench;
     struct platform platform; /* if cfg.present */
+    struct flight flight;     /* if cfg.present */
+    struct lab_aircraft aircraft;
     struct lab_row row;
     struct lab_tilt tilt;
 };
@@ -70,7 +80,7 @@ struct kinematics {
     double w_radps[3];
 };
 
-/* A site of 9.81 m/s^2 that is not placed, a head without error, a table of no axes, no chamber, no supply; the figures of
+/* A site of 9.81 m/s^2 that is not placed, a head without error, a table of no axes, no chamber, no supply, no aircraft; the figures of
  * those that are not there are their defaults. */
 struct lab_cfg lab_default(void);
 
@@ -107,7 +117,10 @@ unsigned lab_sensor_row_mps2(struct lab *l, const struct lab_sensor *s, const in
 void lab_sensor_mps2(struct lab *l, const struct lab_mounting *mounting, const double at_m[3], double cos_alpha0,
                      double sin_alpha0, int64_t t_ns, double a_mps2[3]);
 
-/* "head", "table", "fixed", "platform"; NULL for none. */
+/* State of the aircraft, if there is one; valid until the next call. */
+const struct flight_state *lab_aircraft(struct lab *l, int64_t t_ns);
+
+/* "head", "table", "fixed", "platform", "flight"; NULL for none. */
 const char *lab_mount_name(enum lab_mount on);
 
 #endif

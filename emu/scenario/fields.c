@@ -316,7 +316,7 @@ static const struct {
     {"_n_m_s", "N m s"}, {"_kg", "kg"}, {"_ug_per_urad", "µg/µrad"}, {"_arcsec_per_k", "arcsec/K"}, {"_ug_per_g2", "µg/g²"}, {"_ug_per_k", "µg/K"},
     {"_a_per_g", "A/g"}, {"_a_rthz", "A/√Hz"}, {"_mrad", "mrad"}, {"_urad", "µrad"}, {"_ug", "µg"},
     {"_v_per_s", "V/s"}, {"_a_per_k", "A/K"}, {"_v_rthz", "V/√Hz"}, {"_v_rts", "V/√s"}, {"_arcsec_rms", "arcsec"},
-    {"_arcsec", "arcsec"}, {"_mps2", "m/s²"}, {"_dps2", "°/s²"}, {"_dps", "°/s"}, {"_degc", "°C"}, {"_deg", "°"},
+    {"_arcsec", "arcsec"}, {"_mps3", "m/s³"}, {"_mps2", "m/s²"}, {"_mps", "m/s"}, {"_m_per_h", "m/h"}, {"_dps2", "°/s²"}, {"_dps", "°/s"}, {"_degc", "°C"}, {"_deg", "°"},
     {"_bitrate_hz", "bit/s"}, {"bitrate_hz", "bit/s"}, {"_hz", "Hz"}, {"_ohm", "Ω"}, {"_ppm", "ppm"}, {"_lsb", "LSB"},
     {"_ms", "ms"}, {"_ns", "ns"}, {"_s", "s"}, {"_m", "m"}, {"_v", "V"}, {"_a", "A"}, {"_k", "K"}, {"_bits", "bit"},
 };

@@ -22,6 +22,9 @@ extern const struct fields scenario_supply_fields;        /* of struct supply_cf
 extern const struct fields scenario_platform_fields;      /* of struct platform_cfg */
 extern const struct fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
 extern const struct fields scenario_sway_fields;          /* of struct vehicle_sway */
+extern const struct fields scenario_flight_fields;        /* of struct flight_cfg */
+extern const struct fields scenario_leg_fields;           /* of struct flight_leg: every key of every kind */
+extern const struct fields scenario_baro_fields;          /* of struct baro_cfg */
 extern const struct fields scenario_spread_fields;        /* of struct scenario_spread */
 extern const struct fields scenario_batch_fields;         /* of struct quartz_batch */
 extern const struct fields scenario_afe_fields;           /* of struct afe_cfg */
@@ -56,6 +59,7 @@ struct site scenario_site(const struct scenario_site *s);
 bool scenario_check_lab(struct yaml_file *f, const struct yaml_node *root, const struct lab_cfg *lab);
 bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
 
+bool scenario_check_flight(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
 bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s);
 
 /* The node of its level unit, by the name that it gives. */

@@ -225,6 +225,7 @@ static const struct field scenario_rows[] = {
     {.key = "supply", .type = FIELD_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
     {.key = "platform", .type = FIELD_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
     {.key = "vehicle", .type = FIELD_SECTION, .offset = SCENARIO(lab.vehicle), .sub = &scenario_vehicle_fields, .present = SCENARIO(lab.platform.present), .load = scenario_load_vehicle, .what = "the vehicle that carries the platform"},
+    {.key = "flight", .type = FIELD_SECTION, .offset = SCENARIO(lab.flight), .sub = &scenario_flight_fields, .present = SCENARIO(lab.flight.present), .what = "an aircraft that flies a list of legs; without it there is none"},
     {.key = "spread", .type = FIELD_SECTION, .offset = SCENARIO(spread), .sub = &scenario_spread_fields, .load = load_spread, .what = "production spread: standard deviations from unit to unit"},
     {.key = "units", .type = FIELD_CUSTOM, .load = scenario_load_units, .dump = dump_units, .what = "a sequence of up to 1000 units"},
     {.key = "timeline", .type = FIELD_STRUCTS, .offset = SCENARIO(timeline.event), .present = SCENARIO(timeline.count), .sub = &scenario_event_fields, .load = load_timeline, .what = "a sequence of commands, each at its time"},
@@ -257,7 +258,7 @@ static bool load_scenario(struct yaml_file *f, struct scenario *s)
     if (buses && !load_buses(f, buses, s)) return false;
     if (!yaml_load(f, f->root, "", &scenario_fields, s)) return false;
     if (!scenario_check_lab(f, f->root, &s->lab) || !scenario_check_seats(f, f->root, s)) return false;
-    if (!scenario_check_platform(f, f->root, s)) return false;
+    if (!scenario_check_platform(f, f->root, s) || !scenario_check_flight(f, f->root, s)) return false;
     return s->unit_count > 0 || yaml_file_fail(f, NULL, "units", "expected at least one unit, got none");
 }
 

@@ -126,7 +126,7 @@ static const struct field axes_rows[] = {
 static const struct fields axes_fields = FIELDS(axes_rows);
 
 static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
-                                     [LAB_PLATFORM] = "platform", NULL};
+                                     [LAB_PLATFORM] = "platform", [LAB_FLIGHT] = "flight", NULL};
 
 static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
@@ -428,6 +428,7 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
         const struct scenario_unit *u = &s->units[i];
         const bool there = u->cfg.mounting.on == LAB_TABLE      ? s->lab.table.axes > 0
                            : u->cfg.mounting.on == LAB_PLATFORM ? s->lab.platform.present
+                           : u->cfg.mounting.on == LAB_FLIGHT   ? s->lab.flight.present
                                                                 : true;
         const char *on = lab_mount_name(u->cfg.mounting.on);
         if (!there)

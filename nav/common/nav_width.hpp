@@ -9,7 +9,7 @@
 #ifdef __x86_64__
 #define TARGET_WIDE   __attribute__((target("avx2")))
 #define TARGET_WIDEST __attribute__((target("avx512f,avx512dq,avx512vl")))
-inline int random_width(void)
+inline int nav_width(void)
 {
     if (__builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")) return 2;
     return __builtin_cpu_supports("avx2") ? 1 : 0;
@@ -17,26 +17,24 @@ inline int random_width(void)
 #else
 #define TARGET_WIDE
 #define TARGET_WIDEST
-inline int random_width(void)
+inline int nav_width(void)
 {
     return 0;
 }
 #endif
 
-/* name_by_width[random_width()] has these parameters and is the call, inlined and compiled for that width. */
+#define COMPILE_FOR(name, parameters, lanes, ...)                                                                      \
+    static void name##_##lanes parameters                                                                              \
+    {                                                                                                                  \
+        [[maybe_unused]] constexpr int WIDTH = lanes;                                                                  \
+        __VA_ARGS__;                                                                                                   \
+    }
+
+/* name_by_width[nav_width()] has these parameters and is the call, compiled for that width; it may name WIDTH. */
 #define BY_WIDTH(name, parameters, ...)                                                                                \
-    static void name##_any parameters                                                                                  \
-    {                                                                                                                  \
-        __VA_ARGS__;                                                                                                   \
-    }                                                                                                                  \
-    TARGET_WIDE static void name##_wide parameters                                                                     \
-    {                                                                                                                  \
-        __VA_ARGS__;                                                                                                   \
-    }                                                                                                                  \
-    TARGET_WIDEST static void name##_widest parameters                                                                 \
-    {                                                                                                                  \
-        __VA_ARGS__;                                                                                                   \
-    }                                                                                                                  \
-    static void(*const name##_by_width[]) parameters = {name##_any, name##_wide, name##_widest};
+    COMPILE_FOR(name, parameters, 2, __VA_ARGS__)                                                                      \
+    TARGET_WIDE COMPILE_FOR(name, parameters, 4, __VA_ARGS__)                                                          \
+    TARGET_WIDEST COMPILE_FOR(name, parameters, 8, __VA_ARGS__) static void(*const name##_by_width[])                  \
+        parameters = {name##_2, name##_4, name##_8};
 
 #endif

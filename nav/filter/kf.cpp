@@ -2,18 +2,28 @@
 
 #include "nav/common/nav_math.hpp"
 
+#include <cstdint>
 #include <cstring>
 
+/* One more in an exponent of all ones runs over into the sign. */
 static bool all_finite(const double *a, int count)
 {
-    bool finite = true;
-    for (int i = 0; i < count; i++) finite &= std::isfinite(a[i]);
-    return finite;
+    uint64_t over = 0;
+    for (int i = 0; i < count; i++) over |= (kf_bits(a[i]) & 0x7ff0000000000000) + 0x0010000000000000;
+    return !(over >> 63);
 }
 
 size_t nav_kf_bytes(void)
 {
     return sizeof(struct nav_kf);
+}
+
+/* The filter points into its own memory: it stays where it was started. */
+static void place_arrays(struct nav_kf *kf)
+{
+    const uintptr_t past = (uintptr_t)kf->store % KF_ALIGN_BYTES;
+    kf->p = kf->store + (KF_ALIGN_BYTES - past) % KF_ALIGN_BYTES / sizeof *kf->store;
+    kf->work = kf->p + KF_MAX * KF_MAX;
 }
 
 int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_kf **out)
@@ -25,6 +35,9 @@ int nav_kf_start(void *memory, size_t bytes, int n, int dynamic, int form, nav_k
     kf->n = n;
     kf->dynamic = dynamic;
     kf->form = form;
+    kf->stride = KF_PADDED(n);
+    kf->kernels = &kf_kernels[kf_width()];
+    place_arrays(kf);
     for (int i = 0; form == NAV_KF_UD && i < n; i++) kf->p[i * n + i] = 1.0;
     *out = kf;
     return NAV_OK;
@@ -46,7 +59,8 @@ int nav_kf_set(nav_kf *kf, const double *x, const double *p)
     double d[KF_MAX];
     if (!all_finite(p, n * n) || (x && !all_finite(x, n))) return NAV_NOT_FINITE;
     if (!is_symmetric(n, p) || !kf_factor(n, p, kf->work, d)) return NAV_SINGULAR;
-    memcpy(kf->p, kf->form == NAV_KF_UD ? kf->work : p, sizeof *p * (size_t)(n * n));
+    if (kf->form == NAV_KF_UD) memcpy(kf->p, kf->work, sizeof *p * (size_t)(n * n));
+    else kf_full_set(kf, p);
     memcpy(kf->d, d, sizeof *d * (size_t)n);
     for (int i = 0; i < n; i++) kf->x[i] = x ? x[i] : 0.0;
     return NAV_OK;
@@ -57,46 +71,30 @@ int nav_kf_get(const nav_kf *kf, double *x, double *p)
     const int n = kf->n;
     if (x) memcpy(x, kf->x, sizeof *x * (size_t)n);
     if (p && kf->form == NAV_KF_UD) kf_ud_full(kf, p);
-    if (p && kf->form == NAV_KF_JOSEPH) memcpy(p, kf->p, sizeof *p * (size_t)(n * n));
+    if (p && kf->form == NAV_KF_JOSEPH) kf_full_get(kf, p);
     return NAV_OK;
 }
 
 double kf_variance(const nav_kf *kf, int i)
 {
-    if (kf->form == NAV_KF_JOSEPH) return kf->p[i * (kf->n + 1)];
+    if (kf->form == NAV_KF_JOSEPH) return kf->p[i * (kf->stride + 1)];
     double sum = 0.0;
     for (int k = i; k < kf->n; k++) sum += kf->p[k * kf->n + i] * kf->p[k * kf->n + i] * kf->d[k];
     return sum;
 }
 
-static void gather_rows(struct nav_kf *kf, const double *phi)
-{
-    for (int i = 0; i < kf->dynamic; i++) {
-        int count = 0;
-        for (int k = 0; k < kf->n; k++) {
-            const double value = phi[i * kf->n + k];
-            if (value == 0.0) continue;
-            kf->rows.at[i][count] = k;
-            kf->rows.value[i][count++] = value;
-        }
-        kf->rows.count[i] = count;
-    }
-}
-
 static void move_state(struct nav_kf *kf)
 {
     double moved[KF_MAX];
-    for (int i = 0; i < kf->dynamic; i++) {
-        moved[i] = 0.0;
-        for (int k = 0; k < kf->rows.count[i]; k++) moved[i] += kf->rows.value[i][k] * kf->x[kf->rows.at[i][k]];
-    }
+    kf_move(kf, kf->x, kf->phi.count, moved);
     memcpy(kf->x, moved, sizeof *moved * (size_t)kf->dynamic);
 }
 
 int nav_kf_predict(nav_kf *kf, const double *phi, const double *q)
 {
     if (!all_finite(phi, kf->dynamic * kf->n) || !all_finite(q, kf->dynamic * kf->dynamic)) return NAV_NOT_FINITE;
-    gather_rows(kf, phi);
+    kf->phi.rows = phi;
+    kf->phi.count = kf_list_used(kf->dynamic, kf->n, phi, kf->phi.at);
     if (kf->form == NAV_KF_JOSEPH) kf_full_predict(kf, q);
     else if (!kf_ud_predict(kf, q)) return NAV_SINGULAR;
     move_state(kf);
@@ -120,6 +118,7 @@ int nav_kf_innovate(const nav_kf *kf, const double *h, double z, double r, struc
 {
     struct kf_gain g;
     struct nav_kf_innovation found;
+    g.of = NULL;
     const int status = find_gain(kf, h, z, r, &g, &found);
     if (status == NAV_OK) *out = found;
     return status;
@@ -130,13 +129,14 @@ int nav_kf_update(nav_kf *kf, const double *h, const double *z, const double *r,
 {
     struct kf_gain g;
     struct nav_kf_innovation found;
+    g.of = NULL;
     for (int m = 0; m < count; m++) {
         const int status = find_gain(kf, h + m * kf->n, z[m], r[m], &g, &found);
         if (status != NAV_OK) return status;
         const double step = found.value / found.variance;
         for (int i = 0; i < kf->n; i++) kf->x[i] += g.w[i] * step;
         if (kf->form == NAV_KF_UD) kf_ud_update(kf, h + m * kf->n, r[m], &g);
-        else kf_full_update(kf, &g);
+        else kf_full_update(kf, &g, m + 1 < count ? h + (m + 1) * kf->n : NULL);
         if (out) out[m] = found;
     }
     return NAV_OK;

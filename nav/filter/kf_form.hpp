@@ -2,38 +2,58 @@
 #ifndef PSABENCH_NAV_KF_FORM_HPP
 #define PSABENCH_NAV_KF_FORM_HPP
 
+#include "nav/filter/kf_kernels.h"
 #include "nav/kf.h"
+
+#include <cstdint>
+#include <cstring>
 
 constexpr int KF_MAX = NAV_KF_MAX;
 
-/* Rows of Phi of the moving states, without their zeros. */
-struct kf_rows {
-    int count[KF_MAX];
-    int at[KF_MAX][KF_MAX];
-    double value[KF_MAX][KF_MAX];
+inline uint64_t kf_bits(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+/* Phi's moving rows, dynamic x n, the caller's, and the columns of it that are not zero. */
+struct kf_phi {
+    const double *rows;
+    int count;
+    int at[KF_MAX];
 };
 
 struct nav_kf {
     int n, dynamic, form;
-    double x[KF_MAX];
-    double p[KF_MAX * KF_MAX]; /* n x n: P, or U transposed: its columns are rows here */
-    double d[KF_MAX];
-    struct kf_rows rows;
-    double work[KF_MAX * KF_MAX];
+    int stride;                       /* of P's rows, KF_PADDED(n) */
+    const struct kf_kernels *kernels; /* of this processor */
+    double *p;                        /* P; or n x n: U transposed, its columns are rows here */
+    double *work;                     /* as p in store, aligned for the kernels */
+    double x[KF_MAX], d[KF_MAX];
+    struct kf_phi phi;
+    double store[2 * KF_MAX * KF_MAX + KF_LANES];
 };
 
 /* w: gain times s, innovation variance s = h w + r. u is what the form wants again in the update. */
 struct kf_gain {
-    double w[KF_MAX], u[KF_MAX];
+    alignas(KF_ALIGN_BYTES) double w[KF_MAX];
+    double u[KF_MAX];
     double variance;
+    const double *of; /* h, where w = P h is there before it is asked for; or NULL */
 };
 
 /* P = U D U': ut row j holds column j of U. False: an eigenvalue is negative. p and ut may be the same. */
 bool kf_factor(int n, const double *p, double *ut, double *d);
 
+int kf_list_used(int rows, int n, const double *a, int *at); /* columns of a, rows of n, that are not zero */
+void kf_move(const struct nav_kf *kf, const double *a, int count, double *y); /* Phi a of `count` columns of phi.at */
+
 void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
-void kf_full_update(struct nav_kf *kf, const struct kf_gain *g);
+void kf_full_update(struct nav_kf *kf, struct kf_gain *g, const double *next_h); /* next_h: or NULL */
 void kf_full_predict(struct nav_kf *kf, const double *q);
+void kf_full_set(struct nav_kf *kf, const double *p);
+void kf_full_get(const struct nav_kf *kf, double *p);
 
 void kf_ud_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g);
 void kf_ud_update(struct nav_kf *kf, const double *h, double r, struct kf_gain *g);

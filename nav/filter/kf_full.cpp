@@ -1,67 +1,66 @@
 #include "nav/filter/kf_form.hpp"
 
-#include "nav/common/nav_width.hpp"
-
 #include <cmath>
 #include <cstring>
 
-/* y += a x: whole rows, which the compiler turns into vectors without another order of any sum. */
-INLINE void add_scaled(int n, double *__restrict y, double a, const double *__restrict x)
+static void add_rows(const struct nav_kf *kf, const struct kf_sum &s)
 {
-    for (int i = 0; i < n; i++) y[i] += a * x[i];
+    kf->kernels->add_rows(&s);
 }
 
-/* y += sum of a_k times row k of p, zeros left out. */
-INLINE void add_rows(int n, double *y, const double *a, const double *p)
-{
-    for (int k = 0; k < n; k++)
-        if (a[k] != 0.0) add_scaled(n, y, a[k], p + k * n);
-}
-
-INLINE void subtract_square(int n, double *p, const double *v)
-{
-    for (int i = 0; i < n; i++)
-        if (v[i] != 0.0) add_scaled(n, p + i * n, -v[i], v);
-}
-
-BY_WIDTH(rows, (int n, double *y, const double *a, const double *p), add_rows(n, y, a, p))
-BY_WIDTH(square, (int n, double *p, const double *v), subtract_square(n, p, v))
-
+/* w = P h. */
 void kf_full_gain(const struct nav_kf *kf, const double *h, double r, struct kf_gain *g)
 {
     const int n = kf->n;
-    memset(g->w, 0, sizeof *g->w * (size_t)n);
-    rows_by_width[random_width()](n, g->w, h, kf->p);
+    if (g->of != h) {
+        int at[KF_MAX];
+        const int count = kf_list_used(1, n, h, at);
+        memset(g->w, 0, sizeof *g->w * (size_t)kf->stride);
+        add_rows(kf, {1, kf->stride, count, at, h, kf->p, g->w, 0, kf->stride, 0});
+    }
     g->variance = r;
     for (int k = 0; k < n; k++) g->variance += h[k] * g->w[k];
 }
 
-/* P - w w'/s as (w/sqrt s)(w/sqrt s)': symmetric to the last bit. */
-void kf_full_update(struct nav_kf *kf, const struct kf_gain *g)
+/* P - w w'/s as (w/sqrt s)(w/sqrt s)'. */
+void kf_full_update(struct nav_kf *kf, struct kf_gain *g, const double *next_h)
 {
-    const int n = kf->n;
     const double scale = 1.0 / std::sqrt(g->variance);
-    double v[KF_MAX];
-    for (int i = 0; i < n; i++) v[i] = g->w[i] * scale;
-    square_by_width[random_width()](n, kf->p, v);
+    alignas(KF_ALIGN_BYTES) double v[KF_MAX];
+    for (int i = 0; i < kf->stride; i++) v[i] = g->w[i] * scale;
+    const struct kf_square square = {kf->n, kf->stride, v, next_h, kf->p, g->w};
+    kf->kernels->subtract_square(&square);
+    g->of = next_h;
 }
 
-/* Rows of the moving states: N = Phi P; P_dd = N Phi' + Q, P_dc = N_dc. */
+/* N = Phi P and its transpose as the moving rows and columns; in the square where they meet, Q + Phi N'. */
 void kf_full_predict(struct nav_kf *kf, const double *q)
 {
     const int n = kf->n;
     const int nd = kf->dynamic;
-    const struct kf_rows *a = &kf->rows;
+    const int stride = kf->stride;
+    const int side = KF_PADDED(nd);
+    const struct kf_phi *phi = &kf->phi;
     double *rows = kf->work;
-    memset(rows, 0, sizeof *rows * (size_t)(nd * n));
+    alignas(KF_ALIGN_BYTES) double square[KF_MAX * KF_MAX];
+    memset(rows, 0, sizeof *rows * (size_t)(nd * stride));
+    add_rows(kf, {nd, stride, phi->count, phi->at, phi->rows, kf->p, rows, n, stride, stride});
+    for (int k = 0; k < n; k++)
+        for (int i = 0; i < nd; i++) kf->p[k * stride + i] = rows[i * stride + k];
     for (int i = 0; i < nd; i++)
-        for (int k = 0; k < a->count[i]; k++) add_scaled(n, rows + i * n, a->value[i][k], kf->p + a->at[i][k] * n);
+        for (int j = 0; j < side; j++) square[i * side + j] = j < nd ? q[i * nd + j] : 0.0;
+    add_rows(kf, {nd, side, phi->count, phi->at, phi->rows, kf->p, square, n, stride, side});
+    memcpy(kf->p, rows, sizeof *rows * (size_t)(nd * stride));
     for (int i = 0; i < nd; i++)
-        for (int j = i; j < nd; j++) {
-            double sum = q[i * nd + j];
-            for (int k = 0; k < a->count[j]; k++) sum += rows[i * n + a->at[j][k]] * a->value[j][k];
-            kf->p[i * n + j] = kf->p[j * n + i] = sum;
-        }
-    for (int i = 0; i < nd; i++)
-        for (int j = nd; j < n; j++) kf->p[i * n + j] = kf->p[j * n + i] = rows[i * n + j];
+        for (int j = 0; j <= i; j++) kf->p[i * stride + j] = kf->p[j * stride + i] = square[i * side + j];
+}
+
+void kf_full_set(struct nav_kf *kf, const double *p)
+{
+    for (int i = 0; i < kf->n; i++) memcpy(kf->p + i * kf->stride, p + i * kf->n, sizeof *p * (size_t)kf->n);
+}
+
+void kf_full_get(const struct nav_kf *kf, double *p)
+{
+    for (int i = 0; i < kf->n; i++) memcpy(p + i * kf->n, kf->p + i * kf->stride, sizeof *p * (size_t)kf->n);
 }

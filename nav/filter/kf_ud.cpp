@@ -101,7 +101,7 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
 {
     const int n = kf->n;
     const int nd = kf->dynamic;
-    const struct kf_rows *a = &kf->rows;
+    int used = 0;
     double uq[KF_MAX * KF_MAX];
     double weight[2 * KF_MAX];
     double w[KF_MAX][2 * KF_MAX];
@@ -111,10 +111,8 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
     for (int j = 0; j < n; j++) {
         double *col = kf->p + j * n;
         double moved[KF_MAX];
-        for (int i = 0; i < nd; i++) {
-            moved[i] = 0.0;
-            for (int k = 0; k < a->count[i] && a->at[i][k] <= j; k++) moved[i] += a->value[i][k] * col[a->at[i][k]];
-        }
+        while (used < kf->phi.count && kf->phi.at[used] <= j) used++;
+        kf_move(kf, col, used, moved);
         for (int i = 0; i < nd; i++) (j < nd ? w[i][j] : col[i]) = moved[i];
     }
     for (int j = 0; j < nd; j++) {

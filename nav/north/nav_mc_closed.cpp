@@ -330,7 +330,7 @@ int nav_mc_closed(const struct nav_mc_cfg *cfg, uint64_t seed, uint64_t first_ru
     const int refused = plan_make(cfg, &plan);
     if (refused) return refused;
     const bool three = plan.lin.count == 3 && plan.lin.unknowns == 3;
-    const auto compute = (three ? three_by_width : more_by_width)[random_width()];
+    const auto compute = (three ? three_by_width : more_by_width)[nav_width()];
     struct lanes x;
     for (uint64_t at = 0; at < runs; at += LANES) {
         compute(&plan, seed, first_run + at, &x);

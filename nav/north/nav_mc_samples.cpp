@@ -41,7 +41,7 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
         plan->decay_sums[k] = plan->decay_sums[k - 1] + plan->decays[k - 1];
         plan->decays[k] = plan->decays[k - 1] * plan->decay;
     }
-    plan->width = random_width();
+    plan->width = nav_width();
     plan->step_sd_radps = cfg->gm_sigma_radps * std::sqrt(1.0 - plan->decay * plan->decay);
     plan->white_sd_radps = cfg->white_radps_rts / std::sqrt(cfg->sample_s);
     plan->over_gap[0] = 1.0;

@@ -11,6 +11,6 @@ BY_WIDTH(fill, (uint64_t state, int n, double *out), fill_uniform(state, n, out)
 
 uint64_t random_fill(uint64_t state, int n, double *out)
 {
-    fill_by_width[random_width()](state, n, out);
+    fill_by_width[nav_width()](state, n, out);
     return state + (uint64_t)(n / 2) * RANDOM_STEP;
 }

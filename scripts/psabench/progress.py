@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from shutil import get_terminal_size
+from typing import Protocol, TextIO
 
 BAR = 30  # characters
 REDRAW_S = 0.1
+
+
+class Advance(Protocol):
+    """Once per part done; note: what is known by now, in a few words."""
+
+    def __call__(self, note: str = "") -> None: ...
 
 
 class Bar:
@@ -20,17 +27,17 @@ class Bar:
         self._live = self._stream.isatty()
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def step(self, name: str, total: int) -> Iterator[Advance]:
         start_s = drawn_s = time.monotonic()
-        done = 0
+        done, said = 0, ""
 
-        def advance() -> None:
-            nonlocal done, drawn_s
-            done += 1
+        def advance(note: str = "") -> None:
+            nonlocal done, drawn_s, said
+            done, said = done + 1, note or said
             now_s = time.monotonic()
             if self._live and (now_s - drawn_s >= REDRAW_S or done == total):
                 drawn_s = now_s
-                self._draw(name, done, total, now_s - start_s)
+                self._draw(name, done, total, now_s - start_s, said)
 
         try:
             yield advance
@@ -38,12 +45,15 @@ class Bar:
             if self._live:
                 self._stream.write("\r\x1b[K")
             took_s = time.monotonic() - start_s
-            self._stream.write(f"{name}: {done}/{total} in {took_s:.1f} s\n")
+            self._stream.write(f"{name}: {done}/{total} in {took_s:.1f} s{said and f'; {said}'}\n")
             self._stream.flush()
 
-    def _draw(self, name: str, done: int, total: int, took_s: float) -> None:
-        filled = BAR * done // total
-        left_s = took_s * (total - done) / done
-        bar = "█" * filled + "·" * (BAR - filled)
-        self._stream.write(f"\r{name} {bar} {done}/{total}, {left_s:.0f} s left \x1b[K")
+    def _draw(self, name: str, done: int, total: int, took_s: float, said: str) -> None:
+        """In one line of the terminal, as a longer one would be left behind by the next; the bar gives way to words."""
+        columns = get_terminal_size().columns - 1
+        words = f"{done}/{total}, {took_s * (total - done) / done:.0f} s left{said and f'; {said}'}"
+        length = max(0, min(BAR, columns - len(name) - len(words) - 2))
+        filled = length * done // total
+        line = " ".join([name, *(["█" * filled + "·" * (length - filled)] if length else []), words])
+        self._stream.write(f"\r{line[:columns]}\x1b[K")
         self._stream.flush()

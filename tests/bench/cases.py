@@ -147,6 +147,22 @@ def has_cases(exe: Path) -> set[str]:
     return set(text.partition("cases:")[2].split())
 
 
+def _compiled(path: Path) -> list[Case]:
+    names = sorted(has_cases(path)) if path.exists() else []
+    commands = {name: partial(core, path, name) for name in names}
+    unit = {"bench_core": "frames", "bench_lib": "bytes", "bench_kf": "steps"}[path.name]
+    return [Case(name, unit, partial(printed, c), 2000, c) for name, c in commands.items()]
+
+
+def nav_cases(bench: Path) -> list[Case]:
+    """Those of the page's table of filters: the whole of it is measured without the models."""
+    python_cases = [
+        Case(name, unit, partial(printed, partial(python, name)), first, fixed=unit == "hours")
+        for name, (unit, first) in NAV.items()
+    ]
+    return _compiled(bench / "bench_kf") + python_cases
+
+
 def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
     """In the order of a round."""
     icarus, timing, driven, psd1 = (peers[name] for name in (*NAMES, PSD1))
@@ -156,17 +172,10 @@ def all_cases(bench: Path, peers: dict[str, Peer]) -> list[Case]:
         Case("verilator", "frames", partial(printed, driven.command), 20000, driven.command, (1000, 3000)),
         Case(PSD1, "frames", partial(printed, psd1.command), 1000, psd1.command, (50, 150)),
     ]
-    for exe, unit in (("bench_core", "frames"), ("bench_lib", "bytes"), ("bench_kf", "steps")):
-        path = bench / exe
-        if not path.exists():
-            continue
-        for name in sorted(has_cases(path)):
-            command = partial(core, path, name)
-            cases.append(Case(name, unit, partial(printed, command), 2000, command))
+    cases += _compiled(bench / "bench_core") + _compiled(bench / "bench_lib")
     for name, unit, first in (("decode", "frames", 20000), ("can", "frames", 20000), ("chips-spi", "bytes", 20000)):
         cases.append(Case(name, unit, partial(printed, partial(python, name)), first))
-    for name, (unit, first) in NAV.items():
-        cases.append(Case(name, unit, partial(printed, partial(python, name)), first, fixed=unit == "hours"))
+    cases += nav_cases(bench)
     for name, first in MONTE_CARLO.items():
         cases.append(Case(name, "runs", partial(printed, partial(python, name)), first))
     for name in ("gyro-emulator", "gyro-chain"):

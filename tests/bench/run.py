@@ -54,10 +54,10 @@ def machine() -> dict[str, str | int]:
     }
 
 
-def summary(measured: list[Case], rounds: int) -> Result:
-    by_name = {c.name: c for c in measured}
+def summary(done: list[Case], rounds: int) -> Result:
+    by_name = {c.name: c for c in done}
     rows = {}
-    for c in measured:
+    for c in done:
         if c.name in peers.NAMES:  # only the driver counts while it is timed; all three were proved to make the same
             c.edges_per_unit = by_name[PEER].edges_per_unit
         row: dict[str, object] = {
@@ -82,7 +82,7 @@ def summary(measured: list[Case], rounds: int) -> Result:
             if c.instructions_per_unit:
                 row["instructions_per_edge"] = c.instructions_per_unit / c.edges_per_unit
         rows[c.name] = row
-    return {"machine": machine(), "rounds": rounds, "cases": rows}
+    return {"machine": {}, "rounds": rounds, "cases": rows}
 
 
 def bench(seconds: float) -> Result:
@@ -96,7 +96,11 @@ def bench(seconds: float) -> Result:
     peers.prove(made, board)
     peers.prove(made_psd1, board_psd1, peers.PSD1_LINES)
     say(f"the models send the words of the emulated board, edge for edge: {board.partition(chr(10))[0]}")
-    todo = cases.all_cases(OUT, made | made_psd1)
+    return measured(cases.all_cases(OUT, made | made_psd1), seconds) | {"machine": machine()}
+
+
+def measured(todo: list[Case], seconds: float) -> Result:
+    """Instructions, then rounds of rates; the machine is not yet named."""
     for case in todo:
         say(f"instructions: {case.name}") if case.under_callgrind else None
         cases.count_instructions(case)
@@ -116,20 +120,23 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--seconds", type=float, default=180.0, help="of measuring, about (default 180)")
     parser.add_argument("--no-page", action="store_true", help="leave docs/reference/performance.md as it is")
     parser.add_argument("--page-only", action="store_true", help="write it from the last result")
+    parser.add_argument("--nav", action="store_true", help="the table of filters alone, from what is built")
     args = parser.parse_args(argv)
     result_file = OUT / "result.json"
     os.environ["PYTHONPATH"] = str(ROOT / "scripts")  # what is measured is this checkout
     if not args.page_only:
         result_file.unlink(missing_ok=True)
         result_file.parent.mkdir(parents=True, exist_ok=True)
-        result = bench(args.seconds)
+        result = measured(cases.nav_cases(OUT), args.seconds) if args.nav else bench(args.seconds)
         result_file.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     result = json.loads(result_file.read_text(encoding="utf-8"))
-    print("\n" + "\n\n".join(make(result) for make in page.SECTIONS.values()))
+    sections = ["nav"] if args.nav else list(page.SECTIONS)
+    print("\n" + "\n\n".join(page.SECTIONS[name](result) for name in sections))
     if not args.no_page:
-        PAGE.write_text(page.fill(PAGE.read_text(encoding="utf-8"), result), encoding="utf-8")
-        PICTURE.write_text(page.picture(result), encoding="utf-8")
-        say(f"{PAGE.relative_to(ROOT)}, {PICTURE.relative_to(ROOT)} and {result_file.relative_to(ROOT)} written")
+        PAGE.write_text(page.fill(PAGE.read_text(encoding="utf-8"), result, sections), encoding="utf-8")
+        if not args.nav:
+            PICTURE.write_text(page.picture(result), encoding="utf-8")
+        say(f"{PAGE.relative_to(ROOT)} and {result_file.relative_to(ROOT)} written")
     return 0
 
 

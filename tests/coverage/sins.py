@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from psabench.bench import Bench
 from psabench.estimate.uncertainty import t_quantile
+from psabench.procedures.head_bench import Silent
 from psabench.sins import calibration_run as sins_run
 from psabench.sins.calibration import estimate_unit
 from psabench.sins.calibration_grade import Graded, grade_result, truth_of
@@ -35,7 +36,8 @@ def one_unit(seed: int, plan_name: str) -> tuple[dict[str, tuple[Graded, np.ndar
     p, plan = CalibrationParams(plan=plan_name), read_plan(plan_name)
     began_s = time.monotonic()
     with Bench.start(sins_run.SCENARIO, seed=seed) as bench:
-        data = TableRun(bench, list(moves_of(plan.turns, 3)), lambda: None).measure(True)
+        with Silent().step("", 1) as advance:
+            data = TableRun(bench, list(moves_of(plan.turns, 3)), advance).measure(True)
         truth = truth_of(bench)
     took_s = time.monotonic() - began_s
     start, found = attitudes(0.0, np.zeros((1, 3)))[0], {}

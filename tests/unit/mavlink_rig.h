@@ -99,7 +99,7 @@ static inline void on_world(void *ctx, struct mav_world *out, int64_t t_ns)
     (void)ctx;
     (void)t_ns;
     r.world_calls++;
-    *out = (struct mav_world){{0.1, 0.2, 0.3}, 50.45, 30.5, 120, -3, 4};
+    *out = (struct mav_world){{0.1, 0.2, 0.3}, 50.45, 30.5, 120, -3, 4, 1.5};
 }
 
 static inline double on_value(void *ctx, unsigned which, int64_t t_ns)

@@ -12,8 +12,9 @@ from pathlib import Path
 from psabench.campaign.sins_pairs import params_of, run_pair
 from psabench.campaign.sins_unit import read_experiment
 from psabench.report import plots
-from psabench.sins import secondary_page, snake, snake_page
-from psabench.sins.secondary import calibrate_outputs, compensate_outputs
+from psabench.sins import snake, snake_page
+from psabench.sins.secondary import page as secondary_page
+from psabench.sins.secondary.estimate import calibrate_outputs, compensate_outputs
 
 ROOT = Path(__file__).resolve().parents[2]
 

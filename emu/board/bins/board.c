@@ -125,6 +125,22 @@ static void add_latest(struct sha256 *s, const struct bins_reading *r)
     for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)(uint32_t)r->gyro[i] << 32 | (uint32_t)r->accel[i]);
 }
 
+static void add_nav(struct sha256 *s, const struct bins_nav *n)
+{
+    board_digest_u64(s, (uint64_t)n->state << 32 | n->since);
+    board_digest_u64(s, (uint64_t)n->t_ns);
+    board_digest_u64(s, (uint64_t)n->shown_ns);
+    const double value[] = {n->set.lat_rad, n->set.lon_rad, n->set.h_m,  n->set.alignment_s, n->time_s,
+                            n->lat_rad,     n->lon_rad,     n->v_mps[0], n->v_mps[1],        n->q[0],
+                            n->q[1],        n->q[2],        n->q[3]};
+    for (unsigned i = 0; i < sizeof value / sizeof *value; i++) board_digest_real(s, value[i]);
+    for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->rate[i]);
+    for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->force[i]);
+    for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->a_before[i]);
+    for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->v_before[i]);
+    for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->turned_rad[i]);
+}
+
 static void add_digest(const struct board *board, struct sha256 *s)
 {
     const struct bins *b = (const struct bins *)board;
@@ -133,6 +149,7 @@ static void add_digest(const struct board *board, struct sha256 *s)
     add_gyros(s, &b->gyros);
     add_sums(s, &b->sums);
     add_latest(s, &b->latest);
+    add_nav(s, &b->nav);
     sha256_add(s, &b->counters, sizeof b->counters);
     for (unsigned i = 0; i < 4; i++) board_digest_u64(s, b->temp_code[i]);
 }

@@ -5,8 +5,11 @@
 #include "board/bins/bins.h"
 #include "board/node.h"
 
+#define BINS_NAV_FIELDS 13u /* of object 2210h */
+
 struct bins_can {
-    struct board_node node; /* first */
+    struct board_node node;      /* first */
+    double nav[BINS_NAV_FIELDS]; /* the latest outputs, as in the messages */
 };
 
 extern const struct board_can bins_can;

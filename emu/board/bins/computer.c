@@ -77,6 +77,9 @@ static void send_reading(struct bins *b, const struct bins_latch *at, int64_t t_
     b->counters.saturated += (b->latest.flags & BINS_CLIP) != 0;
     board_notify(&b->psa2.base, BINS_EV_READING, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, &b->latest, t_ns);
+    if (!bins_nav_take(&b->nav, &b->latest)) return;
+    if (b->host.navigated) b->host.navigated(b->host.ctx, t_ns);
+    bins_nav_shown(&b->nav);
 }
 
 /* The first latch is where the first reading begins. */
@@ -208,6 +211,7 @@ static void clear_sums(struct bins *b)
     b->sums = (struct bins_sums){.word_ns = -1};
     sched_ev_inner(&b->sums.ev, latch_gyros, b);
     b->latest = (struct bins_reading){.seq = 0};
+    bins_nav_stop(&b->nav);
     memset(b->temp_code, 0, sizeof b->temp_code);
 }
 
@@ -222,6 +226,7 @@ void bins_init(struct bins *b, const struct bins_profile *p, const struct board_
     b->errors = bins_profile_errors(p, cfg->seed, cfg->serial);
     b->psa2.host = (struct psa2_host){.ctx = b, .frame = on_frame, .fault = on_fault};
     b->sums.word_ns = -1;
+    b->nav.set.alignment_s = BINS_ALIGNMENT_S;
     sched_ev_inner(&b->sums.ev, latch_gyros, b);
     bins_gyro_init(b);
 }

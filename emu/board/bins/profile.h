@@ -26,6 +26,7 @@ struct bins_profile {
     double accel_bias_sd_mps2, accel_scale_sd, accel_misalignment_sd_arcmin;
     /* noise: standard deviation of a mean of one second */
     double gyro_noise_degph, accel_noise_mps2;
+    uint32_t nav_every;        /* readings between two outputs of the unit's own navigation */
     double gyro_lock_in_degph; /* rates below it are not seen; 0: dithered away */
 };
 

@@ -33,7 +33,7 @@ struct mav_readouts { /* of the instruments, as an operator sees them */
 struct mav_world { /* truth, for HIL messages alone */
     double gyro_radps[3];
     double latitude_deg, longitude_deg, height_m;
-    double north_mps, east_mps;
+    double north_mps, east_mps, down_mps;
 };
 
 struct mav_io {

@@ -151,6 +151,7 @@ static void send_hil_gps(struct mav_station *s, int64_t t_ns)
                                  .vel = (uint16_t)cm_per_s(speed_mps),
                                  .vn = cm_per_s(w.north_mps),
                                  .ve = cm_per_s(w.east_mps),
+                                 .vd = cm_per_s(w.down_mps),
                                  .cog =
                                      speed_mps > 0.1 ? (uint16_t)(fmod(track_deg + 360.0, 360.0) * 100.0) : UINT16_MAX,
                                  .fix_type = FIX_3D,

@@ -126,6 +126,9 @@ class BinsObjects(Common):
     INCREMENTS = 0x2200
     READING = 0x2202
     TEMPERATURES = 0x2205
+    NAV = 0x2210
+    NAV_MODE = 0x2211
+    NAV_START = 0x2212
     WEIGHTS = 0x2220
     TIMING = 0x2221
 

@@ -175,6 +175,13 @@ class Unit:
             )
 
 
+def tpdos_of(node: CanopenNode) -> dict[str, int]:
+    """Index of the communication parameters of each message."""
+    return {
+        node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k for k in range(8) if node.has(Common.TPDO + k)
+    }
+
+
 class BusUnit(Unit):
     """A board of which a reading is a row of signals."""
 
@@ -185,11 +192,7 @@ class BusUnit(Unit):
 
         Raises ValueError for one that the board has not.
         """
-        tpdos = {
-            self.node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k
-            for k in range(8)
-            if self.node.has(Common.TPDO + k)
-        }
+        tpdos = tpdos_of(self.node)
         for name in messages:
             if name not in tpdos:
                 raise ValueError(expected(", ".join(tpdos), repr(name), f"message of a {self.title}"))

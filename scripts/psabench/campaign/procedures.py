@@ -15,6 +15,10 @@ CAMPAIGNS: Mapping[str, tuple[str, str]] = {
         "quartz.deformation_command",
         "deformation of a quartz accelerometer's sensing element over temperature, with tolerances",
     ),
+    "sins-methods": (
+        "campaign.sins_methods_command",
+        "a strapdown unit calibrated on a rate table by six positions, by Fourier series and by the filter",
+    ),
     "sins-plan": ("sins.planner.command", "plan of rotations that calibrates a strapdown unit best"),
     "run-in": ("quartz.run_in_command", "thermal run-in of a production batch of quartz accelerometers"),
     "sins-secondary": (

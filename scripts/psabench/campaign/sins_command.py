@@ -80,7 +80,7 @@ def _chosen_experiment(args: argparse.Namespace) -> Experiment:
 def _write_recordings(folder: Path, e: Experiment) -> list[Path]:
     """Recordings of the first unit."""
     from psabench.campaign.sins_pairs import run_pair
-    from psabench.sins.outputs import write_outputs
+    from psabench.sins.secondary.outputs import write_outputs
 
     folder.mkdir(parents=True, exist_ok=True)
     first, second, _ = run_pair(e, 0)

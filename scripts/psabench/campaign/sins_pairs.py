@@ -11,9 +11,9 @@ import numpy as np
 from psabench.campaign.sins_unit import Experiment, UnitErrors, draw_pair, run_unit
 from psabench.procedures.head_bench import Progress
 from psabench.quartz.draws import draw_source
-from psabench.sins.outputs import Outputs
-from psabench.sins.secondary import Secondary, calibrate_outputs, compensate_outputs
-from psabench.sins.secondary_run import SecondaryParams
+from psabench.sins.secondary.estimate import Secondary, calibrate_outputs, compensate_outputs
+from psabench.sins.secondary.outputs import Outputs
+from psabench.sins.secondary.run import SecondaryParams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

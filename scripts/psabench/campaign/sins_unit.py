@@ -19,8 +19,8 @@ from psabench.named_yaml import checked_number, read_named
 from psabench.native.sins import Turn
 from psabench.native.strapdown import ROW, Floats, State, Strapdown
 from psabench.quartz.draws import draw_source
-from psabench.sins.outputs import Outputs, Point
 from psabench.sins.plan import RotationPlan, read_plan
+from psabench.sins.secondary.outputs import Outputs, Point
 
 NAMED = ("article",)  # of proto/sins_experiments
 EARTH_RADPS = 7.292115e-5

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
 from psabench.estimate.uncertainty import Estimate
 from psabench.lcm.channel import Publisher
 from psabench.procedures.head_bench import Progress
+from psabench.progress import Advance
 
 PROGRESS, RESULT = "PSABENCH_PROGRESS", "PSABENCH_RESULT"
 EVERY_S = 0.1  # real time between two messages of a step
@@ -20,19 +21,19 @@ class LcmProgress:
     def __init__(self, publisher: Publisher, procedure: str, inner: Progress) -> None:
         self._publisher, self._procedure, self._inner = publisher, procedure, inner
 
-    def step(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
+    def step(self, name: str, total: int) -> AbstractContextManager[Advance]:
         return self._step(name, total)
 
     @contextmanager
-    def _step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def _step(self, name: str, total: int) -> Iterator[Advance]:
         done, told_s = 0, time.monotonic()
         self._tell(name, 0, total)
         with self._inner.step(name, total) as shown:
 
-            def advance() -> None:
+            def advance(note: str = "") -> None:
                 nonlocal done, told_s
                 done += 1
-                shown()
+                shown(note)
                 if done == total or time.monotonic() - told_s >= EVERY_S:
                     told_s = time.monotonic()
                     self._tell(name, done, total)

@@ -16,6 +16,7 @@ from psabench.procedures.head_bench import Reading, Watch
 from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult, made_params
 from psabench.procedures.wire_bench import WireBench
+from psabench.progress import Advance
 
 # Of an estimate's name, so that "CAL_" and the rest are a parameter's 16 characters.
 _ENDINGS = (("_v_per_g2", ""), ("_v_per_g", ""), ("_deg", "_DEG"), ("_v", "_V"))
@@ -63,10 +64,11 @@ class _Progress:
         self._percent, self._cancelled = percent, cancelled
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def step(self, name: str, total: int) -> Iterator[Advance]:
         done = 0
 
-        def advance() -> None:
+        def advance(note: str = "") -> None:
+            del note
             nonlocal done
             done += 1
             share = (self._begun + done / total) / max(self._steps, self._begun + 1)

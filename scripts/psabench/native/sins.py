@@ -220,8 +220,9 @@ class Calibration:
     """Result of `calibrate_unit`."""
 
     state: State
-    first: State  # of the first pass
     covariance: Floats
+    first: State  # of the first pass, and its own covariance
+    first_covariance: Floats
     rows: Mapping[str, slice]
 
 
@@ -240,11 +241,17 @@ def calibrate_unit(
     (docs/procedures/sins.md)."""
     s = Sins(cfg, c_nb, feedback=True)
     feed_data(s, dtheta_rad, dv_mps, stand)
-    first = s.state()
+    first, first_covariance = s.state(), s.covariance()[1]
     for _ in range(passes - 1):
         s.again()
         feed_data(s, dtheta_rad, dv_mps, stand)
-    return Calibration(state=s.state(), first=first, covariance=s.covariance()[1], rows=s.rows)
+    return Calibration(
+        state=s.state(),
+        covariance=s.covariance()[1],
+        first=first,
+        first_covariance=first_covariance,
+        rows=s.rows,
+    )
 
 
 def feed_data(
@@ -253,23 +260,27 @@ def feed_data(
     dv: Floats,
     stand: tuple[Floats, Floats] | None,
     each_second: Callable[[], None] | None = None,
+    *,
+    first: int = 0,
 ) -> None:
-    """All data through an estimator, the stand's angles before the increments that they are compared with."""
+    """All data through an estimator, the stand's angles before the increments that they are compared with.
+
+    first: increments that it has had."""
     in_parts = stand is not None or each_second is not None
     size = max(round(CHUNK_S / s.cfg.sample_s), 1) if in_parts else max(len(dtheta), 1)
-    for low, angles in _chunks_of(len(dtheta), size, s.cfg.sample_s, stand):
+    for low, angles in _chunks_of(first, len(dtheta), size, s.cfg.sample_s, stand):
         for t_s, c_st in angles:
             s.stand(t_s, c_st)
-        s.samples(low * s.cfg.sample_s, dtheta[low : low + size], dv[low : low + size])
+        s.samples((first + low) * s.cfg.sample_s, dtheta[low : low + size], dv[low : low + size])
         if each_second:
             each_second()
 
 
 def _chunks_of(
-    count: int, size: int, sample_s: float, stand: tuple[Floats, Floats] | None
+    first: int, count: int, size: int, sample_s: float, stand: tuple[Floats, Floats] | None
 ) -> Iterator[tuple[int, list[tuple[float, Floats]]]]:
     times, angles = stand if stand else (np.empty(0), np.empty((0, 3, 3)))
-    edges = np.searchsorted(times, np.arange(0, count + size, size) * sample_s)
+    edges = np.searchsorted(times, (first + np.arange(0, count + size, size)) * sample_s)
     for k, low in enumerate(range(0, count, size)):
         yield low, [(float(times[i]), angles[i]) for i in range(edges[k], edges[k + 1])]
 

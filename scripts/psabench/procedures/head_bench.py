@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.estimate.face import Face
+from psabench.progress import Advance
 
 
 class HeadBench(Protocol):
@@ -62,7 +63,7 @@ class Reading:
 class Progress(Protocol):
     """Where a procedure tells how far it is. The command line draws a bar, the tests count."""
 
-    def step(self, name: str, total: int) -> AbstractContextManager[Callable[[], None]]:
+    def step(self, name: str, total: int) -> AbstractContextManager[Advance]:
         """Enter a step of `total` equal parts; the value entered is called once per part done."""
         ...
 
@@ -71,8 +72,8 @@ class Silent:
     """A `Progress` that says nothing."""
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        yield lambda: None
+    def step(self, name: str, total: int) -> Iterator[Advance]:
+        yield lambda note="": None
 
 
 def _drop(_: Reading) -> None:

@@ -17,7 +17,7 @@ from psabench.budget.gum import COVERAGE
 from psabench.errors import BadInput, expected
 from psabench.procedures.result import LIMIT_CI
 from psabench.report.grading import Compared, aligned, as_ratio, estimate_dict, finite_or_none, with_ci
-from psabench.thermal.budget import estimate_at, unit_of
+from psabench.thermal.budget import unit_of
 from psabench.thermal.compensation import compensation_dict
 from psabench.thermal.records import TRUTH_COLUMNS, Recording, RunFolder, number_in, read_rows
 from psabench.thermal.reduce import SIDE_FACES, Points, points_of, quantity_names
@@ -119,10 +119,11 @@ def _graded_rows(result: ThermalResult, truth: ThermalTruth) -> list[GradedAt]:
     """At the coldest, the normal and the hottest temperature of the soak that a method's fits have reached."""
     rows = []
     for m in result.methods:
+        budget = m.budget(result.accuracy)
         for k in _graded_at(m, truth.element_c, result.normal_c):
             temp_c = float(truth.element_c[k])
             for q in quantity_names():
-                e = estimate_at(m.fitted(q), temp_c, result.accuracy)
+                e = budget.estimate_at(q, temp_c)
                 true = float(truth.points.quantity(q)[k])
                 rows.append(GradedAt(method=m.name, temp_c=temp_c, estimate=e, truth=true, error=e.value - true))
     return rows

@@ -14,7 +14,8 @@ from psabench.report import plots
 from psabench.report import thermal_grading as grading
 from psabench.report.page import bullets, figure, folded, section, table, verdict_line, whole_page, write_report
 from psabench.report.thermal_grading import ThermalReport
-from psabench.thermal.budget import element_of, estimate_at, symbol_of
+from psabench.thermal.budget import symbol_of
+from psabench.thermal.leftover import element_of
 from psabench.thermal.result import Method, predicted_sweep
 
 TITLE = "Accelerometers against temperature"
@@ -92,7 +93,8 @@ def _method_section(report: ThermalReport, m: Method, ident: str) -> str:
 def _budget_table(report: ThermalReport, m: Method) -> list[tuple[str, ...]]:
     """Standard uncertainties at the normal temperature, of the quantities of x."""
     rows: list[tuple[str, ...]] = [("", "component", "u", "unit")]
-    for e in (estimate_at(m.fitted(q), report.result.normal_c, report.result.accuracy) for q in m.fits if "_x" in q):
+    budget = m.budget(report.result.accuracy)
+    for e in (budget.estimate_at(q, report.result.normal_c) for q in m.fits if "_x" in q):
         rows += [(e.name, c.name, f"{c.u:.2g}", e.unit) for c in e.budget]
     return rows
 

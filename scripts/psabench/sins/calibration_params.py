@@ -14,6 +14,7 @@ from psabench.native.sins import DEG, SinsConfig, state_layout
 from psabench.native.strapdown import gravity_mps2
 from psabench.procedures.result import option
 from psabench.sins.covariance_run import GAUGES
+from psabench.sins.parameters import SCALES
 from psabench.sins.plan import RotationPlan
 from psabench.sins.table_run import STAND_S
 
@@ -36,6 +37,8 @@ class CalibrationParams:
     heading_sd_deg: float = option(3.0, "deg", "error of the heading at the start")
     gauge: str = option("article", "", f"elements of Γ that are estimated: {', '.join(GAUGES)}")
     lever: int = option(0, "", "lever arms of the accelerometers: 0 none, 3 along the own axis, 9 all")
+    quad_sd_ugpg2: float = option(0.0, "ug/g2", "quadratic terms of the accelerometers, prior sd; 0: not estimated")
+    delay_sd_ms: float = option(0.0, "ms", "accelerometers later than gyros, prior sd; 0: not estimated")
     gyro_noise_degph: float = option(0.1, "deg/h", "white noise of the gyros, a mean of 1 s")
     accel_noise_mps2: float = option(0.001, "m/s2", "white noise of the accelerometers, a mean of 1 s")
 
@@ -48,6 +51,10 @@ class CalibrationParams:
             raise ValueError(expected("0 to 3600 arcsec", self.wobble_arcsec, "wobble_arcsec"))
         if self.lever not in (0, 3, 9):
             raise ValueError(expected("0, 3 or 9", self.lever, "lever"))
+        if not 0.0 <= self.quad_sd_ugpg2 <= 1e4:
+            raise ValueError(expected("0 to 10000 ug/g2", self.quad_sd_ugpg2, "quad_sd_ugpg2"))
+        if not 0.0 <= self.delay_sd_ms <= 50.0:
+            raise ValueError(expected("0 to 50 ms", self.delay_sd_ms, "delay_sd_ms"))
 
     @property
     def g_mps2(self) -> float:
@@ -66,6 +73,8 @@ class CalibrationParams:
             step_s=sample_s * min(max(round(STEP_S / sample_s), 1), MOST_SAMPLES),
             gauge=GAUGES[self.gauge],
             lever=self.lever,
+            quad_sd_s2pm=self.quad_sd_ugpg2 / SCALES["quad"].per_si,
+            delay_sd_s=self.delay_sd_ms / SCALES["delay"].per_si,
             stand=stand,
             clone=True,
             beta_sd_rad=(DEG, DEG, self.heading_sd_deg * DEG),

@@ -18,10 +18,12 @@ from psabench.sins.calibration import SinsResult, estimate_unit
 from psabench.sins.calibration_grade import P_LIMIT, Graded, grade_result, truth_of
 from psabench.sins.calibration_params import NAME, CalibrationParams, SinsOptions, check_options, longest_cycle_s
 from psabench.sins.layout import read_layout
+from psabench.sins.live import LivePass
 from psabench.sins.plan import RotationPlan, read_plan
 from psabench.sins.readers import read_increments
 from psabench.sins.table import AXES, attitudes, moves_of
-from psabench.sins.table_run import TableData, TableRun, table_axes
+from psabench.sins.table_drive import parts_of, table_axes
+from psabench.sins.table_run import TableData, TableRun
 from psabench.sins.table_store import read_angles, write_data
 
 SCENARIO, COARSE = "sins_table", "sins_coarse"
@@ -52,7 +54,8 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
     if options.data:
         data, truth, facts = _recorded(options), None, {"data": str(options.data)}
     else:
-        data, truth = _measured(options, p, plan, progress)
+        live = LivePass(lambda dt_s: p.config(dt_s, p.stand, longest_cycle_s(plan)), azimuth_rad)
+        data, truth = _measured(options, p, plan, progress, live)
         write_data(options.out, data)
         facts = {"bench": str(options.can or options.control or options.scenario or _scenario(p)), "plan": plan.name}
     start = attitudes(azimuth_rad, np.zeros((1, AXES)))[0]
@@ -78,7 +81,7 @@ def _recorded(options: SinsOptions) -> TableData:
 
 
 def _measured(
-    options: SinsOptions, p: CalibrationParams, plan: RotationPlan, progress: Progress
+    options: SinsOptions, p: CalibrationParams, plan: RotationPlan, progress: Progress, live: LivePass
 ) -> tuple[TableData, Params | None]:
     """On a bench that is there, or on an emulator started for it; then with the truth."""
     with _opened(options, p) as bench:
@@ -86,8 +89,8 @@ def _measured(
         if not units:
             raise BadInput(expected(f"a scenario with an inertial unit, as {SCENARIO}", "none", "--scenario"))
         moves = list(moves_of(plan.turns, table_axes(bench)))
-        with progress.step(f"plan {plan.name}", len(moves)) as advance:
-            run = TableRun(bench, moves, advance)
+        with progress.step(f"plan {plan.name}", parts_of(moves)) as advance:
+            run = TableRun(bench, moves, advance, live)
             try:
                 data = run.measure(p.stand)
             except BaseException:  # Ctrl-C, too: what was measured is kept

@@ -14,7 +14,7 @@ from psabench.named_yaml import checked_number, read_named
 from psabench.native.nav import Floats
 from psabench.native.sins import DEG, Turn
 
-NAMED = ("article", "two_rates", "secondary", "secondary_reversing")  # of proto/rotation_plans
+NAMED = ("article", "two_rates", "secondary", "secondary_reversing", "six_positions")  # of proto/rotation_plans
 AXES: Mapping[str, tuple[float, float, float]] = {
     "z1": (1.0, 0.0, 0.0),
     "z2": (0.0, 1.0, 0.0),

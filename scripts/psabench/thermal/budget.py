@@ -8,54 +8,26 @@ is the same in every point (chain, circle, sensor of the case, play) is of type 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from psabench.boards.psa2.device import CODE_V
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.gum import expand_estimate
-from psabench.estimate.uncertainty import Component, Estimate, estimate, t_quantile, within_limit
+from psabench.estimate.uncertainty import Component, Estimate, estimate, within_limit
 from psabench.thermal.bench import BLOCKS
-from psabench.thermal.compensation import Array, Compensation, SweepCase, residual_squares
-from psabench.thermal.reduce import ARCSEC, AXES, Points, left_out_error, turning_axes
+from psabench.thermal.compensation import Compensation
+from psabench.thermal.excess import Excess, MeanSquare, excess_lines, excess_of
+from psabench.thermal.leftover import Leftover
+from psabench.thermal.reduce import ARCSEC, AXES, Points, face_of, turning_axes
 
 TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
 PLAY_K = 0.3  # limit of how far the way to a temperature moves what the element feels (E0)
-NEXT_ORDERS = 3  # beyond the degree: what a polynomial leaves of a smooth curve is in them
+NOTHING = Excess(square=0.0, variance=0.0)
 SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn again at each turn
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Leftover:
-    """Squares of what a curve leaves of its points: in the next orders, where the misfit to a smooth curve is, and
-    beyond them, where only noise is. Sums, with their degrees of freedom."""
-
-    smooth: float
-    smooth_dof: int
-    rough: float
-    rough_dof: int
-
-
-def element_of(p: Points, c: Compensation) -> Array:
-    """Temperature of the element by the lag of a fit, (n,); that of the case where it has none."""
-    if c.lag is None:
-        return p.case_c
-    sweep = SweepCase(t_s=p.t_s, case_c=p.case_c, history=p.history)
-    return sweep.element_c(np.array([c.lag.tau_s]))[:, 0]
-
-
-def leftover_of(p: Points, c: Compensation) -> Leftover:
-    """By a fit of more orders to the same points."""
-    all_squares = c.rms**2 * c.dof
-    orders = min(NEXT_ORDERS, c.dof)
-    rough_dof, rough = c.dof - orders, 0.0
-    if rough_dof:
-        used = p.up if c.lag is None and len(p.t_s) > c.dof + c.degree + 1 else np.ones(len(p.t_s), np.bool_)
-        case, element, y = (x[used] for x in (p.case_c, element_of(p, c), p.quantity(c.quantity)))
-        rough = min(residual_squares(case, element, y, c.degree + orders), all_squares)
-    return Leftover(smooth=all_squares - rough, smooth_dof=orders, rough=rough, rough_dof=rough_dof)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,17 +75,85 @@ def symbol_of(quantity: str) -> str:
     return {"zero": f"g_t,{axes}", "scale": f"U_k,{axes}", "base": f"δ_{axes}"}[kind]
 
 
-def estimate_at(f: Fitted, temp_c: float, accuracy: BenchAccuracy) -> Estimate:
-    """The quantity at a temperature of the element, with its budget."""
-    name, value = f.best.quantity, float(f.best.value_at(temp_c))
-    noise = _readings_noise(f)
-    dof = (BLOCKS - 1) * len(f.points.history[0])
-    made = estimate(name, symbol_of(name), unit_of(name), value, noise * _leverage(f.best, temp_c), dof)
-    parts = [*_point_parts(f, temp_c, accuracy), *_temperature_parts(f, temp_c), *_bench_parts(f, temp_c, accuracy)]
-    return expand_estimate(made, [part for part in parts if part.u > 0.0])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Budget:
+    """Of all quantities by one method, by name: what is more than noise is found over those that share its cause."""
+
+    fitted: Mapping[str, Fitted]
+    accuracy: BenchAccuracy
+
+    def estimate_at(self, quantity: str, temp_c: float) -> Estimate:
+        """The quantity at a temperature of the element, with its budget."""
+        f = self.fitted[quantity]
+        gain, dof = f.leftover.noise_gain(f.best, temp_c), (BLOCKS - 1) * len(f.points.history[0])
+        value, scatter = float(f.best.value_at(temp_c)), _readings_noise(f) * gain
+        made = estimate(quantity, symbol_of(quantity), unit_of(quantity), value, scatter, dof)
+        points, temps = self._point_parts(f, gain), _temperature_parts(f, temp_c)
+        parts = [*points, *temps, *_bench_parts(f, temp_c, self.accuracy)]
+        return expand_estimate(made, [part for part in parts if part.u > 0.0])
+
+    # ---- what differs from point to point
+
+    def _point_parts(self, f: Fitted, gain: float) -> Iterator[Component]:
+        yield Component(name="head", u=_head_noise(f, self.accuracy) * gain)
+        between, misfit = self._between[f.best.quantity], self._misfit[f.best.quantity]
+        yield from excess_lines({"between recordings": between.times(gain**2), "misfit": misfit})
+
+    @cached_property
+    def _between(self) -> dict[str, Excess]:
+        """Of one point: what is beyond the next orders. Tilts of the mounting are in what the head moves alone."""
+        return self._pooled(self._rough_square, by=lambda f: (f.kind, f.moves_with_head))
+
+    @cached_property
+    def _misfit(self) -> dict[str, Excess]:
+        """What the polynomial leaves, rms over the points."""
+        return self._pooled(self._smooth_square, by=lambda f: f.kind)
+
+    def _pooled(
+        self, square: Callable[[Fitted], MeanSquare | None], by: Callable[[Fitted], Hashable]
+    ) -> dict[str, Excess]:
+        """Over the groups of quantities that share the cause."""
+        groups: dict[Hashable, dict[str, MeanSquare]] = {}
+        for name, f in self.fitted.items():
+            if (made := square(f)) is not None:
+                groups.setdefault(by(f), {})[name] = made
+        found = dict.fromkeys(self.fitted, NOTHING)
+        for group in groups.values():
+            found |= excess_of(group)
+        return found
+
+    def _known(self, f: Fitted) -> float:
+        """Variance of what is drawn at each position, of two of them."""
+        return _readings_noise(f) ** 2 + _head_noise(f, self.accuracy) ** 2
+
+    def _rough_square(self, f: Fitted) -> MeanSquare | None:
+        rough = f.leftover.rough
+        if rough is None:
+            return None
+        return MeanSquare(
+            value=rough.total / rough.noise_part,
+            dof=rough.dof,
+            noise=self._known(f),
+            gain=1.0,
+            drawn=True,
+            source=_source_of(f),
+        )
+
+    def _smooth_square(self, f: Fitted) -> MeanSquare:
+        smooth = f.leftover.smooth
+        return MeanSquare(
+            value=smooth.total / smooth.noise_part,
+            dof=smooth.dof,
+            noise=self._known(f) + self._between[f.best.quantity].square,
+            gain=f.leftover.n / smooth.noise_part,
+            drawn=False,
+            source=_source_of(f),
+        )
 
 
-# ---- what differs from point to point
+def _source_of(f: Fitted) -> Hashable:
+    """Of what is drawn: a tilt is the same for all axes that the head turns on one face, noise is each quantity's."""
+    return face_of(f.axis_pair[1]) if f.moves_with_head else f.best.quantity
 
 
 def _readings_noise(f: Fitted) -> float:
@@ -125,45 +165,6 @@ def _readings_noise(f: Fitted) -> float:
 def _head_noise(f: Fitted, a: BenchAccuracy) -> float:
     """Of one point: each position's scale is read, both are of one mounting."""
     return math.hypot(SCALE_U_ARCSEC / 2.0**0.5, a.mount_arcsec) if f.moves_with_head else 0.0
-
-
-def _interpolation(f: Fitted, a: BenchAccuracy) -> float:
-    """Of one point: what leaving out recordings shows beyond their noise."""
-    i, j = f.axis_pair
-    left_out = f.points.left_out
-    square_v2 = float(left_out.half_sum_v2[i] if f.kind == "zero" else left_out.half_diff_v2[i, j])
-    noise = math.hypot(_readings_noise(f), _head_noise(f, a))
-    return float(left_out_error(square_v2 * f.per_volt**2, noise, f.points.left_out.noise_part))
-
-
-def _leverage(c: Compensation, temp_c: float) -> float:
-    """Standard deviation of the curve for noise of 1 in each point; 1 where the fit is exact."""
-    return float(c.half_width([temp_c])[0]) / t_quantile(c.dof) / c.rms if c.rms > 0.0 else 1.0
-
-
-def _point_parts(f: Fitted, temp_c: float, a: BenchAccuracy) -> Iterator[Component]:
-    head, interpolation = _head_noise(f, a), _interpolation(f, a)
-    leverage = _leverage(f.best, temp_c)
-    known = float(f.points.noise_part[f.axis_pair[1]]) * (_readings_noise(f) ** 2 + head**2) + interpolation**2
-    left = f.leftover
-    unknown = max(left.rough / left.rough_dof - known, 0.0) if left.rough_dof else 0.0
-    yield Component(name="head", u=head * leverage)
-    yield Component(name="interpolation", u=interpolation * leverage)
-    yield Component(name="between recordings", u=unknown**0.5 * leverage, dof=max(left.rough_dof, 1))
-    yield _misfit(left, known + unknown, f.best.dof + f.best.degree + 1)
-
-
-def _misfit(left: Leftover, known: float, n: int) -> Component:
-    """What the polynomial leaves, rms over n points, where the variance of their errors is known.
-
-    The squares in the next orders sum to smooth_dof * known + n m^2 on average; the variance of that sum gives m^2 its
-    degrees of freedom (GUM G.3, eq. E.7).
-    """
-    square = (left.smooth - left.smooth_dof * known) / n
-    if square <= 0.0:
-        return Component(name="misfit", u=0.0)
-    variance = (2.0 * left.smooth_dof * known**2 + 4.0 * n * known * square) / n**2
-    return Component(name="misfit", u=square**0.5, dof=2.0 * square**2 / variance if variance > 0.0 else math.inf)
 
 
 # ---- what all points share

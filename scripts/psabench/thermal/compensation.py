@@ -9,7 +9,7 @@ temperature as the polynomial's argument and case less element as one column mor
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -136,7 +136,7 @@ def fit_sweep(
     sweep = SweepCase(t_s=t_s, case_c=case_c, history=history or (t_s, case_c))
     tau = _best_tau_s(sweep, y, degree) if tau_s is None else tau_s
     element = sweep.element_c(np.array([tau]))[:, 0]
-    return _fit_readings(quantity, element, y, degree, tau, case_c - element)
+    return _fit_readings(quantity, element, y, degree, Lag(tau_s=tau, per_k=0.0), case_c - element, tau_s is None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,15 +209,21 @@ def _best_tau_s(sweep: SweepCase, y: Array, degree: int) -> float:
 
 
 def _fit_readings(
-    quantity: str, t_c: Array, y: Array, degree: int, tau_s: float | None = None, column: Array | None = None
+    quantity: str,
+    t_c: Array,
+    y: Array,
+    degree: int,
+    lag: Lag | None = None,
+    column: Array | None = None,
+    lag_found: bool = False,
 ) -> Compensation:
-    """Least squares by QR; the lag's time constant counts as a parameter that was found."""
+    """Least squares by QR. lag_found: its time constant counts as a parameter, for these readings gave it."""
     low_c, high_c = float(t_c.min()), float(t_c.max())
     rows = _design_matrix(scale_temperature(t_c, low_c, high_c), degree, column)
     q, r = np.linalg.qr(rows)
     found = np.linalg.solve(r, q.T @ y)
     residual = y - rows @ found
-    dof = max(len(y) - rows.shape[1] - (tau_s is not None), 1)
+    dof = max(len(y) - rows.shape[1] - lag_found, 1)
     variance = float(residual @ residual) / dof
     inverse = np.linalg.inv(r)
     return Compensation(
@@ -228,7 +234,7 @@ def _fit_readings(
         covariance=variance * inverse @ inverse.T,
         dof=dof,
         rms=float(np.sqrt(variance)),
-        lag=None if tau_s is None else Lag(tau_s=tau_s, per_k=float(found[-1])),
+        lag=replace(lag, per_k=float(found[-1])) if lag else None,
     )
 
 

@@ -4,12 +4,13 @@ Along gravity and against it, half the difference of an axis's readings is its s
 another axis along gravity, half the difference over the scale is the component of the misalignment towards that axis.
 During a sweep the positions are recorded one after the other, at different temperatures: each is interpolated to one
 instant a round, by cubics through the four nearest of its recordings. How far off that may be is measured, by leaving
-out recordings: `Points.left_out`.
+out recordings: `Points.left_out`. Where curves of the quantities are known already, only what the readings differ from
+them by is interpolated (`refined_points`): the turns of a sweep, which a cubic misses, are in the curves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,8 +32,25 @@ SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Quantities:
+    """Of the three axes, at n instants."""
+
+    zero_ug: Array  # (n, 3)
+    scale_v_per_g: Array  # (n, 3)
+    base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
+
+    def readings_v(self, position: Position) -> Array:
+        """Of the axes in a position, (n, 3)."""
+        along = np.eye(3)[position.axis] + self.base_arcsec[:, :, position.axis] / ARCSEC
+        return np.asarray(self.scale_v_per_g * (self.zero_ug * 1e-6 + position.sign * along))
+
+
+Curves = Callable[[Array], Quantities]  # at instants, s, (n,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LeftOut:
-    """Guesses of a sweep's readings by their neighbours, less the readings: mean squares, V^2; 0 for a soak.
+    """Guesses of a sweep's readings by their neighbours, less the readings: mean squares, V^2.
 
     The two positions of a pair are recorded one after the other, so their errors are nearly the same: they add up in
     half the sum and cancel in half the difference.
@@ -42,6 +60,7 @@ class LeftOut:
     half_diff_v2: Array  # (3, 3) of the axis, with the other one vertical
     most_v2: Array  # (3,) the largest of half_sum_v2
     noise_part: float  # of a reading's variance that is in a guess less the reading
+    dof: float  # of these mean squares; neighbours share readings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,8 +74,8 @@ class Points:
     scale_v_per_g: Array  # (n, 3)
     base_arcsec: Array  # (n, 3, 3): of the axis, towards the axis; 0 towards itself
     scatter_v: Array  # (3,) standard deviation of one recording, rms over the segment
-    left_out: LeftOut
-    noise_part: Array  # (3,) of a reading's variance that is in a point's, by the axis that is vertical
+    left_out: LeftOut | None  # None: of a soak
+    noise_covariance: Array  # (3, n, n) of the points for readings of variance 1, by the axis that is vertical
     history: tuple[Array, Array]  # t_s and case_c of all recordings, (m,) each
     samples: int  # of a recording
     turn_s: float  # when the chamber has reached the top of a sweep; the last instant of a soak
@@ -65,12 +84,16 @@ class Points:
     @property
     def interpolation_v(self) -> Array:
         """Of the half sum of an axis's two readings, rms, (3,)."""
-        return left_out_error(self.left_out.half_sum_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
+        return self._interpolation(self.left_out.half_sum_v2) if self.left_out else np.zeros(3)
 
     @property
     def interpolation_most_v(self) -> Array:
         """The same, the largest, (3,)."""
-        return left_out_error(self.left_out.most_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
+        return self._interpolation(self.left_out.most_v2) if self.left_out else np.zeros(3)
+
+    def _interpolation(self, squares_v2: Array) -> Array:
+        assert self.left_out
+        return left_out_error(squares_v2, self.scatter_v / 2.0**0.5, self.left_out.noise_part)
 
     @property
     def up(self) -> npt.NDArray[np.bool_]:
@@ -99,10 +122,20 @@ def gravity_at(position: Position, alpha_deg: float) -> Array:
     return np.array([along, 0.0, across] if position.face in SIDE_FACES else [along, across, 0.0])
 
 
+def face_of(vertical: int) -> Face:
+    """Of the mount, where this axis is vertical."""
+    (face,) = {p.face for p in POSITIONS.values() if p.axis == vertical}
+    return face
+
+
 def turning_axes(vertical: int) -> tuple[int, ...]:
     """Axes in the plane in which the head turns the unit where this one is vertical; the other is along the head's."""
-    (face,) = {p.face for p in POSITIONS.values() if p.axis == vertical}
-    return (0, 2) if face in SIDE_FACES else (0, 1)
+    return (0, 2) if face_of(vertical) in SIDE_FACES else (0, 1)
+
+
+def refined_points(p: Points, recordings: Sequence[Recording], curves: Curves) -> Points:
+    """The points of a sweep again, by curves that were fitted to them."""
+    return replace(_sweep_points([r for r in recordings if r.segment == p.segment], curves), samples=p.samples)
 
 
 def points_of(recordings: Sequence[Recording], samples: int = 1) -> dict[str, Points]:
@@ -192,8 +225,8 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        left_out=LeftOut(half_sum_v2=np.zeros(3), half_diff_v2=np.zeros((3, 3)), most_v2=np.zeros(3), noise_part=1.0),
-        noise_part=np.ones(3),
+        left_out=None,
+        noise_covariance=np.stack([np.eye(len(whole))] * 3),
         history=(t_s, case_c),
         samples=1,
         turn_s=float(t_s[-1]),
@@ -201,7 +234,7 @@ def _soak_points(rows: Sequence[Recording]) -> Points:
     )
 
 
-def _sweep_points(rows: Sequence[Recording]) -> Points:
+def _sweep_points(rows: Sequence[Recording], curves: Curves | None = None) -> Points:
     """A point a round, in its middle, where every position has been recorded before and after it."""
     level, (t_s, case_c) = _level_rows(rows), _history_of(rows)
     name = rows[0].segment
@@ -215,7 +248,11 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
     middle = np.array([(t_s[at[0]] + t_s[at[-1]]) / 2.0 for at in rounds.values()])
     first, last = max(t_s[at[0]] for at in visits.values()), min(t_s[at[-1]] for at in visits.values())
     middle = middle[(middle >= first) & (middle <= last)]
-    by = {p: interpolate_cubic(t_s[at], level[at], middle) for p, at in visits.items()}
+    by, rest = {}, {}
+    for p, at in visits.items():
+        rest[p] = level[at] - (curves(t_s[at]).readings_v(POSITIONS[p]) if curves else 0.0)
+        by[p] = interpolate_cubic(t_s[at], rest[p], middle)
+        by[p] += curves(middle).readings_v(POSITIONS[p]) if curves else 0.0
     zero, scale, base = _solve_positions(by)
     return Points(
         segment=name,
@@ -225,8 +262,8 @@ def _sweep_points(rows: Sequence[Recording]) -> Points:
         scale_v_per_g=scale,
         base_arcsec=base,
         scatter_v=_scatter_of(rows),
-        left_out=_left_out({p: (left_out_weights(t_s[at]), level[at]) for p, at in visits.items()}),
-        noise_part=_noise_part({p: cubic_weights(t_s[at], middle)[1] for p, at in visits.items()}),
+        left_out=_left_out({p: (left_out_weights(t_s[at]), rest[p]) for p, at in visits.items()}),
+        noise_covariance=_noise_covariance({p: cubic_matrix(t_s[at], middle) for p, at in visits.items()}),
         history=(t_s, case_c),
         samples=1,
         turn_s=_turn_of(rows),
@@ -238,10 +275,10 @@ def _turn_of(rows: Sequence[Recording]) -> float:
     return rows[int(np.argmax(shown >= shown.max() - TOP_K))].t_s
 
 
-def _noise_part(weights: Mapping[str, Array]) -> Array:
-    """By each position's weights of interpolation, (n, 4)."""
-    squares = {p: float((w**2).sum(axis=1).mean()) for p, w in weights.items()}
-    return np.array([(squares[f"{axis}_down"] + squares[f"{axis}_up"]) / 2.0 for axis in AXES])
+def _noise_covariance(weights: Mapping[str, Array]) -> Array:
+    """By each position's weights of interpolation, (n, m)."""
+    each = {p: w @ w.T for p, w in weights.items()}
+    return np.array([(each[f"{axis}_down"] + each[f"{axis}_up"]) / 2.0 for axis in AXES])
 
 
 def _left_out(visits: Mapping[str, tuple[Array, Array]]) -> LeftOut:
@@ -255,7 +292,13 @@ def _left_out(visits: Mapping[str, tuple[Array, Array]]) -> LeftOut:
         half_sum[j], most[j] = squares.mean(), squares.max()
         half_diff[:, j] = (((down - up) / 2.0) ** 2).mean(axis=0)
     noise_part = float(np.mean([(weights**2).sum(axis=1).mean() for weights, _ in visits.values()]))
-    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most, noise_part=noise_part)
+    dof = float(np.mean([_dof_of(weights @ weights.T) for weights, _ in visits.values()]))
+    return LeftOut(half_sum_v2=half_sum, half_diff_v2=half_diff, most_v2=most, noise_part=noise_part, dof=dof)
+
+
+def _dof_of(covariance: Array) -> float:
+    """Of a sum of squares of numbers with that covariance, (n, n) (Satterthwaite)."""
+    return float(np.trace(covariance) ** 2 / (covariance**2).sum())
 
 
 def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array]:
@@ -269,6 +312,14 @@ def cubic_weights(t_s: Array, at_s: Array) -> tuple[npt.NDArray[np.int64], Array
             if m != j:
                 weights[:, j] *= (at_s - t[:, m]) / (t[:, j] - t[:, m])
     return near, weights
+
+
+def cubic_matrix(t_s: Array, at_s: Array) -> Array:
+    """The same weights, of all of the instants, (n, m)."""
+    near, weights = cubic_weights(t_s, at_s)
+    found = np.zeros((len(at_s), len(t_s)))
+    np.put_along_axis(found, near, weights, axis=1)
+    return found
 
 
 def interpolate_cubic(t_s: Array, u: Array, at_s: Array) -> Array:
@@ -297,4 +348,4 @@ def left_out_error(squares: npt.ArrayLike, noise: npt.ArrayLike, noise_part: flo
 def up_leg(p: Points) -> Points:
     """The part of a sweep on the way up."""
     cut = {n: getattr(p, n)[p.up] for n in ("t_s", "case_c", "zero_ug", "scale_v_per_g", "base_arcsec")}
-    return replace(p, **cut)
+    return replace(p, noise_covariance=p.noise_covariance[:, p.up][:, :, p.up], **cut)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.errors import BadInput
 from psabench.estimate.uncertainty import Estimate
-from psabench.thermal.budget import Fitted, Leftover, element_of, estimate_at, leftover_of
+from psabench.thermal.budget import Budget, Fitted
 from psabench.thermal.compensation import (
     Compensation,
     element_temperature,
@@ -20,8 +20,9 @@ from psabench.thermal.compensation import (
     turns_of,
 )
 from psabench.thermal.degree import DegreeRow, degree_rows
+from psabench.thermal.leftover import Leftover, curves_of, element_of, leftover_of
 from psabench.thermal.records import Recording
-from psabench.thermal.reduce import Points, points_of, quantity_names, up_leg
+from psabench.thermal.reduce import Points, points_of, quantity_names, refined_points, up_leg
 from psabench.thermal.schedule import Schedule, sweep_names
 
 Array = npt.NDArray[np.float64]
@@ -61,10 +62,13 @@ class Method:
     settling_k: float = 0.0  # that the element may miss the case by, at the end of a dwell
     play: bool = True  # whether the way to a temperature was not that of the soak
 
-    def fitted(self, quantity: str) -> Fitted:
-        """What the budget of a quantity is made from."""
-        f = self.fits[quantity]
-        return Fitted(points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play)
+    def budget(self, accuracy: BenchAccuracy) -> Budget:
+        """Of its quantities, on a bench of this accuracy."""
+        fitted = {
+            q: Fitted(points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play)
+            for q, f in self.fits.items()
+        }
+        return Budget(fitted=fitted, accuracy=accuracy)
 
     @property
     def title(self) -> str:
@@ -98,14 +102,17 @@ def estimate_run(
 ) -> ThermalResult:
     """Pure. Raises BadInput where a method has too few recordings for its fits."""
     rates, samples = sweep_names(schedule), round(schedule.record_s * schedule.samples_hz)
-    methods = tuple(_method_of(p, rates.get(name), schedule) for name, p in points_of(recordings, samples).items())
+    methods = tuple(
+        _method_of(p, rates.get(name), schedule, recordings) for name, p in points_of(recordings, samples).items()
+    )
     settling_k = _settling_k(methods, recordings, schedule)
     play = schedule.soak is not None and _goes_both_ways(schedule.soak.temperatures_c)
     methods = tuple(replace(m, settling_k=settling_k, play=play) if m.rate_k_per_min is None else m for m in methods)
     low = max(float(m.points.case_c.min()) for m in methods)
     high = min(float(m.points.case_c.max()) for m in methods)
     normal_c = min(max(NORMAL_C, low), high)
-    estimates = {m.name: tuple(estimate_at(m.fitted(q), normal_c, accuracy) for q in quantity_names()) for m in methods}
+    budgets = {m.name: m.budget(accuracy) for m in methods}
+    estimates = {n: tuple(b.estimate_at(q, normal_c) for q in quantity_names()) for n, b in budgets.items()}
     return ThermalResult(
         schedule=schedule,
         g_mps2=g_mps2,
@@ -118,15 +125,30 @@ def estimate_run(
     )
 
 
-def _method_of(p: Points, rate: float | None, schedule: Schedule) -> Method:
-    fits: dict[str, Fits] = {}
+def _method_of(p: Points, rate: float | None, schedule: Schedule, recordings: Sequence[Recording]) -> Method:
+    """The points of a sweep are made twice: by the curves of the first time."""
+    sweep = rate is not None
+    best = _best_of(p, sweep, schedule.degree)
+    if sweep:
+        p = refined_points(p, recordings, curves_of(p, best))
+        best = _best_of(p, sweep, schedule.degree)
+    return Method(
+        name=p.segment, rate_k_per_min=rate, points=p, fits={q: _fits_of(p, c, sweep) for q, c in best.items()}
+    )
+
+
+def _best_of(p: Points, sweep: bool, degree: int) -> dict[str, Compensation]:
+    """With the lag where both legs are there; else of the way up, against the case."""
+    if not (sweep and turns_of(p.case_c)):
+        p = up_leg(p) if sweep else p
+        return {q: fit_soak(q, p.case_c, p.quantity(q), degree) for q in quantity_names()}
+    taus: dict[str, float | None] = {}
+    found = {}
     for q in quantity_names():
-        tau_s = None
-        if not q.startswith("zero"):  # the element is the same, and its zero shows the lag best
-            lag = fits[f"zero_{q.split('_')[1][0]}_ug"].best.lag
-            tau_s = lag.tau_s if lag else None
-        fits[q] = _fits_of(q, p, rate is not None, schedule.degree, tau_s)
-    return Method(name=p.segment, rate_k_per_min=rate, points=p, fits=fits)
+        axis = q.split("_")[1][0]
+        found[q] = c = fit_sweep(q, p.t_s, p.case_c, p.quantity(q), degree, history=p.history, tau_s=taus.get(axis))
+        taus.setdefault(axis, c.lag.tau_s if c.lag else None)  # one element, and its zero shows the lag best
+    return found
 
 
 def _settling_k(methods: Sequence[Method], recordings: Sequence[Recording], schedule: Schedule) -> float:
@@ -150,20 +172,16 @@ def _goes_both_ways(temps_c: Sequence[float]) -> bool:
     return bool(len(ways)) and bool(np.any(ways != ways[0]))
 
 
-def _fits_of(quantity: str, p: Points, sweep: bool, degree: int, tau_s: float | None) -> Fits:
-    y = p.quantity(quantity)
-    largest = float(np.abs(y).max() if quantity.startswith("zero") else np.ptp(y))
-    if not sweep:
-        best, one_leg, both_legs = fit_soak(quantity, p.case_c, y, degree), None, None
-    else:
+def _fits_of(p: Points, best: Compensation, sweep: bool) -> Fits:
+    q, y = best.quantity, p.quantity(best.quantity)
+    largest = float(np.abs(y).max() if q.startswith("zero") else np.ptp(y))
+    one_leg = both_legs = None
+    if sweep:
         up = up_leg(p)
-        best = one_leg = fit_soak(quantity, up.case_c, up.quantity(quantity), degree)
-        both_legs = None
-    if sweep and turns_of(p.case_c):
-        best = fit_sweep(quantity, p.t_s, p.case_c, y, degree, history=p.history, tau_s=tau_s)
-        both_legs = fit_soak(quantity, p.case_c, y, degree)
+        one_leg = fit_soak(q, up.case_c, up.quantity(q), best.degree)
+        both_legs = fit_soak(q, p.case_c, y, best.degree) if best.lag else None
     leftover = leftover_of(p, best)
-    return Fits(quantity=quantity, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest)
+    return Fits(quantity=q, best=best, leftover=leftover, one_leg=one_leg, both_legs=both_legs, largest=largest)
 
 
 # ---- the two methods beside each other

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench.bench import Bench
-from psabench.boards.bins.device import Bins, UnitIncrements, increments_of
-from psabench.errors import InstrumentError
+from psabench.boards.bins.device import Bins, NavState, UnitIncrements, increments_of
+from psabench.errors import DeviceError, InstrumentError
 from psabench.link.vcd import read_vcd
+from psabench.native.strapdown import State, Strapdown
+from psabench.sins.secondary.outputs import matrices_of
 
 pytestmark = pytest.mark.host
 
@@ -180,3 +182,62 @@ def test_tick_is_where_the_interval_ends(tmp_path: Path) -> None:
     rises_us = np.round(tick.edges_ns(1) / 1e3)
     assert set(np.round(got.end_s * 1e6)[1:-1]) <= set(rises_us)
     assert np.unique(tick.edges_ns(0)[-20:] - tick.edges_ns(1)[-20:]).tolist() == [100_000]
+
+
+def test_it_navigates_as_the_host_s_integrator_does(tmp_path: Path) -> None:
+    """A minute at rest, two minutes of turns; accelerometers have zeros; the host aligns by the same increments."""
+    path = tmp_path / "s.yaml"
+    path.write_text(IDEAL.replace(NO_ERRORS, f"{NO_ERRORS}, accel_bias_mps2: [0.003, -0.002, 0.001]"))
+    with Bench.start(path) as bench:
+        unit = bench.board(Bins)
+        unit.wait_ready()
+        unit.frames.forget()
+        unit.start()
+        bench.run_for(0.1)
+        outputs = unit.navigate(55.7, 37.5, 150.0, 60, increments=True)
+        bench.run_for(62.0)
+        assert unit.navigation() is NavState.NAVIGATING
+        bench.table.rate(5.0)
+        bench.run_for(120.0)
+        unit.stop()
+        got, shown = increments_of(unit.frames.take(), unit.weights()), outputs.take()
+    first = int(np.argmin(np.abs(got.end_s - shown.t_sample_s[0]))) + 1  # readings of the alignment
+    rest = slice(first - 6000, first)
+    up = got.dv_mps[rest].sum(axis=0)
+    up /= np.linalg.norm(up)
+    east = np.cross(got.dtheta_rad[rest].sum(axis=0), up)
+    east /= np.linalg.norm(east)
+    start = State(
+        lat_rad=np.radians(55.7),
+        lon_rad=np.radians(37.5),
+        h_m=150.0,
+        v_n_mps=np.zeros(3),
+        C_nb=np.stack([east, np.cross(up, east), up]),
+    )
+    host = Strapdown(start, height_fixed=True)
+    rows = host.advance(got.dtheta_rad[first:], got.dv_mps[first:], 0.01)[19::20][: len(shown) - 1]
+    n = len(rows)
+    place_m = (np.radians(np.column_stack([shown["LAT"], shown["LON"]]))[1 : n + 1] - rows[:, :2]) * 6.4e6
+    speed_mps = np.column_stack([shown["VE"], shown["VN"]])[1 : n + 1] - rows[:, 3:5]
+    assert n >= 590
+    assert np.abs(rows[-1, 3:5]).max() > 0.1  # the zeros carry it away
+    assert np.abs(place_m).max() < 0.02  # rounded to 1 cm
+    assert np.abs(speed_mps).max() < 3e-4
+    q = np.stack([shown[f"Q{k}"] for k in range(4)], axis=1)[1 : n + 1]
+    turned = np.abs(matrices_of(q / np.linalg.norm(q, axis=1)[:, None]) - rows[:, 6:].reshape(-1, 3, 3)).max()
+    assert turned < 1e-4  # a quaternion's steps are 3e-5
+    assert shown["WX"][-1] == pytest.approx(5.0, abs=0.005)
+
+
+def test_navigation_is_refused_before_a_reading_and_fails_on_a_table_that_turns(tmp_path: Path) -> None:
+    with Bench.start(ideal(tmp_path)) as bench:
+        unit = bench.board(Bins)
+        with pytest.raises(DeviceError, match="08000022"):
+            unit.navigate(55.7, 37.5, 150.0, 10)
+        assert "no reading has come yet" in unit.refusal()
+        unit.wait_ready()
+        bench.table.rate(1.0)
+        bench.run_for(1.0)
+        unit.navigate(55.7, 37.5, 150.0, 10)
+        bench.run_for(1.0)
+        assert unit.navigation() is NavState.FAILED

@@ -167,6 +167,35 @@ def test_an_autopilot_in_the_loop_hears_the_place_and_the_turning_earth(tmp_path
     assert (fix.fix_type, fix.vel, fix.cog) == (3, 0, 65535)
 
 
+AIRCRAFT = """
+flight:
+  heading_deg: 130
+  jerk_mps3: 40
+  legs: [{takeoff_mps: 85, accel_mps2: 20}, {climb_m: 500, rate_mps: 3}, {land_mps: 70}, {stop_s: 1}]
+"""
+
+
+def test_an_autopilot_in_the_loop_flies_with_the_aircraft(tmp_path: Path) -> None:
+    """Climbing at 3 m/s to the south-east: the place moves with the velocity."""
+    scenario = tmp_path / "flight.yaml"
+    scenario.write_text(HIL_SCENARIO.replace("node: 5,", "node: 5, on: flight,") + AIRCRAFT, encoding="utf-8")
+    with emulator("tcp:0,hil=20", pace="step", scenario=str(scenario)) as emu, Control(emu.control_path) as control:  # type: ignore[arg-type]
+        gcs = mavutil_connection(emu)
+        until(lambda: gcs.port is not None, "the connection")
+        control.call("run", for_s=0)
+        control.call("run", for_s=16.0)
+        fixes = [receive(gcs, "HIL_GPS") for _ in range(75)][-2:]
+        gcs.close()
+    before, fix = fixes
+    assert (fix.vd, fix.vel, fix.cog) == (-300, 8500, 13000)
+    assert (fix.vn, fix.ve) == (round(8500 * math.cos(math.radians(130))), round(8500 * math.sin(math.radians(130))))
+    assert fix.alt - before.alt == pytest.approx(3 * 200, abs=2)  # mm in 200 ms
+    assert math.radians((fix.lat - before.lat) * 1e-7) * 6.366e6 == pytest.approx(fix.vn * 0.002, abs=0.1)
+    assert math.radians((fix.lon - before.lon) * 1e-7) * 6.392e6 * math.cos(math.radians(55)) == pytest.approx(
+        fix.ve * 0.002, abs=0.1
+    )
+
+
 def test_a_pseudo_terminal_and_udp_clients_at_once(tmp_path: Path) -> None:
     link = tmp_path / "mav"
     with emulator(f"pty:{link},sysid=7", "udpin:0,sysid=9") as emu, ExitStack() as stack:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from psabench import cli
+from psabench.progress import Advance
 from psabench.sins import calibration_run as sins_run
 from psabench.sins.calibration_params import SinsOptions
 
@@ -50,8 +53,9 @@ def found(out: Path) -> dict[str, object]:
 def test_a_short_plan_finds_the_unit_and_its_recording_gives_the_same_digits(tmp_path: Path, capsys: Lines) -> None:
     """With the table's angles; then without, from the files of the same run; then the passport of the unit."""
     assert run(tmp_path / "a", "--plan", plan(tmp_path), "--seed", "4") == 0
-    said = capsys.readouterr().out
-    assert "25 parameters; 21 beside the truth: chi-square " in said
+    said = capsys.readouterr()
+    assert "25 parameters; 21 beside the truth: chi-square " in said.out
+    assert re.search(r"plan short: 8/8 in [\d.]+ s; 235 s, sd ν 0.0\d+ °/h, Θ ", said.err)  # live, of the first pass
     first = found(tmp_path / "a")
     names = {e["name"]: e for e in first["estimates"]}  # type: ignore[attr-defined]
     assert names["tau"]["value"] == pytest.approx(-50.0, abs=4 * names["tau"]["sd"])  # of the scenario's readout
@@ -73,6 +77,15 @@ def test_a_short_plan_finds_the_unit_and_its_recording_gives_the_same_digits(tmp
     assert "tau" not in alone
     assert alone["nu_1"]["sd"] > names["nu_1"]["sd"]
     assert "no truth to compare with" in capsys.readouterr().out
+    more = ("--angles", tmp_path / "a/table_angles.csv", "--quad-sd-ugpg2", "100", "--delay-sd-ms", "5")
+    assert run(tmp_path / "d", *data, *more) == 0
+    added = {e["name"]: e for e in found(tmp_path / "d")["estimates"] if e["name"] not in names}  # type: ignore[attr-defined]
+    assert list(added) == ["quad_1", "quad_2", "quad_3", "delay"]
+    assert all(abs(e["value"]) < 4 * e["sd"] < 100.0 for e in added.values())  # the emulated unit has neither
+    correction: Any = found(tmp_path / "d")["correction"]
+    assert correction["delay_s"] == pytest.approx(1e-3 * added["delay"]["value"])
+    assert all(correction["quadratic_s2pm"])
+    capsys.readouterr()
     store = ("--store", str(tmp_path / "p.sqlite"))
     assert cli.main(["passport", "add", str(tmp_path / "a"), "--serial", "S4", "--type", "sins", *store]) == 0
     assert capsys.readouterr().out == "S4: run 1, sins-calibration short, 25 quantities\n"
@@ -107,6 +120,8 @@ def test_a_correction_levels_the_unit(tmp_path: Path) -> None:
         (("--data", "no.csv"), "no.csv: no such file"),
         (("--latitude-deg", "89"), "latitude_deg: expected -85 to 85 deg"),
         (("--wobble-arcsec", "-1"), "wobble_arcsec: expected 0 to 3600 arcsec"),
+        (("--quad-sd-ugpg2", "-1"), "quad_sd_ugpg2: expected 0 to 10000 ug/g2"),
+        (("--delay-sd-ms", "51"), "delay_sd_ms: expected 0 to 50 ms"),
         (("--accel-noise-mps2", "0"), "sins-calibration: "),
         (("--angles", "a.csv"), "--angles: expected --data, got none"),
     ],
@@ -148,11 +163,12 @@ class Interrupted:
     """A progress whose second step is Ctrl-C."""
 
     @contextmanager
-    def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+    def step(self, name: str, total: int) -> Iterator[Advance]:
         del name, total
         steps = itertools.count()
 
-        def advance() -> None:
+        def advance(note: str = "") -> None:
+            del note
             if next(steps) == 1:
                 raise KeyboardInterrupt
 

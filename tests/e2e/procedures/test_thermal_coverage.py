@@ -18,8 +18,8 @@ def test_u_of_fresh_units_contains_the_truth_as_often_as_it_says() -> None:
     n, share, (low, high) = share_of(runs)
     print(f"{n} values, {share:.4f} within U, {low:.4f} to {high:.4f} by unit")
     assert n >= 800
-    assert 0.94 <= share <= 0.98
+    assert 0.94 <= share <= 0.975
     assert high >= 0.9545
     for kind in ("soak base", "sweep-1 base"):
         _, base, _ = share_of(runs, kind)
-        assert 0.92 < base < 0.99, kind
+        assert 0.92 < base < 0.985, kind

@@ -181,7 +181,7 @@ def test_a_plan_is_read_from_a_file(tmp_path: Path) -> None:
     assert (plan.name, plan.duration_s, plan.axis_from_east_deg) == ("mine", 12.5, 60.0)
     assert plan.turns[0].axis_b == (0.0, 1.0, 0.0)
     assert plan.start_c_nb @ plan.start_c_nb.T == pytest.approx(np.eye(3))
-    known = "article, two_rates, secondary, secondary_reversing"
+    known = "article, two_rates, secondary, secondary_reversing, six_positions"
     with pytest.raises(BadInput, match=rf"^--plan: expected {known}, or a file, got no file nowhere$"):
         read_plan("nowhere")
     file.write_text("[")

@@ -20,6 +20,7 @@ from psabench.procedures.registry import PROCEDURES
 from psabench.procedures.result import ProcedureResult
 from psabench.procedures.reversal import ReversalParams, estimate_reversal, expected_reversal, reversal
 from psabench.procedures.turns import TurnsParams, estimate_turns, expected_turns, turns
+from psabench.progress import Advance
 
 ARTICLE = Sensor(
     u0_v=2.50,
@@ -321,10 +322,11 @@ def test_progress_counts_every_position_of_every_face() -> None:
 
     class Counter:
         @contextmanager
-        def step(self, name: str, total: int) -> Iterator[Callable[[], None]]:
+        def step(self, name: str, total: int) -> Iterator[Advance]:
             told[name] = [0, total]
 
-            def done() -> None:
+            def done(note: str = "") -> None:
+                del note
                 told[name][0] += 1
 
             yield done

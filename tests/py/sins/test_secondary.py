@@ -19,13 +19,15 @@ from psabench.native import nav_errors
 from psabench.native.kalman import Kalman
 from psabench.native.nav_errors import ErrorsConfig
 from psabench.native.sins import Turn
+from psabench.progress import Bar
 from psabench.quartz.draws import draw_source
-from psabench.sins import secondary, secondary_page
 from psabench.sins.alignment import aligned_state
-from psabench.sins.outputs import Outputs, read_outputs, write_outputs
 from psabench.sins.plan import read_plan
-from psabench.sins.secondary import Secondary, calibrate_outputs, compensate_outputs, errors_of
-from psabench.sins.secondary_run import SecondaryParams, run_secondary
+from psabench.sins.secondary import estimate as secondary
+from psabench.sins.secondary import page as secondary_page
+from psabench.sins.secondary.estimate import Secondary, calibrate_outputs, compensate_outputs, errors_of
+from psabench.sins.secondary.outputs import Outputs, read_outputs, write_outputs
+from psabench.sins.secondary.run import SecondaryOptions, SecondaryParams, run_secondary
 
 Floats = np.ndarray
 # Eight minutes, for what needs no accuracy.
@@ -237,7 +239,9 @@ def test_the_procedure_takes_recordings_and_reports(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same run calibrates and is compensated: it becomes better by as much as the short run tells."""
-    result = run_secondary(SecondaryParams(height_m=150.0, least_factor=2.0), recording, recording)
+    result = run_secondary(
+        SecondaryParams(height_m=150.0, least_factor=2.0), SecondaryOptions(first=recording, second=recording), Bar()
+    )
     outputs = short(article(), monkeypatch)
     direct = compensate_outputs(calibrate_outputs(outputs, article().point), outputs)
     assert result.compensated is not None
@@ -251,7 +255,7 @@ def test_the_procedure_takes_recordings_and_reports(
     assert alone.within is None
     assert "no second run" in secondary_page.verdict_words(alone)
     with pytest.raises(BadInput, match="--first"):
-        run_secondary(SecondaryParams(), None, None)
+        run_secondary(SecondaryParams(), SecondaryOptions(), Bar())
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,15 @@ def test_turns_of_a_sweep() -> None:
     assert turns_of(np.concatenate([leg, leg[::-1], leg])) == 2
 
 
+def test_a_lag_that_is_given_is_no_parameter() -> None:
+    s = draw_sweeps(1)[0]
+    found = fit_sweep("u0_v", s.t_s, s.case_c, s.y_ug)
+    assert found.lag is not None
+    given = fit_sweep("u0_v", s.t_s, s.case_c, s.y_ug, tau_s=found.lag.tau_s)
+    assert given.coefficients == found.coefficients
+    assert (given.dof, found.dof) == (len(s.y_ug) - 8, len(s.y_ug) - 9)
+
+
 def test_json_gives_the_same_compensation() -> None:
     s = draw_sweeps(1)[0]
     found = fit_sweep("u0_v", s.t_s, s.case_c, s.y_ug)

@@ -153,6 +153,7 @@ static void hil_messages_need_the_users_word(void **state)
     assert_int_equal(gps.lat, 504500000);
     assert_int_equal(gps.vel, 500);
     assert_int_equal(gps.vn, -300);
+    assert_int_equal(gps.vd, 150);
     assert_int_equal(gps.cog, 12686);
 }
 

@@ -94,6 +94,51 @@ static void a_row_is_its_looks_whoever_asked_before(void **state)
     }
 }
 
+/* An aircraft that taxies through a turn. */
+static struct lab flying(double azimuth_rad)
+{
+    struct lab l;
+    struct lab_cfg c = lab_default();
+    c.site = site_at(55.7 * RAD_PER_DEG, 150.0, azimuth_rad);
+    c.flight.present = true;
+    c.flight.plan.heading_deg = azimuth_rad / RAD_PER_DEG;
+    c.flight.plan.leg[c.flight.plan.legs++] = flight_leg_of(FLIGHT_PARK, 10.0);
+    c.flight.plan.leg[c.flight.plan.legs++] = flight_leg_of(FLIGHT_TAXI, 60.0);
+    c.flight.plan.leg[c.flight.plan.legs++] = flight_leg_of(FLIGHT_TURN, 90.0);
+    c.flight.plan.leg[c.flight.plan.legs++] = flight_leg_of(FLIGHT_STOP, 10.0);
+    lab_init(&l, &c, 1);
+    return l;
+}
+
+/* Parked it is the bench; in a turn a lever arm adds the motion of a rigid body, and rows are their looks. */
+static void in_the_aircraft_it_is_the_flight_s_motion(void **state)
+{
+    (void)state;
+    struct lab l = flying(70.0 * RAD_PER_DEG);
+    struct kinematics kin, far, bench;
+    struct flight_state s;
+    const struct lab_mounting centre = {.on = LAB_FLIGHT}, fixed = {.on = LAB_FIXED};
+    const struct lab_mounting arm = {
+        .on = LAB_FLIGHT, .lever_m = {3.0, 0.5, -0.2}, .misalignment_rad = {0.0, 0.0, 0.1}};
+    lab_kinematics(&l, &centre, origin, NS_PER_S, &kin);
+    lab_kinematics(&l, &fixed, origin, NS_PER_S, &bench);
+    near3(kin.f_mps2, bench.f_mps2, 1e-14);
+    near3(kin.w_radps, bench.w_radps, 1e-18);
+    const int64_t t_ns = l.flight.plan.leg_ns[2] + NS_PER_S / 2; /* the rate rises */
+    flight_at(&l.flight, t_ns, &s);
+    lab_kinematics(&l, &centre, origin, t_ns, &kin);
+    near3(kin.f_mps2, s.f_b_mps2, 0.0);
+    lab_kinematics(&l, &arm, origin, t_ns, &far);
+    const double w = s.pose.w_ib_b_radps[2], dw = s.pose.dw_ib_b_radps2[2];
+    assert_true(w > 0.03 && dw > 0.1);
+    const double x = s.f_b_mps2[0] - w * w * 3.0 - dw * 0.5, y = s.f_b_mps2[1] - w * w * 0.5 + dw * 3.0;
+    near(far.f_mps2[0], cos(0.1) * x + sin(0.1) * y, 1e-4); /* the Earth's rate */
+    near(far.f_mps2[1], cos(0.1) * y - sin(0.1) * x, 1e-4);
+    for (unsigned i = 0; i < 2; i++) row_is_its_looks(&l, i ? &arm : &centre, t_ns, 32);
+    assert_true(lab_smooth_ns(&l, &centre, 0) == 10 * NS_PER_S);
+    assert_string_equal(lab_mount_name(LAB_FLIGHT), "flight");
+}
+
 /* In motion the head's gravity is that of its angle, by libm. */
 static void a_turning_head_is_exact(void **state)
 {
@@ -190,12 +235,12 @@ static void a_spinning_table_presses_outwards(void **state)
 
 static void mounts_have_names(void **state)
 {
-    static const char *const names[] = {"head", "table", "fixed", "platform"};
+    static const char *const names[] = {"head", "table", "fixed", "platform", "flight"};
     (void)state;
-    for (unsigned on = LAB_HEAD; on <= LAB_PLATFORM; on++) {
+    for (unsigned on = LAB_HEAD; on <= LAB_FLIGHT; on++) {
         assert_string_equal(lab_mount_name((enum lab_mount)on), names[on]);
     }
-    assert_null(lab_mount_name((enum lab_mount)4));
+    assert_null(lab_mount_name((enum lab_mount)5));
 }
 
 /* What is random from an instant on: angle of a later setting of the head, reading of the table, drift of the platform. */
@@ -251,6 +296,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(on_the_head_without_lever_arm_it_is_the_heads_own_arithmetic),
         cmocka_unit_test(a_row_is_its_looks_whoever_asked_before),
+        cmocka_unit_test(in_the_aircraft_it_is_the_flight_s_motion),
         cmocka_unit_test(a_turning_head_is_exact),
         cmocka_unit_test(a_vanishing_lever_arm_changes_nothing),
         cmocka_unit_test(misalignment_turns_what_the_case_feels),

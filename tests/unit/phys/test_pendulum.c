@@ -55,27 +55,27 @@ static void a_hinge_costs_its_part_of_the_stiffness(void **state)
 }
 
 /* J phi'' + C phi' + K phi = m L a, from rest, by Runge and Kutta's fourth order. The current is K_DU K_U phi. */
-struct swing {
+struct pendulum_rest {
     double angle_rad, rate_radps;
 };
 
-static struct swing slope(const struct pendulum *p, struct swing s, double a_mps2)
+static struct pendulum_rest slope(const struct pendulum *p, struct pendulum_rest s, double a_mps2)
 {
     const double k = p->pickoff_v_per_rad * p->amplifier_a_per_v * p->torquer_n_m_per_a + p->hinge_n_m_per_rad;
     const double moment = p->mass_kg * p->arm_m * a_mps2 - p->damping_n_m_s * s.rate_radps - k * s.angle_rad;
-    return (struct swing){s.rate_radps, moment / p->inertia_kg_m2};
+    return (struct pendulum_rest){s.rate_radps, moment / p->inertia_kg_m2};
 }
 
-static struct swing along(struct swing s, struct swing d, double dt_s)
+static struct pendulum_rest along(struct pendulum_rest s, struct pendulum_rest d, double dt_s)
 {
-    return (struct swing){s.angle_rad + d.angle_rad * dt_s, s.rate_radps + d.rate_radps * dt_s};
+    return (struct pendulum_rest){s.angle_rad + d.angle_rad * dt_s, s.rate_radps + d.rate_radps * dt_s};
 }
 
-static struct swing integrated(const struct pendulum *p, struct swing s, double a_mps2, double dt_s)
+static struct pendulum_rest integrated(const struct pendulum *p, struct pendulum_rest s, double a_mps2, double dt_s)
 {
-    const struct swing k1 = slope(p, s, a_mps2), k2 = slope(p, along(s, k1, dt_s / 2), a_mps2);
-    const struct swing k3 = slope(p, along(s, k2, dt_s / 2), a_mps2), k4 = slope(p, along(s, k3, dt_s), a_mps2);
-    const struct swing sum = along(along(along(k1, k2, 2.0), k3, 2.0), k4, 1.0);
+    const struct pendulum_rest k1 = slope(p, s, a_mps2), k2 = slope(p, along(s, k1, dt_s / 2), a_mps2);
+    const struct pendulum_rest k3 = slope(p, along(s, k2, dt_s / 2), a_mps2), k4 = slope(p, along(s, k3, dt_s), a_mps2);
+    const struct pendulum_rest sum = along(along(along(k1, k2, 2.0), k3, 2.0), k4, 1.0);
     return along(s, sum, dt_s / 6.0);
 }
 
@@ -109,7 +109,7 @@ static void a_step_swings_as_equation_2_says(void **state)
         struct pendulum p = article();
         p.damping_n_m_s = rows[k].damping_n_m_s;
         struct quartz q = up(&p);
-        struct swing s = {0.0, 0.0};
+        struct pendulum_rest s = {0.0, 0.0};
         double peak = 0.0, settled_ms = 0.0;
         const double full_a = p.mass_kg * p.arm_m * G / p.torquer_n_m_per_a; /* (5) */
         near(out_a(&q, 0.0, 0, 10000), 0.0, 0.0);

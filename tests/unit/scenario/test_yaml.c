@@ -77,6 +77,8 @@ static void every_key_reaches_its_field(void **state)
     assert_true(u->cfg.board.afe[0].load_ohm == 1000); /* the other axes keep the nominal chain */
 }
 
+#define PLACE "units: [{}]\nsite: {latitude_deg: 55}\n"
+
 static const struct {
     const char *text, *why; /* the whole line, or its beginning */
 } bad[] = {
@@ -92,6 +94,30 @@ static const struct {
     {"units: 5\n", "dir/s.yaml:1:8: units: expected a list of units"},
     {"units: [5]\n", "dir/s.yaml:1:9: units.a: expected a mapping `key: value`"},
     {"units: [{}]\nstart: yes\n", "dir/s.yaml:2:8: start: expected true or false, got \"yes\""},
+    {"flight: {legs: [{park_s: 9}]}\nunits: [{}]\n",
+     "dir/s.yaml:1:9: flight: expected site.latitude_deg, where it begins, got none"},
+    {PLACE "flight: {}\n", "dir/s.yaml:3:9: flight.legs: expected a list of legs, got none"},
+    {PLACE "flight: {legs: []}\n", "dir/s.yaml:3:9: flight.legs: expected a list of legs, got none"},
+    {PLACE "flight: {legs: {park_s: 9}}\n", "dir/s.yaml:3:16: flight.legs: expected a list of legs, got "},
+    {PLACE "flight:\n  legs:\n  - {park_s: 9}\n  - {turn: 9}\n",
+     "dir/s.yaml:6:6: flight.legs[1].turn: unknown key, nearest: turn_deg (its unit is part of the name); expected one "
+     "of"},
+    {PLACE "flight:\n  legs:\n  - {bank_deg: 9}\n", "dir/s.yaml:5:5: flight.legs[0]: expected one of park_s, taxi_m, "
+                                                    "stop_s, turn_deg, takeoff_mps, climb_m, descend_m, "
+                                                    "fly_s, snake_s, land_mps, got none"},
+    {PLACE "flight:\n  legs:\n  - {park_s: 9, stop_s: 1}\n",
+     "dir/s.yaml:5:5: flight.legs[0]: expected one of park_s, taxi_m, stop_s, turn_deg, takeoff_mps, climb_m, "
+     "descend_m, "
+     "fly_s, snake_s, land_mps, got more"},
+    {PLACE "flight:\n  legs:\n  - {park_s: 9, bank_deg: 5}\n",
+     "dir/s.yaml:5:27: flight.legs[0]: expected no bank_deg beside park_s, got one"},
+    {PLACE "flight:\n  legs:\n  - {park_s: 9}\n  - {turn_deg: 90, radius_m: 2}\n",
+     "dir/s.yaml:6:30: flight.legs[1].radius_m: expected 5 to 5000, got 2"},
+    {PLACE "flight:\n  legs:\n  - {park_s: 9}\n  - {turn_deg: 90}\n",
+     "dir/s.yaml:6:16: flight.legs[1].turn_deg: expected a moving aircraft (a taxi_m before it), got one at rest"},
+    {PLACE "flight:\n  legs:\n  - {taxi_m: 90}\n  - {turn_deg: 90}\n  - {stop_s: 9}\n  - {park_s: 5, roll_deg: 1}\n",
+     "dir/s.yaml:8:5: flight.legs[3].roll_s: expected up to half of park_s (2.5), got 3"},
+    {"units: [{on: flight}]\n", "dir/s.yaml:1:8: units: a: expected a section flight to mount it on, got none"},
     {"bus:\n  bitrate_hz: 2e6\n", "dir/s.yaml:2:15: bus.bitrate_hz: expected an integer of 0 or more, got 2e6"},
     {"bus:\n  bitrate_hz: 1000001\n", "dir/s.yaml:2:15: bus.bitrate_hz: expected 0 to 1000000, got 1000001"},
     {"bus: {bitrate_hz: 9999}\nunits: [{}]\n",
@@ -411,11 +437,12 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
 {
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
-    assert_string_equal(why, "nope: expected a path or a name from proto/scenarios: "
-                             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, "
-                             "gyrocompass, gyrocompass_ideal, "
-                             "multi, quartz_chamber, quartz_run_in, quiet, realistic, sins_coarse, sins_table, "
-                             "six_positions, stream, table_rate");
+    assert_string_equal(
+        why, "nope: expected a path or a name from proto/scenarios: "
+             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, flight, "
+             "gyrocompass, gyrocompass_ideal, "
+             "multi, quartz_chamber, quartz_run_in, quiet, realistic, sins_coarse, sins_secondary, sins_table, "
+             "six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }

@@ -10,16 +10,18 @@ got.end_s               # (n,), when each interval ended, the unit's clock
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 import numpy as np
 
 from psabench.boards.objects import BinsObjects as OD
-from psabench.boards.readings import ReadingLayout, Readings
-from psabench.boards.unit import BusUnit
+from psabench.boards.readings import ReadingLayout, ReadingReader, Readings
+from psabench.boards.unit import TPDO_OFF, BusUnit, tpdos_of
 from psabench.link.signals import Floats, Ints
 
 RAD_PER_ARCSEC = np.pi / 648_000
+NAV_MESSAGES = ("BINS_NAV_PLACE", "BINS_NAV_SPEED", "BINS_NAV_TURN", "BINS_NAV_RATE")
 MESSAGES = ("BINS_GYRO_XY", "BINS_GYRO_Z", "BINS_ACCEL_XY", "BINS_ACCEL_Z")
 
 
@@ -56,6 +58,15 @@ def increments_of(readings: Readings, weights: Weights) -> UnitIncrements:
     )
 
 
+class NavState(enum.IntEnum):
+    """Object 2211h:2."""
+
+    OFF = 0
+    ALIGNING = 1
+    NAVIGATING = 2
+    FAILED = 3
+
+
 class Bins(BusUnit):
     """One unit on the bus."""
 
@@ -70,3 +81,32 @@ class Bins(BusUnit):
             accel_mps=float(self.node.read(OD.WEIGHTS, 2)) * 1e-9,
             age_s=float(self.node.read(OD.TIMING, 4)) * 1e-9,
         )
+
+    def navigate(
+        self, lat_deg: float, lon_deg: float, h_m: float, alignment_s: int, *, increments: bool = False
+    ) -> ReadingReader:
+        """Align at rest, then navigate from this place: what the unit gives out comes to the reader returned.
+
+        increments: whether they are sent as well. Raises DeviceError before the first reading.
+        """
+        start = (round(lat_deg * 1e7), round(lon_deg * 1e7), round(h_m * 1e3), alignment_s)
+        for sub, value in enumerate(start, start=1):
+            self.node.write(OD.NAV_START, sub, value)
+        self.node.write(OD.NAV_MODE, 1, 1)
+        for name in MESSAGES:
+            self._switch(name, on=increments)
+        for name in NAV_MESSAGES:
+            self._switch(name, on=True)
+        layout = ReadingLayout(board=self.board, messages=NAV_MESSAGES, counter="NSEQ", stamp="NTIME")
+        outputs = ReadingReader(layout, self.node.node_id)
+        self.host.listeners.append(outputs.on_message)
+        return outputs
+
+    def navigation(self) -> NavState:
+        """What the unit's own navigation does."""
+        return NavState(int(self.node.read(OD.NAV_MODE, 2)))
+
+    def _switch(self, message: str, *, on: bool) -> None:
+        index = tpdos_of(self.node)[message]
+        bits = int(self.node.read(index, 1)) & ~TPDO_OFF
+        self.node.write(index, 1, bits if on else bits | TPDO_OFF)

@@ -128,6 +128,7 @@ _EXAMPLES: Mapping[str, str] = {
     SECONDARY[0]: """\
   psabench campaign sins-secondary --out build/sins                  two recordings of a drawn unit
   psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
+  psabench run sins-calibration-secondary --scenario sins_secondary --latitude-deg 55.7 --longitude-deg 37.5
 """,
     SNAKE[0]: """\
   psabench run sins-snake
@@ -186,7 +187,8 @@ def _of_the_covariance() -> Parameters:
 
 
 def _of_outputs(name: str) -> Parameters:
-    from psabench.sins import secondary_run, snake
+    from psabench.sins import snake
+    from psabench.sins.secondary import run as secondary_run
 
     kind: type[Any] = {snake.NAME: snake.SnakeParams, secondary_run.NAME: secondary_run.SecondaryParams}[name]
     return Parameters(fields=kind.__dataclass_fields__)
@@ -238,7 +240,7 @@ _SINS = (
     _command(
         SECONDARY,
         handlers.calibrate_secondary,
-        common=(*FROM_OUTPUTS, "--out"),
+        common=(*FROM_OUTPUTS, "--scenario", "--can", "--table", "--control", "--seed", "--out"),
         load=partial(_of_outputs, SECONDARY[0]),
         notes=NOTES_OUTPUTS,
     ),

@@ -174,11 +174,13 @@ def fly_snake(args: argparse.Namespace) -> int:
 
 
 def calibrate_secondary(args: argparse.Namespace) -> int:
+    """From recordings, or a unit on a bench that navigates by itself."""
     from psabench.procedures.result import made_params
-    from psabench.sins import secondary_page, secondary_run
+    from psabench.sins.secondary import page as secondary_page
+    from psabench.sins.secondary import run as secondary_run
 
     params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
-    found = secondary_run.run_secondary(params, args.first, args.second)
+    found = secondary_run.run_secondary(params, of_fields(secondary_run.SecondaryOptions, args), Bar())
     print("\n".join(secondary_page.console_lines(found)))
     print(secondary_page.verdict_words(found))
     print(f"report: {secondary_page.write_page(args.out, found)}")

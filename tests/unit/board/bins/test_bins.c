@@ -324,7 +324,7 @@ static void dead_drd_a(double for_s)
     near((double)r.words, rig_span_s(&r) * 500.0 - rig_bins(&r)->counters.missed_words, 0.01, "words");
 }
 
-static void missing_words_are_told_and_the_increments_stay_integrals(void **state)
+static void missing_words_are_reported_and_the_increments_stay_integrals(void **state)
 {
     (void)state;
     for (unsigned i = 0; i < 10; i++) {
@@ -337,7 +337,7 @@ static void missing_words_are_told_and_the_increments_stay_integrals(void **stat
     assert_int_equal(r.flags, BINS_INCOMPLETE | BINS_STRETCHED);
 }
 
-static void reset_and_power_begin_anew(void **state)
+static void reset_and_power_begin_again(void **state)
 {
     (void)state;
     ideal(true);
@@ -371,8 +371,8 @@ int main(void)
         cmocka_unit_test(a_locked_gyro_counts_nothing),
         cmocka_unit_test(noise_has_the_density_of_the_article),
         cmocka_unit_test(who_looks_when_changes_nothing),
-        cmocka_unit_test(missing_words_are_told_and_the_increments_stay_integrals),
-        cmocka_unit_test(reset_and_power_begin_anew),
+        cmocka_unit_test(missing_words_are_reported_and_the_increments_stay_integrals),
+        cmocka_unit_test(reset_and_power_begin_again),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -134,7 +134,12 @@ def _of_quaternions(q: Floats, path: Path) -> Floats:
     bad = np.flatnonzero(~(np.abs(norm - 1.0) < NORM))
     if len(bad):
         raise BadInput(expected("quaternions of length 1", f"{norm[bad[0]]:g} in row {bad[0] + 1}", path))
-    w, x, y, z = (q / norm[:, None]).T
+    return matrices_of(q / norm[:, None])
+
+
+def matrices_of(q: Floats) -> Floats:
+    """(n, 3, 3) of rows of unit quaternions, scalar first."""
+    w, x, y, z = q.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],

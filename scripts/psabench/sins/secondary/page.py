@@ -15,8 +15,8 @@ from psabench.report.page import bullets, figure, section, verdict_line, whole_p
 from psabench.report.page import table as html_table
 from psabench.sins.correction import correction_dict
 from psabench.sins.covariance import GAMMA_AT
-from psabench.sins.secondary import Compensated, Errors, Secondary
-from psabench.sins.secondary_run import SecondaryResult
+from psabench.sins.secondary.estimate import Compensated, Errors, Secondary
+from psabench.sins.secondary.run import SecondaryResult
 
 FORMAT = 1  # of result.json
 TITLE = "Strapdown unit calibrated from its own navigation"

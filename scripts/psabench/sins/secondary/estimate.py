@@ -24,7 +24,7 @@ from psabench.native.strapdown import gravity_mps2, radii_m
 from psabench.sins.alignment import aligned_state
 from psabench.sins.correction import Correction
 from psabench.sins.covariance import GAMMA_AT
-from psabench.sins.outputs import Outputs, Point, check_axes
+from psabench.sins.secondary.outputs import Outputs, Point, check_axes
 
 UPDATE_S = 1.0  # between measurements
 SHOWN_S = 10.0  # between points of a compensated run
