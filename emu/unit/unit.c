@@ -211,12 +211,20 @@ static int64_t smooth_ns(void *ctx, int64_t t_ns)
     return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
 }
 
-/* The antenna of a unit is at the site, whatever instrument carries the unit. */
+/* The antenna of a unit is at the origin of the aircraft that carries it, else at the site. */
 static void place_at(void *ctx, int64_t t_ns, struct place *out)
 {
-    const struct site *s = &((const struct unit *)ctx)->lab->site;
-    (void)t_ns;
-    *out = (struct place){.lat_rad = s->latitude_rad, .lon_rad = det_wrap_rad(s->longitude_rad), .h_m = s->height_m};
+    const struct unit *u = ctx;
+    const struct site *s = &u->lab->site;
+    struct flight_state at;
+    if (u->cfg.mounting.on != LAB_FLIGHT) {
+        *out =
+            (struct place){.lat_rad = s->latitude_rad, .lon_rad = det_wrap_rad(s->longitude_rad), .h_m = s->height_m};
+        return;
+    }
+    flight_at(&u->lab->flight, t_ns, &at);
+    *out = (struct place){.lat_rad = at.lat_rad, .lon_rad = det_wrap_rad(at.lon_rad), .h_m = at.h_m};
+    memcpy(out->v_n_mps, at.v_enu_mps, sizeof at.v_enu_mps);
 }
 
 /* To what the scenario has it at power-on. */

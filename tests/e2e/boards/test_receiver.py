@@ -112,9 +112,13 @@ def test_errors_are_of_the_size_of_the_profile(tmp_path: Path) -> None:
 # ---- beside CAN
 
 
-def can_solutions(path: Path) -> list[dict[str, int]]:
+def columns(readings: list[dict[str, int]]) -> dict[str, np.ndarray]:
+    return {name: np.array([r[name] for r in readings], np.int64) for name in readings[0]}
+
+
+def can_solutions(path: Path, node: int = 12) -> list[dict[str, int]]:
     """Raw signals of each reading, from a log of candump's format."""
-    layouts = {0x80 * 2 * k + 0x8C: message(name) for k, name in enumerate(MESSAGES, 1)}  # node 12
+    layouts = {0x80 * 2 * k + 0x80 + node: message(name) for k, name in enumerate(MESSAGES, 1)}
     found: list[dict[str, int]] = []
     for line in path.read_text().splitlines():
         can_id, _, payload = line.split()[2].partition("#")
@@ -153,6 +157,39 @@ def test_the_device_class_has_solutions_in_si(tmp_path: Path) -> None:
     late_s = got.t_rx_s - (got.gps_s - since_s)
     assert (late_s > 0.020).all()
     assert (late_s < 0.022).all()
+
+
+# ---- in an aircraft
+
+FLIGHT = """start: true
+site: {latitude_deg: 55.7, longitude_deg: 37.5, height_m: 150}
+flight:
+  heading_deg: 50
+  legs: [{park_s: 5}, {taxi_m: 60, speed_mps: 6}, {turn_deg: 90, radius_m: 20}, {takeoff_mps: 85}, {climb_m: 100},
+         {turn_deg: 30}, {land_mps: 70}, {stop_s: 5}]
+units:
+"""
+DT1_STEPS, DT2_STEPS = 3, 2  # latencies, in periods of 100 ms
+
+
+def test_in_flight_it_follows_the_aircraft_with_its_latencies(tmp_path: Path) -> None:
+    """Two receivers without noise: one reports what is, the other what was."""
+    delays = ("position_delay_s: 0, velocity_delay_s: 0", "position_delay_s: 0.3, velocity_delay_s: 0.2")
+    path, log = tmp_path / "flight.yaml", tmp_path / "can.log"
+    units = [f"  - {{board: receiver, on: flight, profile_set: {{{QUIET}, {d}}}}}\n" for d in delays]
+    path.write_text(FLIGHT + "".join(units))
+    done = psa_emu(path, "--can", f"log:{log}", "--pace", "free", "--for", "100s", "--quiet")
+    assert done.returncode == 0, done.stderr
+    now, late = (columns(can_solutions(log, node)) for node in (12, 13))
+    assert (late["LAT"][DT1_STEPS:] == now["LAT"][:-DT1_STEPS]).all()
+    assert (late["LON"][DT1_STEPS:] == now["LON"][:-DT1_STEPS]).all()
+    assert (late["VN"][DT1_STEPS + DT2_STEPS :] == now["VN"][: -DT1_STEPS - DT2_STEPS]).all()
+    north_mps = np.diff(now["LAT"]) * 1e-7 * M_PER_DEG[0] * 10
+    assert np.abs(north_mps - (now["VN"][1:] + now["VN"][:-1]) * 5e-4).max() < 0.15  # 1e-7 deg is 1 cm, in 0.1 s
+    up_mps = np.diff(now["H"]) * 1e-2
+    assert np.abs(up_mps - (now["VU"][1:] + now["VU"][:-1]) * 5e-4).max() < 0.05
+    assert np.hypot(now["VE"], now["VN"]).max() > 80_000
+    assert now["H"].max() > 240_000
 
 
 # ---- bit rate
@@ -361,9 +398,17 @@ def test_a_second_port_of_a_unit_is_rejected(tmp_path: Path) -> None:
     assert "expected one serial port per unit, got a second for gps" in done.stderr
 
 
-def test_a_receiver_on_the_platform_is_rejected(tmp_path: Path) -> None:
-    path = tmp_path / "platform.yaml"
-    path.write_text("site: {latitude_deg: 50}\nplatform: {}\nunits:\n  - {name: gps, board: receiver, on: platform}\n")
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        ("on: platform", "whose vehicle has no longitude"),
+        ("on: flight", "expected a section flight"),
+        ("on: fixed, lever_arm_m: [0, 0, 1]", "expected lever_arm_m of [0, 0, 0] for a receiver"),
+    ],
+)
+def test_an_antenna_whose_place_is_not_known_is_rejected(tmp_path: Path, unit: str, words: str) -> None:
+    path = tmp_path / "antenna.yaml"
+    path.write_text(f"site: {{latitude_deg: 50}}\nplatform: {{}}\nunits:\n  - {{name: gps, board: receiver, {unit}}}\n")
     done = psa_emu(path, "--can", "none", "--pace", "free", "--for", "0s")
     assert done.returncode == 2
-    assert "whose vehicle has no longitude" in done.stderr
+    assert words in done.stderr
