@@ -42,9 +42,11 @@ class Gpsd:
 
     def __init__(self, control: Control, port: int, process: subprocess.Popen[bytes]) -> None:
         self._control, self._process, self._rest = control, process, b""
+        self._reports: list[dict[str, Any]] = []  # not yet looked at
         self._socket = self._connected(port)
         self._socket.settimeout(LOOK_S)
         self._socket.sendall(b'?WATCH={"enable":true,"json":true}\n')
+        self.until(lambda r: r["class"] == "WATCH", step_s=0.0)  # from here on nothing that it learns is missed
 
     def _connected(self, port: int) -> socket.socket:
         deadline = time.monotonic() + TIMEOUT_S
@@ -56,17 +58,19 @@ class Gpsd:
                 self._process.poll()
         raise AssertionError(f"gpsd does not listen after {TIMEOUT_S:g} s")
 
-    def until(self, found: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """The first report that it is true for."""
+    def until(self, found: Callable[[dict[str, Any]], bool], step_s: float = STEP_S) -> dict[str, Any]:
+        """The first report that it is true for, while time moves by step_s from look to look."""
         deadline = time.monotonic() + TIMEOUT_S
         while time.monotonic() < deadline:
-            self._control.call("run", for_s=STEP_S)
-            for report in self._reports():
-                if found(report):
+            if step_s:
+                self._control.call("run", for_s=step_s)
+            self._reports += self._received()
+            while self._reports:
+                if found(report := self._reports.pop(0)):
                     return report
         raise AssertionError(f"no such report after {TIMEOUT_S:g} s")
 
-    def _reports(self) -> list[dict[str, Any]]:
+    def _received(self) -> list[dict[str, Any]]:
         try:
             self._rest += self._socket.recv(1 << 20)
         except TimeoutError:
