@@ -159,12 +159,13 @@ RULES = {
     "loose-modules": Rule(loose_modules, 12, 12),
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
-    "one-word-functions-python": Rule(one_word_functions, 980, 980),
+    "one-word-functions-python": Rule(one_word_functions, 975, 975),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 59_543, 59_543),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 60_748, 60_748),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 1_982, 1_982),
+    # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 61_681, 61_681),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 62_258, 62_258),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_053, 2_053),
 }
 
 

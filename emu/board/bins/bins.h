@@ -7,13 +7,13 @@
 #ifndef PSABENCH_BOARD_BINS_BINS_H
 #define PSABENCH_BOARD_BINS_BINS_H
 
+#include "board/bins/navigate.h"
 #include "board/bins/profile.h"
 #include "board/psa2/inside.h"
 #include "phys/sensor/inertial.h"
 
 #define BINS_TICK_PULSE_NS 100000
 #define BINS_LATCHES       8u /* that wait for their words */
-#define BINS_ALIGNMENT_S   600.0
 
 enum bins_line { BINS_LINE_TICK = PSA2_LINES, BINS_LINES }; /* a pulse when the gyros are latched */
 extern const struct board_line bins_lines[BINS_LINES];
@@ -90,31 +90,6 @@ struct bins_sums {
     struct sched_ev ev; /* of the next latch */
 };
 
-enum bins_nav_state { BINS_NAV_OFF, BINS_NAV_ALIGNING, BINS_NAV_RUNNING, BINS_NAV_FAILED };
-
-/* What an operator sets before it starts; kept over a stop. */
-struct bins_nav_settings {
-    double lat_rad, lon_rad, h_m, alignment_s;
-};
-
-/* The unit's own navigation; n is east, north, up. */
-struct bins_nav {
-    struct bins_nav_settings set;
-    enum bins_nav_state state;
-    bool due; /* outputs, after this reading */
-    uint32_t since, every;
-    double gyro_rad, accel_mps; /* of a count, of a code */
-    int64_t t_ns;               /* end of the last reading */
-    double time_s;              /* of the alignment */
-    double rate[3], force[3];   /* sums of it, in b */
-    double lat_rad, lon_rad;
-    double v_mps[2]; /* east, north */
-    double q[4];     /* b to n, scalar first */
-    double a_before[3], v_before[3];
-    double turned_rad[3]; /* since the outputs before, in b */
-    int64_t shown_ns;     /* when those were */
-};
-
 struct bins {
     struct psa2 psa2; /* first; its base is the board's */
     struct bins_profile profile;
@@ -146,12 +121,5 @@ void bins_gyro_init(struct bins *b);
 void bins_gyro_power(struct bins *b, bool on, int64_t t_ns);
 void bins_gyro_until(struct bins *b, int64_t t_ns);
 void bins_gyro_counts(struct bins *b, int64_t t_ns, int64_t count[3]);
-
-/* ---- bins/navigate.c: aligns at rest, then navigates by its own increments, with all their errors ---- */
-void bins_nav_start(struct bins *b);
-void bins_nav_stop(struct bins_nav *n);
-bool bins_nav_take(struct bins_nav *n, const struct bins_reading *r); /* true: outputs are due */
-void bins_nav_rates(const struct bins_nav *n, double w_radps[3]);     /* mean since the outputs before */
-void bins_nav_shown(struct bins_nav *n);
 
 #endif

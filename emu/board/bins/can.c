@@ -60,7 +60,7 @@ static void on_reading(void *ctx, const struct bins_reading *r, int64_t t_ns)
 
 /* ---- the unit's own navigation ---- */
 
-static double limited(double x, double limit)
+static double limited_to(double x, double limit)
 {
     return fmin(fmax(floor(x + 0.5), -limit), limit - 1.0);
 }
@@ -71,12 +71,12 @@ static void nav_fields(const struct bins *b, double field[BINS_NAV_FIELDS])
     const struct bins_nav *n = &b->nav;
     double w_radps[3];
     bins_nav_rates(n, w_radps);
-    field[0] = limited(n->lat_rad / RAD_PER_DEG * 1e7, 2147483648.0);
-    field[1] = limited(n->lon_rad / RAD_PER_DEG * 1e7, 2147483648.0);
-    for (unsigned i = 0; i < 2; i++) field[2 + i] = limited(n->v_mps[i] * 1e4, 8388608.0);
+    field[0] = limited_to(n->lat_rad / RAD_PER_DEG * 1e7, 2147483648.0);
+    field[1] = limited_to(n->lon_rad / RAD_PER_DEG * 1e7, 2147483648.0);
+    for (unsigned i = 0; i < 2; i++) field[2 + i] = limited_to(n->v_mps[i] * 1e4, 8388608.0);
     field[4] = (uint16_t)(n->since / n->every + 1);
-    for (unsigned i = 0; i < 4; i++) field[5 + i] = limited(n->q[i] * 32768.0, 32768.0);
-    for (unsigned i = 0; i < 3; i++) field[9 + i] = limited(w_radps[i] / RAD_PER_DEG / 0.004, 32768.0);
+    for (unsigned i = 0; i < 4; i++) field[5 + i] = limited_to(n->q[i] * 32768.0, 32768.0);
+    for (unsigned i = 0; i < 3; i++) field[9 + i] = limited_to(w_radps[i] / RAD_PER_DEG / 0.004, 32768.0);
     field[12] = (uint16_t)((n->t_ns + 500000) / 1000000);
 }
 
@@ -160,7 +160,9 @@ static uint32_t write_nav_mode(struct board_node *n, const struct co_entry *e, c
         board_node_reject(n, "no reading has come yet");
         return CO_AB_STATE;
     }
-    if (v->number != 0.0) bins_nav_start(b);
+    if (v->number != 0.0)
+        bins_nav_start(&b->nav, &b->latest, b->profile.nav_every, b->profile.gyro_arcsec_per_count * RAD_PER_ARCSEC,
+                       bins_accel_mps_per_code(b));
     else bins_nav_stop(&b->nav);
     return CO_OK;
 }

@@ -2,9 +2,10 @@
  *
  * Axes n are east, north, up at the present place; q turns b to n. The height is held. Rotation vector and velocity of a reading
  * from its increments and those before it (coning and sculling of two readings), the turn of n by its mean rate. */
-#include "board/bins/bins.h"
+#include "board/bins/navigate.h"
 
 #include "base/detmath.h"
+#include "board/bins/bins.h"
 #include "phys/motion/earth.h"
 
 #include <math.h>
@@ -20,13 +21,13 @@ enum { E, N, U };
 
 /* ---- rotations */
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     const double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     memcpy(out, c, sizeof c);
 }
 
-static void multiply(const double p[4], const double q[4], double out[4])
+static void multiply_quaternions(const double p[4], const double q[4], double out[4])
 {
     const double r[4] = {
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3], p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
@@ -47,12 +48,12 @@ static void into_n(const double q[4], const double v[3], double out[3])
 {
     const double pure[4] = {0.0, v[0], v[1], v[2]}, back[4] = {q[0], -q[1], -q[2], -q[3]};
     double r[4];
-    multiply(q, pure, r);
-    multiply(r, back, r);
+    multiply_quaternions(q, pure, r);
+    multiply_quaternions(r, back, r);
     memcpy(out, r + 1, 3 * sizeof *out);
 }
 
-static void normalise(double q[4])
+static void normalise_quaternion(double q[4])
 {
     const double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (unsigned i = 0; i < 4; i++) q[i] /= size;
@@ -81,7 +82,7 @@ static void quaternion_of_rows(const double c[3][3], double q[4])
 
 /* ---- alignment */
 
-static bool moves(const double dtheta_rad[3], double dt_s)
+static bool is_moving(const double dtheta_rad[3], double dt_s)
 {
     const double limit = STILL_RADPS * dt_s;
     return fabs(dtheta_rad[0]) > limit || fabs(dtheta_rad[1]) > limit || fabs(dtheta_rad[2]) > limit;
@@ -100,17 +101,17 @@ static bool find_attitude(struct bins_nav *n)
     double c[3][3];
     memcpy(c[U], n->force, sizeof c[U]);
     if (!make_unit(c[U])) return false;
-    cross(n->rate, c[U], c[E]);
+    cross_product(n->rate, c[U], c[E]);
     if (!make_unit(c[E])) return false;
-    cross(c[U], c[E], c[N]);
+    cross_product(c[U], c[E], c[N]);
     quaternion_of_rows((const double(*)[3])c, n->q);
-    normalise(n->q);
+    normalise_quaternion(n->q);
     return true;
 }
 
 static void align_on(struct bins_nav *n, const double a[3], const double v[3], double dt_s)
 {
-    if (moves(a, dt_s)) {
+    if (is_moving(a, dt_s)) {
         n->state = BINS_NAV_FAILED;
         return;
     }
@@ -140,7 +141,7 @@ static struct level level_at(const struct bins_nav *n)
 }
 
 /* Of n against the Earth. */
-static void transport(const struct level *l, const double v[2], double out[3])
+static void transport_rate(const struct level *l, const double v[2], double out[3])
 {
     out[E] = -v[N] / l->meridian_m;
     out[N] = v[E] / l->vertical_m;
@@ -148,13 +149,14 @@ static void transport(const struct level *l, const double v[2], double out[3])
 }
 
 /* Of one reading, in b at its beginning. */
-static void increments(const struct bins_nav *n, const double a[3], const double v[3], double turn[3], double push[3])
+static void increments_of(const struct bins_nav *n, const double a[3], const double v[3], double turn[3],
+                          double push[3])
 {
     double coning[3], scull[3], other[3], mean[3];
-    cross(n->a_before, a, coning);
-    cross(n->a_before, v, scull);
-    cross(n->v_before, a, other);
-    cross(a, v, mean);
+    cross_product(n->a_before, a, coning);
+    cross_product(n->a_before, v, scull);
+    cross_product(n->v_before, a, other);
+    cross_product(a, v, mean);
     for (unsigned i = 0; i < 3; i++) {
         turn[i] = a[i] + coning[i] / 12.0;
         push[i] = v[i] + 0.5 * mean[i] + (scull[i] + other[i]) / 12.0;
@@ -167,27 +169,27 @@ static void navigate_on(struct bins_nav *n, const double a[3], const double v[3]
     const double u[3] = {0.0, EARTH_RATE_RADPS * l.cos, EARTH_RATE_RADPS * l.sin},
                  held[3] = {n->v_mps[E], n->v_mps[N], 0.0};
     double rho[3], turn[3], push[3], push_n[3], w[3], coriolis[3], lean[3], back[3], q[4], mean[2];
-    increments(n, a, v, turn, push);
+    increments_of(n, a, v, turn, push);
     into_n(n->q, push, push_n);
-    transport(&l, n->v_mps, rho);
+    transport_rate(&l, n->v_mps, rho);
     for (unsigned i = 0; i < 3; i++) w[i] = 2.0 * u[i] + rho[i];
-    cross(w, held, coriolis);
+    cross_product(w, held, coriolis);
     for (unsigned i = 0; i < 3; i++) w[i] = -0.5 * (u[i] + rho[i]) * dt_s; /* n has turned by half of it on the way */
-    cross(w, push_n, lean);
+    cross_product(w, push_n, lean);
     for (unsigned i = 0; i < 2; i++) {
         const double after = n->v_mps[i] + push_n[i] + lean[i] - coriolis[i] * dt_s;
         mean[i] = 0.5 * (n->v_mps[i] + after);
         n->v_mps[i] = after;
     }
-    transport(&l, mean, rho);
+    transport_rate(&l, mean, rho);
     n->lat_rad -= rho[E] * dt_s;
     n->lon_rad = det_wrap_rad(n->lon_rad + rho[N] / l.cos * dt_s);
     for (unsigned i = 0; i < 3; i++) back[i] = -(u[i] + rho[i]) * dt_s;
     quaternion_of(turn, q);
-    multiply(n->q, q, n->q);
+    multiply_quaternions(n->q, q, n->q);
     quaternion_of(back, q);
-    multiply(q, n->q, n->q);
-    normalise(n->q);
+    multiply_quaternions(q, n->q, n->q);
+    normalise_quaternion(n->q);
     if (fabs(n->lat_rad) > LATITUDE_MAX_RAD) n->state = BINS_NAV_FAILED;
     for (unsigned i = 0; i < 3; i++) n->turned_rad[i] += a[i];
     n->due = ++n->since % n->every == 0;
@@ -215,17 +217,17 @@ void bins_nav_stop(struct bins_nav *n)
     *n = (struct bins_nav){.set = set};
 }
 
-void bins_nav_start(struct bins *b)
+void bins_nav_start(struct bins_nav *n, const struct bins_reading *from, uint32_t every, double gyro_rad,
+                    double accel_mps)
 {
-    struct bins_nav *n = &b->nav;
     bins_nav_stop(n);
     n->state = BINS_NAV_ALIGNING;
-    n->every = b->profile.nav_every;
-    n->t_ns = n->shown_ns = b->latest.t_ns;
+    n->every = every;
+    n->t_ns = n->shown_ns = from->t_ns;
     n->lat_rad = n->set.lat_rad;
     n->lon_rad = n->set.lon_rad;
-    n->accel_mps = bins_accel_mps_per_code(b);
-    n->gyro_rad = b->profile.gyro_arcsec_per_count * RAD_PER_ARCSEC;
+    n->gyro_rad = gyro_rad;
+    n->accel_mps = accel_mps;
 }
 
 /* A word is truncated: half a code is missing in each. */

@@ -63,6 +63,7 @@ def result_dict(run: SinsRun) -> dict[str, Any]:
             "seconds": r.seconds,
             "correlation_1s": [x if math.isfinite(x) else None for x in r.correlation.tolist()],
         },
+        "advice": list(run.advice),
         "doubts": list(r.doubts),
         "correction": correction_dict(r.correction),
     }
@@ -102,6 +103,7 @@ def write_page(out: Path, run: SinsRun) -> Path:
     good = None if run.graded is None and run.within else run.within
     parts: Sequence[str] = (
         section("Verdict", verdict_line(verdict_words(run), good), bullets(run.result.doubts)),
+        *([section("Before the run", bullets(run.advice))] if run.advice else []),
         section("Parameters", table(table_rows(run))),
         section("How to read them", bullets(NOTES)),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -11,12 +11,14 @@ import numpy as np
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins
 from psabench.errors import BadInput, BenchError, expected
+from psabench.native.nav import Refused
 from psabench.native.sins import DEG, Params
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.result import made_params
 from psabench.sins.calibration import SinsResult, estimate_unit
 from psabench.sins.calibration_grade import P_LIMIT, Graded, grade_result, truth_of
 from psabench.sins.calibration_params import NAME, CalibrationParams, SinsOptions, check_options, longest_cycle_s
+from psabench.sins.covariance import QUANTITIES, SAMPLE_S, predict_accuracy, warnings_of
 from psabench.sins.layout import read_layout
 from psabench.sins.live import LivePass
 from psabench.sins.plan import RotationPlan, read_plan
@@ -38,19 +40,24 @@ class SinsRun:
     plan: str
     facts: Mapping[str, str]
     graded: Graded | None
+    advice: tuple[str, ...] = ()  # given before the run; none for a recording
 
     @property
     def within(self) -> bool:
         return not self.result.doubts and (self.graded is None or self.graded.p >= P_LIMIT)
 
 
-def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
-    """Measure, or read; estimate; grade. What was measured is in OUT. Raises BadInput, BenchError."""
+def run_calibration(
+    options: SinsOptions, progress: Progress, advise: Callable[[Sequence[str]], None] = lambda _: None
+) -> SinsRun:
+    """Advise and measure, or read; estimate; grade. What was measured is in OUT. Raises BadInput, BenchError."""
     p = made_params(CalibrationParams, NAME, options.params)
     check_options(options, p)
     plan = read_plan(p.plan or "article")
     azimuth_rad = (plan.axis_azimuth_deg if p.azimuth_deg is None else p.azimuth_deg) * DEG
     options.out.mkdir(parents=True, exist_ok=True)
+    advice = () if options.data else tuple(advice_lines(p, plan.with_azimuth(azimuth_rad / DEG)))
+    advise(advice)
     if options.data:
         data, truth, facts = _recorded(options), None, {"data": str(options.data)}
     else:
@@ -67,7 +74,18 @@ def run_calibration(options: SinsOptions, progress: Progress) -> SinsRun:
     duration = f"{len(data.increments) * data.increments.dt_s:.0f} s"
     facts |= {"recorded": duration, "table's angles": str(len(data.stand_s)) if stand else "not used"}
     graded = None if truth is None else grade_result(result, truth)
-    return SinsRun(params=p, result=result, plan=plan.name, facts=facts, graded=graded)
+    return SinsRun(params=p, result=result, plan=plan.name, facts=facts, graded=graded, advice=advice)
+
+
+def advice_lines(p: CalibrationParams, plan: RotationPlan) -> list[str]:
+    """What the covariance says of the plan before it is made, and what an operator should know. Raises BadInput."""
+    cfg = p.config(SAMPLE_S, p.stand, longest_cycle_s(plan))
+    try:
+        found = predict_accuracy(plan, cfg)
+    except Refused as e:
+        raise BadInput(f"{NAME}: {e}") from e
+    sigmas = (f"{q.label} {found.columns[q.key].rms:.2g} {q.unit}".rstrip() for q in QUANTITIES)
+    return [f"predicted sd: {', '.join(sigmas)}", *(f"WARNING: {w}" for w in warnings_of(plan, cfg, found))]
 
 
 def _scenario(p: CalibrationParams) -> str:

@@ -13,6 +13,8 @@ from psabench.cli import main
 from psabench.errors import BadInput
 from psabench.native.nav import ARCMIN, DEGPH
 from psabench.native.sins import DEG, Gauge, Sins, SinsConfig, prior_covariance
+from psabench.sins.calibration_params import CalibrationParams
+from psabench.sins.calibration_run import advice_lines
 from psabench.sins.covariance import PRINTED, QUANTITIES, READINGS, Prediction, predict_accuracy, read_as, warnings_of
 from psabench.sins.plan import RotationPlan, plan_of_dict, read_plan
 
@@ -231,3 +233,14 @@ def test_the_command_prints_both_tables_and_stores_them(tmp_path: Path, capsys: 
 def test_the_command_names_what_it_rejects(options: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "sins-covariance", *options]) == 2
     assert says in capsys.readouterr().err
+
+
+def test_advice_before_a_run_has_the_covariance_and_the_warnings(article: RotationPlan) -> None:
+    good = advice_lines(CalibrationParams(accel_noise_mps2=0.004), article)
+    assert len(good) == 1
+    assert good[0].startswith("predicted sd: ν 0.0048 °/h")  # the article's 0.0031 to 0.0039, and the table's wobble
+    said = advice_lines(CalibrationParams(stand=False, lever=3), article.with_azimuth(90.0))
+    assert "0 deg from east" in said[1]
+    assert "lever arms with one rate" in said[2]
+    short = RotationPlan(name="short", axis_azimuth_deg=0.0, turns=article.turns[:2])
+    assert any("keeps 100% of its prior" in line for line in advice_lines(CalibrationParams(), short))

@@ -79,7 +79,7 @@ def test_the_azimuth_of_a_series_goes_into_the_drift_alone() -> None:
     off = replace(r, plan=r.plan.with_azimuth(10.0))
     left = worst(BY_NAME["Fourier"].find(off), truth)
     cosine = 15.041 * np.cos(np.radians(55.7)) * (1.0 - np.cos(np.radians(10.0)))
-    assert left["nu"] == pytest.approx(cosine, rel=0.1)  # the unit stands a degree or two off the axes
+    assert left["nu"] == pytest.approx(cosine, rel=0.1)  # the unit is a degree or two off the axes
     assert max(left["df"], left["gamma"]) < 1e-9
 
 

@@ -141,7 +141,8 @@ def calibrate_sins(args: argparse.Namespace) -> int:
     from psabench.sins.calibration_params import SinsOptions
     from psabench.sins.calibration_run import run_calibration
 
-    done = run_calibration(of_fields(SinsOptions, args, params=_params(args)), Bar())
+    options = of_fields(SinsOptions, args, params=_params(args))
+    done = run_calibration(options, Bar(), lambda lines: print(*lines, sep="\n", flush=True) if lines else None)
     page = calibration_page.write_page(args.out, done)
     if args.verbose:
         print("\n".join(aligned(calibration_page.table_rows(done))))

@@ -38,7 +38,7 @@ class TableSide:
         return np.asarray(self.c_st[int(np.argmin(np.abs(self.t_s - t_s)))])
 
     def mean(self, begin_s: float, end_s: float) -> Floats:
-        """Mean of the readings while the table stands: a rotation but for the square of their noise."""
+        """Mean of the readings while the table is still: a rotation but for the square of their noise."""
         chosen = (self.t_s > begin_s) & (self.t_s < end_s)
         return np.asarray(self.c_st[chosen].mean(axis=0))
 

@@ -129,6 +129,13 @@ static void what_moves_does_not_align(void **state)
     assert_false(bins_nav_take(&b.nav, &g));
 }
 
+static void start_navigation(void)
+{
+    struct bins *u = rig_bins(&r);
+    bins_nav_start(&u->nav, &u->latest, u->profile.nav_every, u->profile.gyro_arcsec_per_count * RAD_PER_ARCSEC,
+                   bins_accel_mps_per_code(u));
+}
+
 static unsigned shown;
 
 static void on_navigated(void *ctx, int64_t t_ns)
@@ -152,7 +159,7 @@ static void it_follows_the_table(void **state)
     rig_bins(&r)->nav.set.lat_rad = RIG_LATITUDE;
     rig_run(&r, 1.0);
     rig_bins(&r)->nav.set.alignment_s = 60.0;
-    bins_nav_start(rig_bins(&r));
+    start_navigation();
     rig_run(&r, 60.5);
     struct bins_nav *n = &rig_bins(&r)->nav;
     assert_int_equal(n->state, BINS_NAV_RUNNING);
@@ -173,7 +180,7 @@ static void a_reset_ends_it(void **state)
     (void)state;
     rig_up(&r, &p, true, 1);
     rig_run(&r, 1.0);
-    bins_nav_start(rig_bins(&r));
+    start_navigation();
     rig_run(&r, 1.0);
     assert_int_equal(rig_bins(&r)->nav.state, BINS_NAV_ALIGNING);
     bins_reset(rig_bins(&r), r.s.now_ns);
