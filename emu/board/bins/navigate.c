@@ -6,13 +6,12 @@
 
 #include "base/detmath.h"
 #include "board/bins/bins.h"
+#include "phys/flight/ellipsoid.h"
 #include "phys/motion/earth.h"
 
 #include <math.h>
 #include <string.h>
 
-#define SEMI_MAJOR_M     6378137.0 /* WGS 84: NIMA TR8350.2, table 3.1 */
-#define ECCENTRICITY2    6.69437999014e-3
 #define STILL_RADPS      (0.1 * RAD_PER_DEG) /* an alignment's rate, the Earth's is a twentieth of it */
 #define LATITUDE_MAX_RAD (89.0 * RAD_PER_DEG)
 #define NS_A_SECOND      1e9
@@ -135,9 +134,8 @@ struct level {
 static struct level level_at(const struct bins_nav *n)
 {
     const struct det_pair lat = det_sin_cos(n->lat_rad);
-    const double x = 1.0 - ECCENTRICITY2 * lat.sin * lat.sin, vertical_m = SEMI_MAJOR_M / sqrt(x);
-    return (struct level){lat.sin, lat.cos, vertical_m * (1.0 - ECCENTRICITY2) / x + n->set.h_m,
-                          vertical_m + n->set.h_m};
+    const struct radii r = ellipsoid_radii(lat.sin, lat.cos);
+    return (struct level){lat.sin, lat.cos, r.meridian_m + n->set.h_m, r.vertical_m + n->set.h_m};
 }
 
 /* Of n against the Earth. */

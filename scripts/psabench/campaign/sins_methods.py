@@ -108,7 +108,7 @@ def run_methods(units: int, seed: int, progress: Progress) -> list[Row]:
                     found = m.find(runs[m.plan])
                     key = m.name, base.name
                     took[key] = took.get(key, 0.0) + time.process_time() - start_s
-                    errors.setdefault(key, []).append(_columns(found, drawn))
+                    errors.setdefault(key, []).append(error_columns(found, drawn))
             done()
     return [
         Row(
@@ -123,7 +123,7 @@ def run_methods(units: int, seed: int, progress: Progress) -> list[Row]:
     ]
 
 
-def _columns(found: Params, truth: UnitErrors) -> Floats:
+def error_columns(found: Params, truth: UnitErrors) -> Floats:
     """Rms over the elements of each column of the article's tables."""
     off = {
         "nu": found.nu_radps - truth.nu_radps,

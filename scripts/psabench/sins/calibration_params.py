@@ -16,6 +16,7 @@ from psabench.procedures.result import option
 from psabench.sins.covariance_run import GAUGES
 from psabench.sins.parameters import SCALES
 from psabench.sins.plan import RotationPlan
+from psabench.sins.table_drive import TableOptions
 from psabench.sins.table_run import STAND_S
 
 NAME = "sins-calibration"
@@ -87,15 +88,9 @@ class CalibrationParams:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SinsOptions:
+class SinsOptions(TableOptions):
     """What the command line asked for."""
 
-    out: Path
-    can: str | None = None
-    table: str | None = None
-    control: Path | None = None
-    scenario: Path | None = None
-    seed: int | None = None
     real_time: bool = False
     data: Path | None = None  # recorded increments in place of a bench
     layout: Path | None = None
@@ -109,9 +104,8 @@ def check_options(options: SinsOptions, p: CalibrationParams) -> None:
         state_layout(p.config(0.01, p.stand, 1.0))
     except Refused as e:
         raise BadInput(f"{NAME}: {e}") from e
-    given = [n for n in ("can", "table", "control", "scenario", "seed") if getattr(options, n) is not None]
-    if options.data and given:
-        raise BadInput(expected("--data without a bench", f"--{given[0]}", NAME))
+    if options.data and options.given:
+        raise BadInput(expected("--data without a bench", f"--{options.given[0]}", NAME))
     if options.data and options.angles and not p.plan:
         raise BadInput(expected("--plan of the recording: its cycles are in the intervals", "none", "--angles"))
     if not options.data and (options.angles or options.layout):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.bench import Bench
 from psabench.boards.bins.device import Bins
 from psabench.errors import BadInput, BenchError, expected
 from psabench.native.nav import Refused
@@ -102,7 +101,7 @@ def _measured(
     options: SinsOptions, p: CalibrationParams, plan: RotationPlan, progress: Progress, live: LivePass
 ) -> tuple[TableData, Params | None]:
     """On a bench that is there, or on an emulator started for it; then with the truth."""
-    with _opened(options, p) as bench:
+    with options.open_bench(_scenario(p), "wall" if options.real_time else "step") as bench:
         units = [u for u in bench.units.values() if isinstance(u, Bins)]
         if not units:
             raise BadInput(expected(f"a scenario with an inertial unit, as {SCENARIO}", "none", "--scenario"))
@@ -116,11 +115,3 @@ def _measured(
                     write_data(options.out, run.data())
                 raise
         return data, truth_of(bench) if bench.emulator else None
-
-
-def _opened(options: SinsOptions, p: CalibrationParams) -> Bench:
-    if options.can or options.table or options.control:
-        scpi = {"table": options.table} if options.table else None
-        return Bench.connect(options.can, control=options.control, scpi=scpi)
-    pace = "wall" if options.real_time else "step"
-    return Bench.start(options.scenario or _scenario(p), pace=pace, seed=options.seed)

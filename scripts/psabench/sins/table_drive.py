@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 from psabench.bench import Bench
 from psabench.errors import InstrumentError
@@ -52,6 +54,29 @@ class PlanDrive:
         for _ in range(parts):
             self._bench.run_for(duration_s / parts)
             self._look()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableOptions:
+    """A bench with a table: at these addresses, or an emulator with the scenario."""
+
+    out: Path = Path("build/run")
+    can: str | None = None
+    table: str | None = None
+    control: Path | None = None
+    scenario: Path | None = None
+    seed: int | None = None
+
+    @property
+    def given(self) -> list[str]:
+        """Options that say which bench."""
+        return [n for n in ("can", "table", "control", "scenario", "seed") if getattr(self, n) is not None]
+
+    def open_bench(self, usual: str, pace: str = "step") -> Bench:
+        """usual: the scenario where none is given. Raises BadInput, BenchError."""
+        if self.can or self.table or self.control:
+            return Bench.connect(self.can, control=self.control, scpi={"table": self.table} if self.table else None)
+        return Bench.start(self.scenario or usual, pace=pace, seed=self.seed)
 
 
 def _parts(duration_s: float) -> int:

@@ -12,7 +12,9 @@ from psabench.boards.bins.device import Bins, NavState, UnitIncrements, incremen
 from psabench.errors import DeviceError, InstrumentError
 from psabench.link.vcd import read_vcd
 from psabench.native.strapdown import State, Strapdown
-from psabench.sins.secondary.outputs import matrices_of
+from psabench.sins.secondary.on_bench import record_outputs
+from psabench.sins.secondary.outputs import Outputs, Point, matrices_of
+from psabench.sins.table import Move
 
 pytestmark = pytest.mark.host
 
@@ -241,3 +243,16 @@ def test_navigation_is_refused_before_a_reading_and_fails_on_a_table_that_turns(
         unit.navigate(55.7, 37.5, 150.0, 10)
         bench.run_for(1.0)
         assert unit.navigation() is NavState.FAILED
+
+
+def test_what_a_run_cut_short_has_shown_is_kept() -> None:
+    """Half a minute of a plan, then Ctrl-C."""
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    kept: list[Outputs] = []
+    point = Point(lat_rad=np.radians(55.7), lon_rad=np.radians(37.5), h_m=150.0)
+    with Bench.start("sins_secondary") as bench, pytest.raises(KeyboardInterrupt):
+        kept.extend(record_outputs(bench, [Move(axis=1, rate_dps=5.0, duration_s=60.0)], point, 20, interrupt))
+    assert [150 < len(k) < 160 for k in kept] == [True]  # 31 s, five a second

@@ -63,7 +63,7 @@ static void on_world(void *ctx, struct mav_world *out, int64_t t_ns)
     (void)ctx;
     (void)t_ns;
     assert(w.hil);
-    *out = (struct mav_world){{1, 2, 3}, 90, -180, 30000, 1e6, -1e6};
+    *out = (struct mav_world){{1, 2, 3}, 90, -180, 30000, 1e6, -1e6, 1e6};
 }
 
 static double on_value(void *ctx, unsigned which, int64_t t_ns)

@@ -43,6 +43,15 @@ MISTAKES: list[tuple[str, str]] = [
     ("run gyrocompass --hours 4", "gyrocompass: expected an option that --help lists, got --hours"),
     ("run sins-snake --flight loop", "--flight: expected snake, straight, or a file, got no file loop"),
     ("run sins-calibration-secondary", "--first: expected a recording"),
+    (
+        "run sins-calibration-secondary --seed 1 --latitude-deg 55 --longitude-deg 37 --plan nope",
+        "--plan: expected article, two_rates",
+    ),
+    (
+        "run sins-calibration-secondary --seed 1",
+        "--latitude-deg, --longitude-deg: expected the table's place, got none",
+    ),
+    ("run sins-calibration-secondary --first x.csv --seed 1", "--first: expected a recording or a bench, got both"),
     ("run sins-calibration-secondary --first x.csv", "x.csv: No such file"),
     ("campaign sins-secondary --pairs 0", "--pairs: expected 1 to 100000, got 0"),
     ("campaign sins-secondary --experiment x.yaml", "--experiment: expected article, or a file, got no file x.yaml"),

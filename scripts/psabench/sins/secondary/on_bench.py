@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -20,8 +20,11 @@ REST_S = 1.0  # after the alignment's end, and after the last turn
 
 def record_outputs(
     bench: Bench, moves: Sequence[Move], point: Point, alignment_s: int, advance: Callable[[], None]
-) -> Outputs:
-    """One run; advance: after each part of a move. Raises DeviceError where the unit does not navigate."""
+) -> Iterator[Outputs]:
+    """One run; advance: after each part of a move. Gives what the unit gave out, also of a run that is cut short.
+
+    Raises DeviceError where the unit does not navigate.
+    """
     unit, drive = bench.board(Bins), PlanDrive(bench, moves, advance)
     unit.wait_ready()
     drive.go_home()
@@ -30,10 +33,15 @@ def record_outputs(
     bench.run_for(alignment_s + REST_S)
     if (state := unit.navigation()) is not NavState.NAVIGATING:
         raise DeviceError("navigation", 0, expected("navigating", state.name.lower(), "state after the alignment"))
-    drive.make_all()
-    bench.run_for(REST_S)
-    unit.stop()
-    return outputs_of(_whole_run(reader))
+    try:
+        drive.make_all()
+        bench.run_for(REST_S)
+        unit.stop()
+    except BaseException:  # Ctrl-C, too: hours on a table are kept
+        if len(reader) > 1:
+            yield outputs_of(reader.take())
+        raise
+    yield outputs_of(_whole_run(reader))
 
 
 def _whole_run(reader: ReadingReader) -> Readings:

@@ -22,12 +22,12 @@ from psabench.sins.secondary.estimate import (
     compensate_outputs,
 )
 from psabench.sins.secondary.outputs import Outputs, Point, read_outputs, write_outputs
+from psabench.sins.table_drive import TableOptions, parts_of, table_axes
 
 if TYPE_CHECKING:
-    from psabench.bench import Bench
     from psabench.procedures.head_bench import Progress
 
-NAME = "sins-calibration-secondary"
+NAME, SCENARIO = "sins-calibration-secondary", "sins_secondary"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +37,7 @@ class SecondaryParams:
     latitude_deg: float | None = option(None, "deg", "latitude of the table; none: where the recording starts")
     longitude_deg: float | None = option(None, "deg", "longitude of the table; none: where the recording starts")
     height_m: float = option(0.0, "m", "height of the table over the ellipsoid")
-    plan: str | None = option(None, "", "plan of rotations on a bench: a name or a YAML file (none: secondary)")
+    plan: str = option("secondary", "", "plan of rotations on a bench: a name or a YAML file")
     alignment_s: float = option(600.0, "s", "alignment at rest before the unit navigates")
     gyro_noise_degph_rts: float = option(0.1, "deg/h", "noise of the gyros, mean over 1 s")
     accel_noise_mps2_rts: float = option(1e-3, "m/s2", "noise of the accelerometers, mean over 1 s")
@@ -92,28 +92,17 @@ class SecondaryResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SecondaryOptions:
+class SecondaryOptions(TableOptions):
     """Where the outputs come from."""
 
     first: Path | None = None
     second: Path | None = None
-    scenario: str | Path | None = None
-    can: str | None = None
-    table: str | None = None
-    control: Path | None = None
-    seed: int | None = None
-    out: Path = Path("build/run")
-
-    @property
-    def on_a_bench(self) -> bool:
-        """Is the first experiment to be made?"""
-        return any(x is not None for x in (self.scenario, self.can, self.table, self.control))
 
 
 def run_secondary(params: SecondaryParams, options: SecondaryOptions, progress: Progress) -> SecondaryResult:
     """Raises BadInput with the file and what is wrong with it; BenchError where a run on a bench fails."""
     first, second = options.first, options.second
-    if options.on_a_bench:
+    if options.given:
         if first is not None:
             raise BadInput(expected("a recording or a bench", "both", "--first"))
         first = record_first(params, options, progress)
@@ -135,29 +124,18 @@ def record_first(params: SecondaryParams, options: SecondaryOptions, progress: P
     """A run on the bench, as OUT/first.csv. Raises BadInput, BenchError."""
     from psabench.sins.secondary.on_bench import record_outputs
     from psabench.sins.table import moves_of
-    from psabench.sins.table_drive import parts_of, table_axes
 
     if params.latitude_deg is None or params.longitude_deg is None:
         raise BadInput(expected("the table's place", "none", "--latitude-deg, --longitude-deg"))
     point = Point(
         lat_rad=math.radians(params.latitude_deg), lon_rad=math.radians(params.longitude_deg), h_m=params.height_m
     )
-    plan = read_plan(params.plan or "secondary")
+    plan = read_plan(params.plan)
     options.out.mkdir(parents=True, exist_ok=True)
-    with _opened(options) as bench:
+    path = options.out / "first.csv"
+    with options.open_bench(SCENARIO) as bench:
         moves = list(moves_of(plan.turns, table_axes(bench)))
         with progress.step(f"alignment, plan {plan.name}", parts_of(moves)) as advance:
-            outputs = record_outputs(bench, moves, point, round(params.alignment_s), advance)
-    path = options.out / "first.csv"
-    write_outputs(path, outputs)
+            for outputs in record_outputs(bench, moves, point, round(params.alignment_s), advance):
+                write_outputs(path, outputs)
     return path
-
-
-def _opened(options: SecondaryOptions) -> Bench:
-    from psabench.bench import Bench
-
-    if options.can or options.table or options.control:
-        scpi = {"table": options.table} if options.table else None
-        return Bench.connect(options.can, control=options.control, scpi=scpi)
-    assert options.scenario is not None
-    return Bench.start(options.scenario, pace="step", seed=options.seed)
