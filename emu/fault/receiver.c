@@ -55,8 +55,11 @@ static void refresh_receiver(struct fault *f, int64_t t_ns)
 {
     const struct unit *u = fault_unit(f);
     struct board_receiver_faults sum = {.weeks = 0};
-    for (unsigned i = 0; i < FAULTS_MAX; i++)
-        if (fault_lasts_at(f, &f->engine->fault[i])) add_to_sum(&f->engine->fault[i], &sum, t_ns);
+    for (unsigned i = 0; i < FAULTS_MAX; i++) {
+        const struct fault *other = &f->engine->fault[i];
+        const bool of_table = other->id != 0 && other->kind->lift == refresh_receiver; /* frozen_words is not */
+        if (of_table && fault_lasts_at(f, other)) add_to_sum(other, &sum, t_ns);
+    }
     u->type->receiver->set_faults(u->board, &sum, t_ns);
 }
 
