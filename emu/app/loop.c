@@ -156,9 +156,7 @@ static int64_t timeout_ns(const struct loop *l)
         const int64_t due_ns = ns_earlier(sched_next_ns(l->sched), l->end_ns);
         const int64_t at_ns = l->sched->now_ns + PACE_QUANTUM_NS;
         const int64_t rested_ns = l->sched->now_ns + PACE_REST_NS; /* or the sleep would count as falling behind */
-        if (due_ns < SCHED_NEVER)
-            wait_ns =
-                ns_earlier(wait_ns, l->pace->origin_ns + ns_earlier(ns_later(due_ns, at_ns), rested_ns) - clock_ns);
+        wait_ns = ns_earlier(wait_ns, l->pace->origin_ns + ns_earlier(ns_later(due_ns, at_ns), rested_ns) - clock_ns);
     }
     if (l->full_since_ns && clock_ns - l->full_since_ns < SLOW_NS)
         wait_ns = ns_earlier(wait_ns, l->full_since_ns + SLOW_NS - clock_ns);

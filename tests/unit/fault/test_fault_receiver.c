@@ -176,18 +176,20 @@ static void those_of_a_kind_add_up(void **state)
     sched_run_until(&r.s, 2000 * MS);
     added("receiver.jump", "'jump_m':30");
     const uint32_t jump = added("receiver.jump", "'jump_m':-10,'azimuth_deg':90");
+    const uint32_t back = added("receiver.jump", "'jump_m':3,'azimuth_deg':90");
     added("receiver.bad_checksum", "'probability':0.5");
     added("receiver.bad_checksum", "'probability':0.5");
     added("receiver.wrong_week", "'weeks':2");
     added("receiver.wrong_week", "'weeks':3");
     struct board_receiver_faults due = {.rate_mps = {0.0, 5.0},
                                         .base_m = {0.0, 10.0},
-                                        .jump_m = {-10.0, 30.0},
+                                        .jump_m = {-7.0, 30.0},
                                         .checksum_probability = 0.75,
                                         .weeks = 5};
     assert_wrong(&due);
     clear(ramp);
     clear(jump);
+    clear(back);
     due.rate_mps[1] = due.base_m[1] = due.jump_m[0] = 0.0;
     assert_wrong(&due);
 }
