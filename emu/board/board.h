@@ -13,6 +13,8 @@
 #include "board/cfg.h"
 #include "board/field.h"
 #include "board/part.h"
+#include "board/satellite.h"
+#include "board/serial.h"
 #include "phys/sensor/mems.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
@@ -41,30 +43,6 @@ struct board_controller_fault {
 struct board_platform {
     const char *(*set_mode)(struct board *b, unsigned mode,
                             int64_t t_ns); /* enum gyro_mode; NULL, or why it is rejected */
-};
-
-/* What is wrong with a receiver: the sum of the faults that are active (fault/receiver.c). East, north. */
-struct board_receiver_faults {
-    bool outage, frozen_time;
-    double checksum_probability; /* of a message */
-    int32_t weeks;               /* by which the date is off */
-    double rate_mps[2];          /* the position runs away, and the velocity says so */
-    double base_m[2];            /* how far it has, when this is set */
-    double jump_m[2];
-};
-
-/* Operations on a satellite receiver. */
-struct board_receiver {
-    void (*set_faults)(struct board *b, const struct board_receiver_faults *f, int64_t t_ns);
-};
-
-/* A serial port, bytes out of the board at their bit rate. */
-struct board_serial {
-    uint32_t (*baud)(const struct board *b);
-    void (*unfit)(const struct board *b, char *names,
-                  size_t cap); /* messages that its bit rate does not carry; or "" */
-    /* Each byte from now on, when its stop bit ends; NULL: to no one. */
-    void (*connect)(struct board *b, void (*sent)(void *ctx, uint8_t byte, int64_t t_ns), void *ctx);
 };
 
 typedef void board_truth_fn(void *ctx, const char *name, double value);
@@ -115,8 +93,7 @@ struct board_type {
     void (*power_down)(struct board *b, int64_t t_ns);
     void (*reset)(struct board *b, int64_t t_ns);
     bool (*ready)(const struct board *b);
-    void (*sample_until)(struct board *b,
-                         int64_t t_ns); /* takes its inputs up to now; the physics may change abruptly after */
+    void (*sample_until)(struct board *b, int64_t t_ns); /* takes its inputs; then the physics may change abruptly */
     /* Why it computes what no one looks at from t_ns on; a sentence without its end. NULL: it does not. No function: always. */
     const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
