@@ -141,8 +141,8 @@ void receiver_init(struct receiver *b, const struct receiver_profile *p, const s
     receiver_errors_init(&b->errors, &errors, cfg->seed, cfg->serial);
     b->checksum = board_draws(&b->base, "receiver.checksum");
     (void)calendar_parse(p->start_utc, &b->start_utc_ms); /* receiver_profile_check() has read it */
-    sched_ev(&b->solve_ev, solve_periodically, b);
-    sched_ev(&b->output_ev, put_out, b);
+    sched_ev_inner(&b->solve_ev, solve_periodically, b);
+    sched_ev_inner(&b->output_ev, put_out, b);
     sched_ev_inner(&b->pps_ev, toggle_pps, b);
     sched_ev_inner(&b->sol_ev, end_sol, b);
     b->base.trace.source = (struct trace_source){.wake = receiver_tx_wake, .ctx = b};
