@@ -95,7 +95,7 @@ def coincident(rng: np.random.Generator, last: Strobe) -> list[Strobe]:
     read = Strobe(False, 10 + last.delay_ns, last.length_ns, last.address)
     given = Strobe(False, 0, int(rng.integers(200, 900)), FLAGS, data=BOTH, before_dr_ns=int(rng.integers(5000, 40000)))
     end_ns = int(rng.choice([0, 0, 0, 0, -1, 1, int(rng.integers(-300, 300))]))
-    data, before_ns = int(rng.integers(0, 3)), int(rng.integers(300, 3000))
+    data, before_ns = int(rng.integers(0, 3)), int(rng.integers(600, 3000))  # 600 - 300 is no strobe too short
     away = Strobe(False, 0, 0, FLAGS, data=data, before_dr_ns=before_ns, end_ns=end_ns)
     again = Strobe(False, int(rng.integers(10, 3000)), int(rng.integers(200, 900)), FLAGS, data=BOTH)
     return [off, read, given, away, again]
