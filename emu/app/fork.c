@@ -119,6 +119,7 @@ static bool make_options(struct child_options *w, const struct options *parent, 
         o->scpi[i].link = NULL;
     }
     for (unsigned i = 0; i < o->bus_count; i++) o->bus[i].link = NULL;
+    for (unsigned i = 0; i < o->serial_count; i++) o->serial[i].link = NULL;
     snprintf(w->can, sizeof w->can, "%s", f->can);
     return options_cans(o, w->can, why, CONTROL_WHY_MAX);
 }

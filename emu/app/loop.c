@@ -155,8 +155,8 @@ static int64_t timeout_ns(const struct loop *l)
     if (l->started && l->pace->kind == PACE_WALL) {
         const int64_t due_ns = ns_earlier(sched_next_ns(l->sched), l->end_ns);
         const int64_t at_ns = l->sched->now_ns + PACE_QUANTUM_NS;
-        if (due_ns < SCHED_NEVER)
-            wait_ns = ns_earlier(wait_ns, l->pace->origin_ns + (due_ns > at_ns ? due_ns : at_ns) - clock_ns);
+        const int64_t rested_ns = l->sched->now_ns + PACE_REST_NS; /* or the sleep would count as falling behind */
+        wait_ns = ns_earlier(wait_ns, l->pace->origin_ns + ns_earlier(ns_later(due_ns, at_ns), rested_ns) - clock_ns);
     }
     if (l->full_since_ns && clock_ns - l->full_since_ns < SLOW_NS)
         wait_ns = ns_earlier(wait_ns, l->full_since_ns + SLOW_NS - clock_ns);

@@ -237,12 +237,9 @@ static bool set_line_hz(const struct target *t, const char *arg)
 }
 
 /* a:LINK or LINK: names of units are plain. */
-static bool set_bus_port(const struct target *t, const char *arg)
+static bool parse_unit_port(const struct target *t, const char *arg, struct options_bus *b)
 {
     static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
-    struct options *o = t->o;
-    if (o->bus_count == OPTIONS_BUS_MAX) return expected(t, arg, "up to %u bus ports", OPTIONS_BUS_MAX);
-    struct options_bus *b = &o->bus[o->bus_count++];
     const size_t len = strspn(arg, plain);
     const bool named = len > 0 && arg[len] == ':';
     const char *link = named ? arg + len + 1 : arg;
@@ -250,6 +247,20 @@ static bool set_bus_port(const struct target *t, const char *arg)
     if (!*link || (named && len >= sizeof b->unit)) return expected(t, arg, "[UNIT:]LINK, where LINK is a path or -");
     if (named) snprintf(b->unit, sizeof b->unit, "%.*s", (int)len, arg);
     return true;
+}
+
+static bool set_bus_port(const struct target *t, const char *arg)
+{
+    struct options *o = t->o;
+    if (o->bus_count == OPTIONS_BUS_MAX) return expected(t, arg, "up to %u bus ports", OPTIONS_BUS_MAX);
+    return parse_unit_port(t, arg, &o->bus[o->bus_count++]);
+}
+
+static bool set_serial(const struct target *t, const char *arg)
+{
+    struct options *o = t->o;
+    if (o->serial_count == OPTIONS_SERIAL_MAX) return expected(t, arg, "up to %u serial ports", OPTIONS_SERIAL_MAX);
+    return parse_unit_port(t, arg, &o->serial[o->serial_count++]);
 }
 
 static bool set_mavlink(const struct target *t, const char *arg)
@@ -345,6 +356,8 @@ static const struct row rows[] = {
      "                           times)"},
     {"--bus-port", " [UNIT:]LINK", set_bus_port, 0, "bus port: cycles on a unit's parallel bus as lines of text on a pseudo-terminal\n"
      "                           (default: the first unit that has one); LINK as above; may be given several times"},
+    {"--serial", " [UNIT:]LINK", set_serial, 0, "serial port of a unit that has one (receiver): its bytes on a pseudo-terminal, at their\n"
+     "                           bit rate (default: the first unit that has one); LINK as above; may be given several times"},
     {"--mavlink", " KIND[,...]", set_mavlink, 0, "a unit as a MAVLink system (docs/tools/mavlink.md). KIND: udp[:PORT] (sends to 127.0.0.1),\n"
      "                           udpin[:PORT], tcp[:PORT] (wait for clients there), pty[:LINK]. Then, after commas:\n"
      "                           unit=NAME, sysid=N, compid=N, autopilot=generic|px4|ardupilot|invalid, imu=HZ,\n"

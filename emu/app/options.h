@@ -11,10 +11,11 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define OPTIONS_CAN_MAX   8u
-#define OPTIONS_SCPI_MAX  8u
-#define OPTIONS_BUS_MAX   8u
-#define OPTIONS_LOGIC_MAX 4u
+#define OPTIONS_CAN_MAX    8u
+#define OPTIONS_SCPI_MAX   8u
+#define OPTIONS_BUS_MAX    8u
+#define OPTIONS_SERIAL_MAX 8u
+#define OPTIONS_LOGIC_MAX  4u
 
 #define OPTIONS_MAVLINK_MAX 4u
 
@@ -43,9 +44,10 @@ struct options_scpi {
     uint16_t port;    /* 0: a free one */
 };
 
+/* Of a bus port, or of a serial one. */
 struct options_bus {
     const char *arg;  /* as given */
-    char unit[32];    /* "": the first that has a bus */
+    char unit[32];    /* "": the first that has such a port */
     const char *link; /* symbolic link; NULL: none */
 };
 
@@ -83,6 +85,8 @@ struct options {
     unsigned scpi_count;
     struct options_bus bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
+    struct options_bus serial[OPTIONS_SERIAL_MAX];
+    unsigned serial_count;
     struct options_logic logic[OPTIONS_LOGIC_MAX];
     unsigned logic_count;
     struct mav_options mavlink[OPTIONS_MAVLINK_MAX];

@@ -12,6 +12,7 @@ enum pace_kind { PACE_WALL, PACE_STEP, PACE_FREE };
 
 #define PACE_QUANTUM_NS 100000    /* wall: events nearer than this to the last wake-up share the next one */
 #define PACE_LATE_NS    1000000   /* an event this late is counted as late */
+#define PACE_REST_NS    100000000 /* wall: the longest sleep; well below PACE_SLIP_NS */
 #define PACE_SLIP_NS    500000000 /* behind by more than this: simulated time gives up catching up, counted */
 #define PACE_BATCH_NS   10000000  /* wall: simulated time run at most between looks at input */
 

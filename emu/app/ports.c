@@ -20,7 +20,8 @@ static bool fail_pty(char *why, size_t cap, const char *option, const char *arg,
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
-                                     2 * OPTIONS_BUS_MAX + OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
+                                     2 * OPTIONS_BUS_MAX + 2 * OPTIONS_SERIAL_MAX +
+                                     OPTIONS_LOGIC_MAX * (BEAGLE_CLIENTS_MAX + 1) +
                                      OPTIONS_MAVLINK_MAX * (MAV_PEERS_MAX + 1) + 3,
                "LOOP_LINKS_MAX");
 
@@ -194,33 +195,53 @@ static const struct board_type *type_of(const struct bench *b, unsigned unit)
     return b->scenario.units[unit].cfg.type;
 }
 
-/* The unit of that name, the first that has a bus for none; the number of units if there is none. */
-static unsigned find_unit(const struct bench *b, const char *name)
+static bool has_bus(const struct board_type *t)
+{
+    return t->bus != NULL;
+}
+
+static bool has_serial(const struct board_type *t)
+{
+    return t->serial != NULL;
+}
+
+/* An option that opens ports of units, and which boards have such a port. */
+struct port_kind {
+    const char *option, *name, *port; /* "--bus-port", "bus port", "parallel bus" */
+    bool (*has)(const struct board_type *t);
+};
+static const struct port_kind bus_ports = {"--bus-port", "bus port", "parallel bus", has_bus},
+                              serial_ports = {"--serial", "serial port", "serial port", has_serial};
+
+/* The unit of that name, the first that has such a port for none; the number of units if there is none. */
+static unsigned find_unit(const struct bench *b, const struct port_kind *kind, const char *name)
 {
     unsigned i = 0;
     for (; i < b->scenario.unit_count; i++)
-        if (name[0] ? strcmp(b->scenario.units[i].name, name) == 0 : type_of(b, i)->bus != NULL) break;
+        if (name[0] ? strcmp(b->scenario.units[i].name, name) == 0 : kind->has(type_of(b, i))) break;
     return i;
 }
 
-/* Whether there are such units and their boards have a bus. */
-static bool check_bus_ports(const struct bench *b, const struct options *o, char *why, size_t cap)
+/* Whether there are such units, their boards have such a port, and none is named twice. */
+static bool check_unit_ports(const struct bench *b, const struct port_kind *k, const struct options_bus *port,
+                             unsigned count, char *why, size_t cap)
 {
-    for (unsigned i = 0; i < o->bus_count; i++) {
-        const struct options_bus *p = &o->bus[i];
-        const unsigned unit = find_unit(b, p->unit);
+    for (unsigned i = 0; i < count; i++) {
+        const struct options_bus *p = &port[i];
+        const unsigned unit = find_unit(b, k, p->unit);
         if (unit == b->scenario.unit_count && p->unit[0])
-            return why_fail(why, cap, "--bus-port %s: expected a unit of the scenario, got \"%s\"", p->arg, p->unit);
+            return why_fail(why, cap, "%s %s: expected a unit of the scenario, got \"%s\"", k->option, p->arg, p->unit);
         if (unit == b->scenario.unit_count)
-            return why_fail(why, cap, "--bus-port %s: expected a scenario with a unit that has a parallel bus", p->arg);
-        if (!type_of(b, unit)->bus) {
-            return why_fail(why, cap, "--bus-port %s: expected a unit with a parallel bus, got %s, a %s", p->arg,
+            return why_fail(why, cap, "%s %s: expected a scenario with a unit that has a %s", k->option, p->arg,
+                            k->port);
+        if (!k->has(type_of(b, unit))) {
+            return why_fail(why, cap, "%s %s: expected a unit with a %s, got %s, a %s", k->option, p->arg, k->port,
                             p->unit, type_of(b, unit)->title);
         }
-        for (unsigned k = 0; k < i; k++)
-            if (find_unit(b, o->bus[k].unit) == unit)
-                return why_fail(why, cap, "--bus-port %s: expected one bus port per unit, got a second for %s", p->arg,
-                                b->scenario.units[unit].name);
+        for (unsigned other = 0; other < i; other++)
+            if (find_unit(b, k, port[other].unit) == unit)
+                return why_fail(why, cap, "%s %s: expected one %s per unit, got a second for %s", k->option, p->arg,
+                                k->name, b->scenario.units[unit].name);
     }
     return true;
 }
@@ -253,7 +274,7 @@ static bool open_bus_port(struct ports *p, struct bench *b, const struct options
     struct bus_port *bus = calloc(1, sizeof *bus);
     if (!bus) return why_fail(why, cap, "--bus-port %s: out of memory", o->arg);
     bus->bench = b;
-    bus->unit = find_unit(b, o->unit);
+    bus->unit = find_unit(b, &bus_ports, o->unit);
     const struct board_type *type = type_of(b, bus->unit);
     const struct bus_pty_ops ops = {
         .ctx = bus, .submit = submit_cycle, .board = type->name, .addresses = type->bus->addresses, .name = name_of};
@@ -279,6 +300,51 @@ static void close_bus_port(struct bus_port *p)
 {
     bench_cycle_forget(p->bench, p->unit);
     bus_pty_close(&p->pty);
+}
+
+/* ---- serial ports of units */
+
+/* A receiver whose messages do not fit loses some of them: said at the start. */
+static void notice_unfit(struct serial_port *p)
+{
+    const struct board_serial *serial = p->unit->type->serial;
+    char unfit[120];
+    serial->unfit(p->unit->board, unfit, sizeof unfit);
+    if (!unfit[0]) return;
+    snprintf(p->notice, sizeof p->notice,
+             "messages of %s that do not fit into the period at %u bit/s, and may be lost: %s", p->unit->cfg.name,
+             serial->baud(p->unit->board), unfit);
+    p->pty.pty.link.notice = p->notice;
+}
+
+static bool open_serial_port(struct ports *p, struct bench *b, const struct options_bus *o, char *why, size_t cap)
+{
+    struct serial_port *port = calloc(1, sizeof *port);
+    if (!port) return why_fail(why, cap, "--serial %s: out of memory", o->arg);
+    port->unit = &b->unit[find_unit(b, &serial_ports, o->unit)];
+    const int err = serial_pty_open(&port->pty, &p->links, p->hub[0].lossless, o->link);
+    if (err) {
+        const struct pty pty = port->pty.pty.pty;
+        free(port);
+        return fail_pty(why, cap, "--serial ", o->arg, err, &pty);
+    }
+    port->unit->type->serial->connect(port->unit->board, serial_pty_byte, &port->pty);
+    notice_unfit(port);
+    p->serial[p->serial_count++] = port;
+    return true;
+}
+
+static bool open_serial_ports(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    for (unsigned i = 0; i < o->serial_count; i++)
+        if (!open_serial_port(p, b, &o->serial[i], why, cap)) return false;
+    return true;
+}
+
+static void close_serial_port(struct serial_port *p)
+{
+    p->unit->type->serial->connect(p->unit->board, NULL, NULL);
+    serial_pty_close(&p->pty);
 }
 
 /* ---- sockets and file */
@@ -341,15 +407,17 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     for (unsigned i = 0; i < o->can_count; i++) {
         if (!hub_of(p, o->can[i].bus)) return fail_bus(p, o->can[i].bus, why, cap);
     }
-    return instruments_check(&p->scpi, o, why, cap) && check_bus_ports(b, o, why, cap) && logic_check(b, o, why, cap) &&
+    return instruments_check(&p->scpi, o, why, cap) &&
+           check_unit_ports(b, &bus_ports, o->bus, o->bus_count, why, cap) &&
+           check_unit_ports(b, &serial_ports, o->serial, o->serial_count, why, cap) && logic_check(b, o, why, cap) &&
            mavlink_check(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
-           logic_open(&p->logic, &p->links, b, o, why, cap) && open_mavlinks(p, b, o, why, cap) &&
-           open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
+           open_serial_ports(p, b, o, why, cap) && logic_open(&p->logic, &p->links, b, o, why, cap) &&
+           open_mavlinks(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
            open_socket(&p->control, "control", o->control, why, cap) &&
            open_socket(&p->truth, "truth", o->truth, why, cap);
 }
@@ -369,6 +437,7 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->can_count; i++) close_can(p->can[i]);
     if (p->line) line_pty_close(p->line);
     for (unsigned i = 0; i < p->bus_count; i++) close_bus_port(p->bus[i]);
+    for (unsigned i = 0; i < p->serial_count; i++) close_serial_port(p->serial[i]);
     logic_close(&p->logic);
     for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_close(p->mavlink[i]);
     instruments_close(&p->scpi);
@@ -380,10 +449,11 @@ static void close_all(struct ports *p)
     for (unsigned i = 0; i < p->bus_count; i++) free(p->bus[i]);
     for (unsigned i = 0; i < p->mavlink_count; i++) mavlink_free(p->mavlink[i]);
     instruments_free(&p->scpi);
+    for (unsigned i = 0; i < p->serial_count; i++) free(p->serial[i]);
     logic_free(&p->logic);
     free(p->line);
     if (p->vcd) fclose(p->vcd);
-    p->can_count = p->bus_count = p->mavlink_count = 0;
+    p->can_count = p->bus_count = p->serial_count = p->mavlink_count = 0;
     p->line = NULL;
     p->vcd = NULL;
 }
@@ -402,6 +472,7 @@ void ports_abandon(struct ports *p)
     for (unsigned i = 0; i < p->scpi.count; i++) p->scpi.port[i]->port.pty.name = NULL;
     if (p->line) p->line->pty.name = NULL;
     for (unsigned i = 0; i < p->bus_count; i++) p->bus[i]->pty.pty.name = NULL;
+    for (unsigned i = 0; i < p->serial_count; i++) p->serial[i]->pty.pty.pty.name = NULL;
     for (unsigned i = 0; i < p->mavlink_count; i++) p->mavlink[i]->port.pty.name = NULL;
     p->control.path = p->truth.path = "";
     close_all(p);

@@ -15,6 +15,7 @@
 #include "link/ctl_sock.h"
 #include "link/line/bus_pty.h"
 #include "link/line/line_pty.h"
+#include "link/line/serial_pty.h"
 
 #include <cjson/cJSON.h>
 
@@ -41,6 +42,12 @@ struct bus_port {
     unsigned unit;
 };
 
+struct serial_port {
+    struct serial_pty pty;
+    struct unit *unit;
+    char notice[200];
+};
+
 struct ports {
     struct links links;
     struct can_hub hub[SCENARIO_BUSES_MAX]; /* one a bus */
@@ -51,6 +58,8 @@ struct ports {
     struct line_pty *line;
     struct bus_port *bus[OPTIONS_BUS_MAX];
     unsigned bus_count;
+    struct serial_port *serial[OPTIONS_SERIAL_MAX];
+    unsigned serial_count;
     struct logic_ports logic;
     struct mavlink *mavlink[OPTIONS_MAVLINK_MAX];
     unsigned mavlink_count;

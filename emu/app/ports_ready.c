@@ -74,6 +74,14 @@ static void add_line(const struct ports *p, const struct options *o, cJSON *all)
     add_pty(e, &p->line->pty);
 }
 
+static void add_serial(const struct serial_port *p, cJSON *all)
+{
+    cJSON *e = add_endpoint(all, "serial", "8n1");
+    add_key(e, "unit", p->unit->cfg.name);
+    add_number(e, "baud", p->unit->type->serial->baud(p->unit->board));
+    add_pty(e, &p->pty.pty.pty);
+}
+
 static void add_logic(const struct logic_port *p, cJSON *all)
 {
     cJSON *e = add_endpoint(all, "logic", "beaglelogic");
@@ -107,6 +115,7 @@ cJSON *ports_endpoints(const struct ports *p, const struct options *o)
         add_key(e, "unit", b->bench->scenario.units[b->unit].name);
         add_pty(e, &b->pty.pty);
     }
+    for (unsigned i = 0; i < p->serial_count; i++) add_serial(p->serial[i], all);
     for (unsigned i = 0; i < p->logic.count; i++) add_logic(p->logic.port[i], all);
     for (unsigned i = 0; i < p->mavlink_count; i++) add_mavlink(p->mavlink[i], all);
     for (unsigned k = 0; k < p->scpi.count; k++) add_instrument(p->scpi.port[k], all);

@@ -13,6 +13,8 @@
 #include "board/cfg.h"
 #include "board/field.h"
 #include "board/part.h"
+#include "board/satellite.h"
+#include "board/serial.h"
 #include "phys/sensor/mems.h"
 #include "trace/line_fault.h"
 #include "trace/trace.h"
@@ -82,6 +84,8 @@ struct board_type {
     const struct board_can *can;
     const struct board_bus *bus;           /* NULL: no parallel bus */
     const struct board_platform *platform; /* NULL: it controls none */
+    const struct board_receiver *receiver; /* NULL: it is none */
+    const struct board_serial *serial;     /* NULL: it has no serial port */
     /* life */
     void (*init)(struct board *b, const void *profile, const struct board_cfg *cfg, const struct board_io *io,
                  struct sched *s);
@@ -89,8 +93,7 @@ struct board_type {
     void (*power_down)(struct board *b, int64_t t_ns);
     void (*reset)(struct board *b, int64_t t_ns);
     bool (*ready)(const struct board *b);
-    void (*sample_until)(struct board *b,
-                         int64_t t_ns); /* takes its inputs up to now; the physics may change abruptly after */
+    void (*sample_until)(struct board *b, int64_t t_ns); /* takes its inputs; then the physics may change abruptly */
     /* Why it computes what no one looks at from t_ns on; a sentence without its end. NULL: it does not. No function: always. */
     const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */

@@ -4,6 +4,7 @@
 
 #include "base/looks.h"
 #include "board/afe.h"
+#include "phys/receiver/place.h"
 
 #include <stdint.h>
 
@@ -36,6 +37,7 @@ struct board_io {
      * smooth, if nothing changes abruptly before. */
     void (*kinematics)(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3]);
     int64_t (*smooth_ns)(void *ctx, int64_t t_ns);
+    place_at_fn *place;                                     /* of the unit's antenna */
     void (*event)(void *ctx, unsigned event, int64_t t_ns); /* number in board_type.events; may be NULL */
     /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
     double (*supply_ratio)(void *ctx, int64_t t_ns);

@@ -46,6 +46,10 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_OVERSHOOT_K] = {"overshoot_k", CONTROL_REAL, true, "K", 0.1, 50, .what = "how far the chamber's air goes past its set point"},
     [FAULT_SLIP_DEG] = {"slip_deg", CONTROL_REAL, true, "deg", -10, 10, .what = "by which each turn leaves the mount short of the head's scale", .least = 1e-3},
     [FAULT_LATE_S] = {"late_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "delay of an instrument's answers, simulated time"},
+    [FAULT_RAMP_MPS] = {"ramp_mps", CONTROL_REAL, true, "m/s", -1000, 1000, .what = "speed at which a receiver's position runs away", .least = 0.01},
+    [FAULT_JUMP_M] = {"jump_m", CONTROL_REAL, true, "m", -1e5, 1e5, .what = "step of a receiver's position", .least = 0.1},
+    [FAULT_AZIMUTH_DEG] = {"azimuth_deg", CONTROL_REAL, true, "deg", -360, 360, .what = "direction from north, clockwise; default: 0, north"},
+    [FAULT_WEEKS] = {"weeks", CONTROL_REAL, true, NULL, -1024, 1024, .what = "whole weeks by which a receiver's date is off; -1024: a rollover of the GPS week", .least = 1},
 };
 // clang-format on
 _Static_assert(FAULT_ARGS <= CONTROL_ARGS_MAX, "all values of a command fit");

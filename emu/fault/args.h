@@ -53,6 +53,10 @@ enum fault_arg {
     FAULT_OVERSHOOT_K,
     FAULT_SLIP_DEG,
     FAULT_LATE_S,
+    FAULT_RAMP_MPS,
+    FAULT_JUMP_M,
+    FAULT_AZIMUTH_DEG,
+    FAULT_WEEKS,
     FAULT_ARGS
 };
 

@@ -8,9 +8,9 @@
 
 /* ---- kinds: a new table is named here, a new kind is a row of its layer's file */
 
-static const struct fault_table *const tables[] = {&fault_sensor,     &fault_analog, &fault_chip,
-                                                   &fault_controller, &fault_line,   &fault_link,
-                                                   &fault_lab,        &fault_scpi,   NULL};
+static const struct fault_table *const tables[] = {&fault_sensor,   &fault_analog, &fault_chip, &fault_controller,
+                                                   &fault_line,     &fault_link,   &fault_lab,  &fault_scpi,
+                                                   &fault_receiver, NULL};
 
 const struct fault_kind *fault_kind(unsigned i)
 {

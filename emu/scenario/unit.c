@@ -422,6 +422,23 @@ bool scenario_load_units(struct yaml_file *f, const struct yaml_node *node, void
     return true;
 }
 
+/* The place of an antenna has to be known (unit.c). */
+static bool check_antenna(struct yaml_file *f, const struct yaml_node *units, const struct scenario_unit *u)
+{
+    const double *const lever_m = u->cfg.mounting.lever_m;
+    if (u->cfg.mounting.on == LAB_PLATFORM)
+        return yaml_file_fail(
+            f, units, "units",
+            "%s: expected a receiver at the site or on flight, got one on the platform, whose vehicle "
+            "has no longitude",
+            u->name);
+    if (lever_m[0] != 0.0 || lever_m[1] != 0.0 || lever_m[2] != 0.0)
+        return yaml_file_fail(
+            f, units, "units",
+            "%s: expected lever_arm_m of [0, 0, 0] for a receiver, whose antenna has none, got another", u->name);
+    return true;
+}
+
 bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, const struct scenario *s)
 {
     for (unsigned i = 0; i < s->unit_count; i++) {
@@ -434,6 +451,7 @@ bool scenario_check_seats(struct yaml_file *f, const struct yaml_node *root, con
         if (!there)
             return yaml_file_fail(f, yaml_get(root, "units"), "units",
                                   "%s: expected a section %s to mount it on, got none", u->name, on);
+        if (u->cfg.type->receiver && !check_antenna(f, yaml_get(root, "units"), u)) return false;
     }
     return true;
 }

@@ -8,10 +8,11 @@
 #include "board/pmka/board.h"
 #include "board/psa2/board.h"
 #include "board/psd1/board.h"
+#include "board/receiver/board.h"
 
 /* The types, the default one first. X(NAME): board/NAME/board.h has struct NAME, struct NAME_can, struct NAME_profile and the
  * board_type NAME_board. */
-#define BOARD_TYPES(X) X(psa2) X(psd1) X(pmka) X(pik) X(gyro) X(bins)
+#define BOARD_TYPES(X) X(psa2) X(psd1) X(pmka) X(pik) X(gyro) X(bins) X(receiver)
 
 /* Other names for a type with one of its profiles. X(name, type, title); the profile is proto/profiles/<name>.yaml. */
 #define BOARD_ALIASES(X) X(psa1, psa2, "PSA-1") X(pik5, pik, "PIK-5") X(pik6, pik, "PIK-6")

@@ -211,6 +211,22 @@ static int64_t smooth_ns(void *ctx, int64_t t_ns)
     return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
 }
 
+/* The antenna of a unit is at the origin of the aircraft that carries it, else at the site. */
+static void place_at(void *ctx, int64_t t_ns, struct place *out)
+{
+    const struct unit *u = ctx;
+    const struct site *s = &u->lab->site;
+    struct flight_state at;
+    if (u->cfg.mounting.on != LAB_FLIGHT) {
+        *out =
+            (struct place){.lat_rad = s->latitude_rad, .lon_rad = det_wrap_rad(s->longitude_rad), .h_m = s->height_m};
+        return;
+    }
+    flight_at(&u->lab->flight, t_ns, &at);
+    *out = (struct place){.lat_rad = at.lat_rad, .lon_rad = det_wrap_rad(at.lon_rad), .h_m = at.h_m};
+    memcpy(out->v_n_mps, at.v_enu_mps, sizeof at.v_enu_mps);
+}
+
 /* To what the scenario has it at power-on. */
 static double supply_ratio(void *ctx, int64_t t_ns)
 {
@@ -307,6 +323,7 @@ static void init_board(struct unit *u, struct sched *s)
     io.skip_accel = skip_accel;
     io.kinematics = case_kinematics;
     io.smooth_ns = smooth_ns;
+    io.place = place_at;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;

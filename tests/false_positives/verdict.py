@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from psabench.boards.registry import BUS_BOARDS
+from psabench.boards.registry import BOARDS, BUS_BOARDS
 from psabench.conform import runner
 from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
 from psabench.conform.profile import variant
@@ -108,7 +108,7 @@ def real_time(case: Case, loops: int, only: Sequence[str]) -> list[Outcome]:
             lines=line,
             bus_port=bus if has_bus else None,
             scpi=scpi_addresses(emulator.endpoints),
-            inputs_v={} if v.family == "gyro" else INPUTS_V,
+            inputs_v=INPUTS_V if BOARDS[v.family].has_inputs else {},
         )
         stack.enter_context(busy(loops))
         with Dut.open(v, at) as dut:

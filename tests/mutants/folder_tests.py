@@ -31,6 +31,7 @@ TESTS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "emu/board/pmka/": (("board/pmka/test_*.c",), ("tests/e2e/boards/test_pmka.py",)),
     "emu/board/pik/": (("board/pik/test_*.c",), ("tests/e2e/boards/test_bus_cycles.py",)),
     "emu/board/gyro/": (("board/gyro/test_*.c",), ("tests/e2e/boards/test_gyro.py",)),
+    "emu/board/receiver/": (("board/receiver/test_*.c",), ("tests/e2e/boards/test_receiver.py",)),
     "emu/board/": (("board/test_*.c", "unit/test_*.c"), ("tests/e2e/boards/test_bus_cycles.py",)),
     "emu/canopen/": (("canopen/test_*.c", "board/test_node*.c"), ("tests/e2e/boards/test_canopen.py",)),
     "emu/link/": (("link/test_*.c",), ("tests/e2e/faults/test_bad_lines.py", "tests/e2e/boards/test_cycles.py")),

@@ -19,6 +19,7 @@ ON: tuple[tuple[str, str], ...] = (
     ("emu/board/pmka/", "pmka"),
     ("emu/board/pik/", "pik"),
     ("emu/board/gyro/", "gyro"),
+    ("emu/board/receiver/", "receiver"),
     ("emu/board/", "pmka"),
     ("emu/canopen/", "psa2"),
     ("emu/link/can/", "psa2"),

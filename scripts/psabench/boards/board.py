@@ -92,6 +92,7 @@ class Board:
     has_inputs: bool = True  # volts can be put on its inputs
     has_thermometer: bool = False  # its temperatures are compared with a chamber's
     on_table: bool = False  # it has gyros
+    on_platform: bool = False  # it controls one, and reads its level from a PSA-2
     session: Session | None = None  # what PulseView and GTKWave show of its lines at first; None: no such files
     schedule_s: float = 1.0  # simulated time of a schedule of psabench explore
     overdrive_v_per_g: float = 0.0  # of the accelerometer X, which a dividing head turns beyond full scale

@@ -131,3 +131,12 @@ class BinsObjects(Common):
     NAV_START = 0x2212
     WEIGHTS = 0x2220
     TIMING = 0x2221
+
+
+class ReceiverObjects(Common):
+    """Of a RECEIVER unit."""
+
+    SOLUTION = 0x2200
+    READING = 0x2202
+    ACCURACY = 0x2220
+    PORT = 0x2221

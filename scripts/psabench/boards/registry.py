@@ -11,8 +11,9 @@ from psabench.boards.pik.board import BOARD as PIK
 from psabench.boards.pmka.board import BOARD as PMKA
 from psabench.boards.psa2.board import BOARD as PSA2
 from psabench.boards.psd1.board import BOARD as PSD1
+from psabench.boards.receiver.board import BOARD as RECEIVER
 
-BOARDS: Mapping[str, Board] = {board.name: board for board in (PSA2, PSD1, PMKA, PIK, GYRO, BINS)}
+BOARDS: Mapping[str, Board] = {board.name: board for board in (PSA2, PSD1, PMKA, PIK, GYRO, BINS, RECEIVER)}
 ALIASES: Mapping[str, str] = {alias: board.name for board in BOARDS.values() for alias in board.aliases}
 NAMES = (*BOARDS, *ALIASES)
 BUS_BOARDS = tuple(name for name, board in BOARDS.items() if board.bus)  # boards with a parallel bus

@@ -320,7 +320,8 @@ def scenario(
     """A bench around one board: known volts at its inputs, a supply that can be switched.
 
     clock_ppm: by how much the board's clocks are fast; still: the specimen's crystal adds nothing to it. A gyro unit
-    has no inputs: it has its platform, on a parked vehicle, and the PSA-2 on it that it reads the level from.
+    has no inputs: it has its platform, on a parked vehicle, and the PSA-2 on it that it reads the level from. A
+    receiver has none, either: it is at the bench's site.
     """
     axes = {axis: {"sensor": "mems", "u0_v": v, **dict.fromkeys(SENSITIVITIES, 0.0)} for axis, v in inputs_v.items()}
     unit: dict[str, Any] = {"name": UNIT, "board": variant.family, "profile": variant.profile, "axes": axes}
@@ -332,6 +333,7 @@ def scenario(
         unit["profile_set"] = clocks
     if not board.has_inputs:
         del unit["axes"]
+    if board.on_platform:
         return {"supply": {}, "start": True, **PLATFORM, "units": [unit | {"level": LEVEL["name"]}, LEVEL]}
     around: dict[str, Any] = {"chamber": {}} if board.has_thermometer else {}
     if board.on_table:

@@ -26,13 +26,14 @@ HOLD = {**LEAK, "hold_s": (0.0003, 0.002, 0.01)}
 class Rule:
     """holds: what must hold while it is on. values: choices for each argument. not_at: endings of points left out.
 
-    is_once: it is over at once, and has no duration.
+    is_once: it is over at once, and has no duration. board: the only one that has it, where a point does not say so.
     """
 
     holds: str
     values: Mapping[str, tuple[Any, ...]]
     not_at: tuple[str, ...] = ()
     is_once: bool = False
+    board: str | None = None
 
 
 RULES: Mapping[str, Rule] = {
@@ -72,6 +73,11 @@ RULES: Mapping[str, Rule] = {
     "platform.torquer": Rule(READINGS, {}),
     "platform.drift_step": Rule(READINGS, {"drift_degph": (0.1, 100.0)}),
     "platform.encoder_stuck": Rule(READINGS, {}),
+    "receiver.outage": Rule(READINGS, {}, board="receiver"),
+    "receiver.spoof": Rule(VALUES, {"ramp_mps": (0.5, 30.0)}, board="receiver"),
+    "receiver.jump": Rule(VALUES, {"jump_m": (5.0, 1000.0)}, board="receiver"),
+    "receiver.frozen_time": Rule(READINGS, {}, board="receiver"),
+    "receiver.wrong_week": Rule(READINGS, {"weeks": (1, -1024)}, board="receiver"),
 }
 
 # Kinds that are not tried, and why.
@@ -89,6 +95,7 @@ LEFT_OUT: Mapping[str, str] = {
     "scpi.silent": "the host speaks to no instrument by SCPI",
     "scpi.late": "the host speaks to no instrument by SCPI",
     "scpi.garbled": "the host speaks to no instrument by SCPI",
+    "receiver.bad_checksum": "no requirement is about the serial port",
 }
 
 

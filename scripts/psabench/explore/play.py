@@ -200,7 +200,7 @@ def catalogue_of(board: str, profile: str, length_s: float) -> Catalogue:
     """What schedules of a board and of this length can consist of, as the emulator and the dictionary say."""
     v = variant(board, profile)
     with Dut.open(v, Addresses()) as s:
-        points = {kind: _points_of(s, kind) for kind in RULES}
+        points = {kind: _points_of(s, kind) for kind, rule in RULES.items() if rule.board in (None, v.family)}
         entries = [Entry(d.index, d.sub, d.data_bytes or 0, d.access) for d in s.unit.node.objects()]
         node = s.node
     names = short_looks(v, length_s)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from psabench.boards.registry import BUS_BOARDS
+from psabench.boards.registry import BOARDS, BUS_BOARDS
 from psabench.conform import suite
 from psabench.conform.dut import INPUTS_V, UNIT, Addresses, Dut, scenario
 from psabench.conform.profile import Variant, variant
@@ -71,7 +71,7 @@ def in_real_time(v: Variant, folder: Path) -> Iterator[Dut]:
             lines=line,
             bus_port=bus if v.family in BUS_BOARDS else None,
             scpi=scpi_addresses(emulator.endpoints),
-            inputs_v={} if v.family == "gyro" else INPUTS_V,
+            inputs_v=INPUTS_V if BOARDS[v.family].has_inputs else {},
         )
         with Dut.open(v, at) as dut:
             yield dut

@@ -31,6 +31,7 @@ assert ALIASES, "emu/unit/boards.h: expected a list of aliases"
 ALL = sorted(NAMES)
 LINE_BYTES = 190_000  # 0.1 s at 2 MHz, but for what is not known yet at its end
 SETUP_S = 0.4  # of the slowest board
+NO_INPUTS = ("gyro", "receiver")
 PLATFORM = "site: {latitude_deg: 50}\nplatform: {}\n"  # what a gyro unit controls
 GENTLE = "seed: 3\nhead: {turn_s: 0}\nunits:\n"
 SENSORS = (
@@ -42,7 +43,7 @@ def scenario(folder: Path, *boards: str) -> Path:
     """One unit of each of these boards, on one bus."""
     path = folder / "boards.yaml"
     head = f"{PLATFORM}{GENTLE}" if "gyro" in boards else GENTLE
-    sensors = {b: "" if b == "gyro" else f"{SENSORS}, " for b in boards}  # it has no inputs of its own
+    sensors = {b: "" if b in NO_INPUTS else f"{SENSORS}, " for b in boards}
     path.write_text(head + "".join(f"  - {{name: {b}, {sensors[b]}board: {b}}}\n" for b in boards))
     return path
 

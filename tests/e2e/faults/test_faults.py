@@ -76,6 +76,8 @@ ELSEWHERE = (
     *("controller.capacitor", "controller.stuck_reset", "controller.stuck_key"),  # test_faults_boards.py
     *("platform.torquer", "platform.drift_step", "platform.encoder_stuck"),  # test_gyro.py
     *("chamber.slow", "chamber.readout", "chamber.overshoot", "table.ripple"),  # test_faults_instruments.py
+    *("receiver.outage", "receiver.spoof", "receiver.jump"),  # test_receiver.py
+    *("receiver.frozen_time", "receiver.bad_checksum", "receiver.wrong_week"),
 )
 EVERYWHERE = ("head.stick", "head.slip", "scpi.silent", "scpi.late", "scpi.garbled")  # the same file
 

@@ -195,11 +195,13 @@ def test_a_second_emulator_is_refused_by_the_pid_of_the_first(kind: str, tmp_pat
     assert psa_emu("stream", "--quiet", "--for", SHORT, *OUTPUTS[kind].options(str(path))).returncode == 0
 
 
-@pytest.mark.parametrize("option", ["--can=slcan:{}", "--line={}", "--bus-port={}", "--scpi=head:pty:{}"])
+@pytest.mark.parametrize(
+    "option", ["--can=slcan:{}", "--line={}", "--bus-port={}", "--serial={}", "--scpi=head:pty:{}"]
+)
 def test_a_link_that_an_emulator_serves_is_refused_and_a_stale_one_is_replaced(option: str, tmp_path: Path) -> None:
     link = tmp_path / "link"
     name, value = option.format(link).split("=")
-    scenario = "converters" if name == "--bus-port" else "calibrate"
+    scenario = {"--bus-port": "converters", "--serial": "receiver"}.get(name, "calibrate")
     extra = [name, value] if name == "--can" else [name, value, "--can", "none"]
     argv = [str(find_emulator()), scenario, "--quiet", *extra]
     with subprocess.Popen([*argv, "--until-eof"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as first:

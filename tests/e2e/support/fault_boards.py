@@ -69,6 +69,7 @@ ACCEPTED = {
     "link": r"[dmp]\.can|bus\.can0|client\.\d+",
     "supply": r"supply",
     "platform": r"platform\..*",  # there is none here
+    "receiver": r".*\.solver",  # there is none here
     "chamber": r"chamber",  # nor this
     "table": r"table\.\d",  # nor this
     "head": r"head",

@@ -39,6 +39,9 @@ VALUES: dict[str, dict[str, object]] = {
     "chamber.overshoot": {"overshoot_k": 1},
     "head.slip": {"slip_deg": 1},
     "scpi.late": {"late_s": 1},
+    "receiver.spoof": {"ramp_mps": 1},
+    "receiver.jump": {"jump_m": 1},
+    "receiver.wrong_week": {"weeks": 1},
 }
 
 

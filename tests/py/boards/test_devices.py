@@ -112,7 +112,7 @@ def test_boards_and_their_other_names(board: str, kind: type[Unit]) -> None:
 
 
 def test_a_board_that_nobody_knows_is_a_bad_argument() -> None:
-    with pytest.raises(ValueError, match="board: expected psa2, psd1, pmka, pik, gyro, bins, got 'psa3'"):
+    with pytest.raises(ValueError, match="board: expected psa2, psd1, pmka, pik, gyro, bins, receiver, got 'psa3'"):
         of_board("psa3")
 
 

@@ -28,7 +28,8 @@ from psabench.places import find_emulator
 
 SEED = 23
 SCHEDULE_S = 2 * 3600 / 10_000  # of one core
-COUNT = {"psa2": 25, "psd1": 15, "pik": 15, "pmka": 15, "gyro": 5, "bins": 10}
+OF_TWO_BOARDS = {"psa2": "article", "receiver": "receiver"}  # and a profile of it
+COUNT = {"psa2": 25, "psd1": 15, "pik": 15, "pmka": 15, "gyro": 5, "bins": 10, "receiver": 8}
 
 
 def search(board: str = "psa2", seed: int = SEED) -> Search:
@@ -195,6 +196,15 @@ def test_a_catalogue_has_looks_points_and_objects() -> None:
     assert any(p.startswith("a.line.") for p in c.points["line.stuck"])
     assert not any(p.startswith("client") for points in c.points.values() for p in points)
     assert json.dumps([e.index for e in c.entries])
+
+
+def test_faults_of_a_receiver_are_drawn_for_no_other_board() -> None:
+    """fault.points knows places alone: the controller of each board is one."""
+    points = {board: catalogue_of(board, profile, 1.0).points for board, profile in OF_TWO_BOARDS.items()}
+    assert not [kind for kind in points["psa2"] if kind.startswith("receiver.")]
+    assert {kind: at for kind, at in points["receiver"].items() if kind.startswith("receiver.")} == {
+        kind: ["a.solver"] for kind in RULES if kind.startswith("receiver.")
+    }
 
 
 @pytest.mark.parametrize("length_s", [0.02, 0.1])

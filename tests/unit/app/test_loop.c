@@ -51,6 +51,12 @@ static void say(const char *text)
     (void)text;
 }
 
+static void on_moved_nothing(void *ctx, int64_t now_ns)
+{
+    (void)ctx;
+    (void)now_ns;
+}
+
 static void start(struct loop_rig *r)
 {
     static const struct text_link_cfg cfg = {
@@ -192,6 +198,35 @@ static void time_strides_only_while_all_boards_sleep(void **state)
     assert_true(longest_stride_ns(1) >= 20000000);
 }
 
+/* ---- wall pace */
+
+enum { IDLE_MS = 600 };
+_Static_assert(IDLE_MS *INT64_C(1000000) > PACE_SLIP_NS + PACE_REST_NS / 2,
+               "longer than what counts as falling behind");
+
+/* The sleep is no falling behind: nothing is late, and time is where it should be. */
+static void in_wall_pace_time_goes_on_while_nothing_happens(void **state)
+{
+    static const volatile sig_atomic_t stop = 0;
+    static struct loop_rig r;
+    (void)state;
+    sched_init(&r.sched);
+    pace_init(&r.pace, PACE_WALL);
+    r.counter = (struct link){.fd = -1, .flush = on_turn, .timer = on_timer, .timer_ms = IDLE_MS, .ctx = &r};
+    links_add_last(&r.links, &r.counter);
+    r.loop = (struct loop){.sched = &r.sched,
+                           .pace = &r.pace,
+                           .links = &r.links,
+                           .end_ns = SCHED_NEVER,
+                           .moved = on_moved_nothing,
+                           .say = say,
+                           .ctx = &r};
+    loop_run(&r.loop, &stop);
+    assert_int_equal(r.pace.slips, 0);
+    assert_true(r.sched.now_ns >= PACE_SLIP_NS - PACE_REST_NS);
+    assert_in_range(r.turns, 1, IDLE_MS * INT64_C(1000000) / PACE_BATCH_NS + TURNS_MAX); /* it catches up in batches */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -199,6 +234,7 @@ int main(void)
         cmocka_unit_test(each_client_is_heard_and_answered),
         cmocka_unit_test(who_writes_and_closes_is_heard),
         cmocka_unit_test(time_strides_only_while_all_boards_sleep),
+        cmocka_unit_test(in_wall_pace_time_goes_on_while_nothing_happens),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

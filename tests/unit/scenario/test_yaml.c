@@ -438,11 +438,12 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
     assert_string_equal(
-        why, "nope: expected a path or a name from proto/scenarios: "
-             "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, flight, "
-             "gyrocompass, gyrocompass_ideal, "
-             "multi, quartz_chamber, quartz_run_in, quiet, realistic, sins_coarse, sins_secondary, sins_table, "
-             "six_positions, stream, table_rate");
+        why,
+        "nope: expected a path or a name from proto/scenarios: "
+        "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, flight, "
+        "gyrocompass, gyrocompass_ideal, "
+        "multi, quartz_chamber, quartz_run_in, quiet, realistic, receiver, sins_coarse, sins_secondary, sins_table, "
+        "six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }

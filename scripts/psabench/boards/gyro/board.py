@@ -26,6 +26,7 @@ BOARD = Board(
     port_lines=LINES,
     beat=Beat(rows={"GYRO-CAN-02": "period_us"}, line="STEP", level=1, message="GYRO_ANGLES", counter="STEP"),
     setting=Setting(index=GyroObjects.RUN, sub=1, value=bytes([2])),
-    has_inputs=False,  # it is on a platform; it counts its seconds by its steps: no clock to be off
+    has_inputs=False,
+    on_platform=True,  # it counts its seconds by its steps: no clock to be off
     session=SESSION,
 )

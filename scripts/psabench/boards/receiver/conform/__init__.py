@@ -1,0 +1,1 @@
+"""The conformance tests of the receiver: stimulus and check."""
