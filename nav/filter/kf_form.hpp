@@ -22,10 +22,9 @@ struct kf_used { /* columns of some rows that are not zero */
     int at[KF_MAX];
 };
 
-/* Phi's moving rows, dynamic x n, the caller's; what all of them use, and what each group of rows does. */
+/* Phi's moving rows, dynamic x n, the caller's, and what each group of rows uses. */
 struct kf_phi {
     const double *rows;
-    struct kf_used all;
     struct kf_used group[(KF_MAX + KF_GROUP - 1) / KF_GROUP];
 };
 
@@ -50,10 +49,17 @@ struct kf_gain {
 /* P = U D U': ut row j holds column j of U. False: an eigenvalue is negative. p and ut may be the same. */
 bool kf_factor(int n, const double *p, double *ut, double *d);
 
-void kf_list_used(int rows, int n, const double *a, struct kf_used *used);
+/* Moving rows of the group that begins with row i. */
+inline int kf_group(const struct nav_kf *kf, int i)
+{
+    return kf->dynamic - i < KF_GROUP ? kf->dynamic - i : KF_GROUP;
+}
+
+void kf_list_used(int rows, int n, const double *a, struct kf_used *used); /* rows > 0 */
 double kf_dot(int n, const double *a, const double *b);
 void kf_take_phi(struct nav_kf *kf, const double *rows);
-void kf_move(const struct nav_kf *kf, const double *a, int count, double *y); /* Phi a of the first `count` of phi.all */
+/* Phi a of `count` columns. */
+void kf_move(const struct nav_kf *kf, const double *a, const int *at, int count, double *y);
 
 /* Measurements by groups of KF_GROUP, so that P is read once and written once: products of all, then for each what the ones
  * before it leave of its gain and, once it is taken, its part of P; then the parts are subtracted. */

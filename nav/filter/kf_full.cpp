@@ -47,9 +47,8 @@ static void add_moving(const struct nav_kf *kf, const double *p, int columns, do
 {
     for (int i = 0; i < kf->dynamic; i += KF_GROUP) {
         const struct kf_used *used = &kf->phi.group[i / KF_GROUP];
-        const int rows = kf->dynamic - i < KF_GROUP ? kf->dynamic - i : KF_GROUP;
-        add_rows(kf, {rows, columns, used->count, used->at, kf->phi.rows + i * kf->n, p, y + i * y_stride, kf->n,
-                      kf->stride, y_stride});
+        add_rows(kf, {kf_group(kf, i), columns, used->count, used->at, kf->phi.rows + i * kf->n, p, y + i * y_stride,
+                      kf->n, kf->stride, y_stride});
     }
 }
 

@@ -101,6 +101,7 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
 {
     const int n = kf->n;
     const int nd = kf->dynamic;
+    struct kf_used all = {0, {0}};
     int used = 0;
     double uq[KF_MAX * KF_MAX];
     double weight[2 * KF_MAX];
@@ -108,11 +109,12 @@ bool kf_ud_predict(struct nav_kf *kf, const double *q)
     memset(w, 0, sizeof *w * (size_t)nd);
     memset(weight, 0, sizeof weight);
     if (!kf_factor(nd, q, uq, weight + nd)) return false;
+    if (nd > 0) kf_list_used(nd, n, kf->phi.rows, &all);
     for (int j = 0; j < n; j++) {
         double *col = kf->p + j * n;
         double moved[KF_MAX];
-        while (used < kf->phi.all.count && kf->phi.all.at[used] <= j) used++;
-        kf_move(kf, col, used, moved);
+        while (used < all.count && all.at[used] <= j) used++;
+        kf_move(kf, col, all.at, used, moved);
         for (int i = 0; i < nd; i++) (j < nd ? w[i][j] : col[i]) = moved[i];
     }
     for (int j = 0; j < nd; j++) {
