@@ -110,8 +110,8 @@ static int check_measurement(const nav_kf *kf, const double *h, double z, double
     return r > 0.0 ? NAV_OK : NAV_RANGE;
 }
 
-static int innovation(const nav_kf *kf, const double *h, double z, const struct kf_gain *g,
-                      struct nav_kf_innovation *out)
+static int find_innovation(const nav_kf *kf, const double *h, double z, const struct kf_gain *g,
+                           struct nav_kf_innovation *out)
 {
     if (!(g->variance > 0.0)) return NAV_SINGULAR;
     out->variance = g->variance;
@@ -136,7 +136,7 @@ int nav_kf_innovate(const nav_kf *kf, const double *h, double z, double r, struc
         kf_full_products(kf, h, 1, &g);
         kf_full_gain(kf, h, r, &g, 0);
     }
-    status = innovation(kf, h, z, &g, &found);
+    status = find_innovation(kf, h, z, &g, &found);
     if (status == NAV_OK) *out = found;
     return status;
 }
@@ -148,7 +148,7 @@ static int update_ud(nav_kf *kf, const double *h, double z, double r, struct nav
     int status = check_measurement(kf, h, z, r);
     if (status != NAV_OK) return status;
     kf_ud_gain(kf, h, r, &g);
-    status = innovation(kf, h, z, &g, &found);
+    status = find_innovation(kf, h, z, &g, &found);
     if (status != NAV_OK) return status;
     step_state(kf, &g, &found);
     kf_ud_update(kf, r, &g);
@@ -170,7 +170,7 @@ static int update_full(nav_kf *kf, const double *h, const double *z, const doubl
         status = check_measurement(kf, row, z[done], r[done]);
         if (status != NAV_OK) break;
         kf_full_gain(kf, row, r[done], g, done);
-        status = innovation(kf, row, z[done], &g[done], &found);
+        status = find_innovation(kf, row, z[done], &g[done], &found);
         if (status != NAV_OK) break;
         step_state(kf, &g[done], &found);
         kf_full_take(kf, &g[done]);
