@@ -38,6 +38,7 @@ struct board_io {
     void (*kinematics)(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3]);
     int64_t (*smooth_ns)(void *ctx, int64_t t_ns);
     place_at_fn *place;                                     /* of the unit's antenna */
+    double (*baro_m)(void *ctx, int64_t t_ns);              /* height that the altimeter beside the unit shows */
     void (*event)(void *ctx, unsigned event, int64_t t_ns); /* number in board_type.events; may be NULL */
     /* The voltage that feeds the unit, to its nominal one. NULL: the bench has no supply. */
     double (*supply_ratio)(void *ctx, int64_t t_ns);

@@ -9,7 +9,7 @@
 #include "base/can/can.h"
 #include "canopen/co_od.h"
 
-#define CO_TPDO_MAX    8u
+#define CO_TPDO_MAX    9u
 #define CO_PDO_BACKLOG 16u /* frames that may wait for the bus */
 
 struct co_node;

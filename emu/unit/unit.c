@@ -227,6 +227,12 @@ static void place_at(void *ctx, int64_t t_ns, struct place *out)
     memcpy(out->v_n_mps, at.v_enu_mps, sizeof at.v_enu_mps);
 }
 
+static double baro_m(void *ctx, int64_t t_ns)
+{
+    const struct unit *u = ctx;
+    return u->cfg.mounting.on == LAB_FLIGHT ? flight_baro_m(&u->lab->flight, t_ns) : u->lab->site.height_m;
+}
+
 /* To what the scenario has it at power-on. */
 static double supply_ratio(void *ctx, int64_t t_ns)
 {
@@ -324,6 +330,7 @@ static void init_board(struct unit *u, struct sched *s)
     io.kinematics = case_kinematics;
     io.smooth_ns = smooth_ns;
     io.place = place_at;
+    io.baro_m = baro_m;
     if (is_recorded(u)) io.accel = recorded_row;
     if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
     if (u->lab->platform.cfg.present) io.platform = &platform_io;

@@ -51,9 +51,17 @@ struct bins_counters {
     uint32_t saturated;      /* readings with a word at its limit */
 };
 
+/* Barometric height at the end of a reading. */
+struct bins_baro {
+    uint16_t seq;
+    int32_t height_mm;
+    int64_t t_ns;
+};
+
 struct bins_host {
     void *ctx;
     void (*reading)(void *ctx, const struct bins_reading *r, int64_t t_ns);
+    void (*baro)(void *ctx, const struct bins_baro *b, int64_t t_ns); /* after its reading */
     void (*navigated)(void *ctx, int64_t t_ns);            /* after the reading: outputs of bins.nav are due */
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns); /* enum psa2_fault */
 };
@@ -99,6 +107,7 @@ struct bins {
     struct bins_sums sums;
     struct bins_counters counters;
     struct bins_reading latest;
+    struct bins_baro baro; /* the latest */
     uint16_t temp_code[4];
     struct bins_nav nav;
 };

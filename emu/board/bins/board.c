@@ -150,6 +150,8 @@ static void add_digest(const struct board *board, struct sha256 *s)
     add_sums(s, &b->sums);
     add_latest(s, &b->latest);
     add_nav(s, &b->nav);
+    board_digest_u64(s, (uint64_t)b->baro.seq << 32 | (uint32_t)b->baro.height_mm);
+    board_digest_u64(s, (uint64_t)b->baro.t_ns);
     sha256_add(s, &b->counters, sizeof b->counters);
     for (unsigned i = 0; i < 4; i++) board_digest_u64(s, b->temp_code[i]);
 }

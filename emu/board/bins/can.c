@@ -36,6 +36,11 @@ static struct psabench_bins_gyro_z_t gyro_z_of(const struct bins_reading *r)
     };
 }
 
+static uint16_t stamp_ms(int64_t t_ns)
+{
+    return (uint16_t)((t_ns + 500000) / 1000000);
+}
+
 static void end_conditions(struct board_node *n, const struct bins_reading *r, int64_t t_ns)
 {
     co_node_error_end(&n->node, BINS_EMCY_ACCEL_PORT, t_ns);
@@ -58,6 +63,14 @@ static void on_reading(void *ctx, const struct bins_reading *r, int64_t t_ns)
     board_node_stream(n, BINS_GYRO_XY_TPDO, m, FRAMES, t_ns);
 }
 
+static void on_baro(void *ctx, const struct bins_baro *b, int64_t t_ns)
+{
+    struct can_msg m = {0};
+    const struct psabench_bins_baro_t baro = {b->height_mm, b->seq, stamp_ms(b->t_ns)};
+    m.len = (uint8_t)psabench_bins_baro_pack(m.data, &baro, sizeof m.data);
+    board_node_stream(ctx, BINS_BARO_TPDO, &m, 1, t_ns);
+}
+
 /* ---- the unit's own navigation ---- */
 
 static double limited_to(double x, double limit)
@@ -77,7 +90,7 @@ static void nav_fields(const struct bins *b, double field[BINS_NAV_FIELDS])
     field[4] = (uint16_t)(n->since / n->every + 1);
     for (unsigned i = 0; i < 4; i++) field[5 + i] = limited_to(n->q[i] * 32768.0, 32768.0);
     for (unsigned i = 0; i < 3; i++) field[9 + i] = limited_to(w_radps[i] / RAD_PER_DEG / 0.004, 32768.0);
-    field[12] = (uint16_t)((n->t_ns + 500000) / 1000000);
+    field[12] = stamp_ms(n->t_ns);
 }
 
 static void on_navigated(void *ctx, int64_t t_ns)
@@ -140,6 +153,13 @@ static double read_timing(const struct board_node *n, const struct co_entry *e)
     return (double)value[e->sub];
 }
 
+static double read_baro(const struct board_node *n, const struct co_entry *e)
+{
+    const struct bins_baro *b = &bins_of(n)->baro;
+    const double value[] = {0.0, b->height_mm, b->seq, stamp_ms(b->t_ns)};
+    return value[e->sub];
+}
+
 static double read_nav(const struct board_node *n, const struct co_entry *e)
 {
     return ((const struct bins_can *)(const void *)n)->nav[e->sub - 1];
@@ -199,6 +219,7 @@ static const struct board_object objects[] = {
     {BINS_OD_TEMPERATURES, .value = read_temperature},
     {BINS_OD_WEIGHTS, .value = read_weight},
     {BINS_OD_TIMING, .value = read_timing},
+    {BINS_OD_BARO, .value = read_baro},
     {BINS_OD_NAV, .value = read_nav},
     {BINS_OD_NAV_MODE, .value = read_nav_mode, .write = write_nav_mode},
     {BINS_OD_NAV_START, .value = read_nav_start, .write = write_nav_start},
@@ -216,8 +237,8 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
                      struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    ((struct bins *)board)->host =
-        (struct bins_host){.ctx = can, .reading = on_reading, .navigated = on_navigated, .fault = on_fault};
+    ((struct bins *)board)->host = (struct bins_host){
+        .ctx = can, .reading = on_reading, .baro = on_baro, .navigated = on_navigated, .fault = on_fault};
 }
 
 const struct board_can bins_can = {.size = sizeof(struct bins_can), .init = init_can, BOARD_NODE_LIFE};

@@ -129,6 +129,7 @@ class BinsObjects(Common):
     NAV = 0x2210
     NAV_MODE = 0x2211
     NAV_START = 0x2212
+    BARO = 0x2213
     WEIGHTS = 0x2220
     TIMING = 0x2221
 

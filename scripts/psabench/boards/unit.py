@@ -177,9 +177,7 @@ class Unit:
 
 def tpdos_of(node: CanopenNode) -> dict[str, int]:
     """Index of the communication parameters of each message."""
-    return {
-        node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k for k in range(8) if node.has(Common.TPDO + k)
-    }
+    return {node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k for k in node.tpdos}
 
 
 class BusUnit(Unit):

@@ -260,8 +260,9 @@ class Talk:
     def pdos(self) -> dict[int, int]:
         """Identifiers of the messages that the board sends as it comes, by number of the TPDO (from 1)."""
         found = {}
-        for k in range(8):
-            default = self.s.unit.node.default(Common.TPDO + k, 1) if self.s.unit.node.has(Common.TPDO + k) else None
+        node = self.s.unit.node
+        for k in node.tpdos:
+            default = node.default(Common.TPDO + k, 1)
             if isinstance(default, int) and not default & OFF:
                 found[k + 1] = default & 0x7FF
         return found

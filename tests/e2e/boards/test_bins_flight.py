@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, increments_of
+from psabench.boards.objects import BinsObjects as OD
 
 pytestmark = pytest.mark.host
 
@@ -35,12 +36,21 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> flight.Flight:
     return flight.Flight(flight.build(tmp_path_factory.mktemp("flight")), LEGS, heading_deg=50.0)
 
 
-def scenario(folder: Path) -> Path:
+def lagged(h_m: np.ndarray, step_s: float, lag_s: float) -> np.ndarray:
+    """Of lag y' = h - y, h straight between steps; at rest before."""
+    y, keep = h_m.copy(), np.exp(-step_s / lag_s)
+    for k in range(1, len(h_m)):
+        slope = (h_m[k] - h_m[k - 1]) / step_s
+        y[k] = h_m[k] - lag_s * slope + (y[k - 1] - h_m[k - 1] + lag_s * slope) * keep
+    return y
+
+
+def scenario(folder: Path, flight_keys: str = "") -> Path:
     file = folder / "flight.yaml"
     legs = ", ".join("{" + ", ".join(f"{k}: {v}" for k, v in leg.items()) + "}" for leg in LEGS)
     file.write_text(f"""seed: 1
 site: {{latitude_deg: 55.7, longitude_deg: 37.5, height_m: 150}}
-flight: {{heading_deg: 50, legs: [{legs}]}}
+flight: {{heading_deg: 50, legs: [{legs}]{flight_keys}}}
 units:
   - {{name: sins, board: bins, on: flight, adc_chain: direct, adc_noise_scale: 0, profile_set: {{{NO_ERRORS}}}}}
 """)
@@ -67,6 +77,40 @@ def test_each_reading_is_the_increment_of_its_interval(path: flight.Flight, tmp_
     assert np.abs(off_mps.sum(axis=0)).max() < 4.9e-6 * 85.0  # half a code
     assert np.abs(speed[:, 0]).max() > 0.035  # the run: 4 m/s2
     assert np.degrees(np.abs(angle[:, 0]).max()) > 0.05  # the bank: 8 deg/s
+
+
+def test_the_unit_sends_what_the_altimeter_shows(path: flight.Flight, tmp_path: Path) -> None:
+    """Ten a second, of the instant of their readings, in order."""
+    keys = ", baro: {lag_s: 0.8, scale_ppm: 3000, offset_m: 12, drift_m_per_h: 90}"
+    with Bench.start(scenario(tmp_path, keys)) as bench:
+        unit = bench.board(Bins)
+        unit.wait_ready()
+        heights = unit.barometer()
+        unit.start()
+        bench.run_for(80.0)
+        got = heights.take()
+    seq, t_ns = np.asarray(got["BSEQ"], np.int64), np.round(got.t_sample_s * 1e9).astype(np.int64)
+    assert len(seq) > 700
+    assert (np.diff(seq) == 1).all()
+    assert np.abs(np.diff(t_ns) - 100_000_000).max() <= 1_000_000
+    grid_ns = np.arange(0, t_ns[-1] + 20_000_000, 10_000_000)
+    shown = 1.003 * lagged(path.states(grid_ns).h_m, 0.01, 0.8) + 12.0 + 90.0 * grid_ns * 1e-9 / 3600.0
+    assert np.ptp(shown) > 90.0
+    # BTIME counts 1 ms, in which the aircraft climbs 15 mm; HBARO 1 mm
+    assert np.abs(got["HBARO"] - np.interp(t_ns, grid_ns, shown)).max() < 0.02
+
+
+def test_a_unit_on_a_table_shows_the_height_of_the_site(tmp_path: Path) -> None:
+    file = tmp_path / "table.yaml"
+    file.write_text("seed: 1\nsite: {latitude_deg: 55.7, height_m: 163.5}\nunits: [{name: sins, board: bins}]\n")
+    with Bench.start(file) as bench:
+        unit = bench.board(Bins)
+        unit.wait_ready()
+        heights = unit.barometer()
+        unit.start()
+        bench.run_for(1.0)
+        assert set(heights.take()["HBARO"]) == {163.5}
+        assert unit.node.read(OD.BARO, 1) == 163500
 
 
 def test_the_truth_port_has_the_aircraft(path: flight.Flight, tmp_path: Path) -> None:

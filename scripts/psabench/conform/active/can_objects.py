@@ -140,9 +140,7 @@ def mappings_lay_out_the_messages(t: Talk) -> str:
     """Upload each mapping and lay it beside the DBC; try to write it."""
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
     node, told = t.s.unit.node, []
-    for k in range(8):
-        if not node.has(Common.TPDO_MAPPING + k):
-            continue
+    for k in node.tpdos:
         name = node.title(Common.TPDO + k).partition(":")[0]
         count = t.number(Common.TPDO_MAPPING + k)
         entries = [t.number(Common.TPDO_MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]

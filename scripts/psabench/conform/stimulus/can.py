@@ -66,8 +66,9 @@ def _nothing_lost(s: Dut) -> None:
 def everything_on(t: Talk) -> None:
     """TPDOs that the host may switch on. Those of a PSA-2 are chosen by its frame form."""
     node = t.s.unit.node
-    for k in range(8):
-        if t.s.variant.family != "psa2" and node.has(Common.TPDO + k):
-            cob = t.number(Common.TPDO + k, 1)
-            if cob & OFF:
-                t.download(Common.TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))
+    if t.s.variant.family == "psa2":
+        return
+    for k in node.tpdos:
+        cob = t.number(Common.TPDO + k, 1)
+        if cob & OFF:
+            t.download(Common.TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))
