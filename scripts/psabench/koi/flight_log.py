@@ -1,0 +1,142 @@
+"""A unit's flights in its passport (docs/tools/passports.md): each enters twice, when it begins and when it is over.
+
+Both entries are whole or not at all, so that a flight during which the power is lost stays there as one that only
+began: it is incomplete and has no weight. Nothing is ever changed: a roll-back is an entry, too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from psabench.errors import BadInput, expected
+from psabench.koi.autocal import FlightEstimate, RollBack, standing_flights
+from psabench.passport.store import Covariance, Measured, PassportStore, UnitRun
+
+BEGUN, OVER, BACK = "koi-flight begun", "koi-flight", "koi-flight roll-back"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightLog:
+    """What a passport says of a unit's flights. A roll-back counts numbers of complete flights, from 1."""
+
+    events: tuple[FlightEstimate | RollBack, ...]
+    incomplete: tuple[str, ...]  # beginnings without an end
+    verdicts: tuple[str, ...]  # of each complete flight: why it has no weight, or nothing
+
+
+def begin_flight(store: PassportStore, serial: str, kind: str, begun: datetime) -> str:
+    """Enter a flight that begins; its key. Raises BadInput for one that has begun at that instant."""
+    key = _iso(begun)
+    if key in _begun_in(store, serial):
+        raise BadInput(expected("a flight that has not begun yet", key, serial))
+    _put(store, serial, kind, BEGUN, key, {})
+    return key
+
+
+def end_flight(
+    store: PassportStore, kind: str, key: str, found: FlightEstimate, names: tuple[str, ...], *, verdict: str = ""
+) -> None:
+    """Enter what a flight that has begun found. Raises BadInput for one that has not, or is over."""
+    if key not in _begun_in(store, found.serial):
+        raise BadInput(expected("a flight that has begun", key, found.serial))
+    if key in _over_in(store, found.serial):
+        raise BadInput(expected("a flight that is not over", key, found.serial))
+    sd = np.sqrt(np.diag(found.covariance))
+    quantities = tuple(
+        Measured(name=name, unit="", value=float(x), half_width=2.0 * float(s))
+        for name, x, s in zip(names, found.x, sd, strict=True)
+    )
+    covariance = Covariance(names=names, matrix=tuple(tuple(row) for row in found.covariance.tolist()))
+    more = {"weight": found.weight, "verdict": verdict}
+    _put(store, found.serial, kind, OVER, key, more, quantities, covariance)
+
+
+def roll_back(store: PassportStore, serial: str, kind: str, number: int, now: datetime) -> None:
+    """Flights after this one of the complete ones count no longer. Raises BadInput for one that has not been."""
+    log = read_log(store, serial)
+    try:
+        standing_flights((*log.events, RollBack(number)))
+    except ValueError as e:
+        raise BadInput(f"{serial}: {e}") from None
+    _put(store, serial, kind, BACK, _iso(now), {"number": number})
+
+
+def read_log(store: PassportStore, serial: str) -> FlightLog:
+    """In the order in which things were entered. Raises BadInput for what is no flight's entry."""
+    events, verdicts, open_keys = list[FlightEstimate | RollBack](), list[str](), list[str]()
+    for run in _runs(store, serial):
+        try:
+            key = str(run.provenance["flight"])
+            if run.method == BEGUN:
+                open_keys.append(key)
+            elif run.method == BACK:
+                events.append(RollBack(int(run.provenance["number"])))
+            else:
+                open_keys.remove(key)
+                events.append(_estimate_of(serial, run))
+                verdicts.append(str(run.provenance["verdict"]))
+        except (KeyError, TypeError, ValueError) as e:
+            raise BadInput(expected("an entry of a flight", e, f"{store.path}: {serial}@{run.number}")) from None
+    return FlightLog(events=tuple(events), incomplete=tuple(open_keys), verdicts=tuple(verdicts))
+
+
+def _estimate_of(serial: str, run: UnitRun) -> FlightEstimate:
+    if run.covariance is None:
+        raise ValueError("no covariance")
+    return FlightEstimate(
+        serial=serial,
+        time_s=datetime.fromisoformat(run.begun).timestamp(),
+        x=np.array([q.value for q in run.quantities]),
+        covariance=np.array(run.covariance.matrix),
+        weight=float(run.provenance["weight"]),
+    )
+
+
+def _runs(store: PassportStore, serial: str) -> list[UnitRun]:
+    if serial not in store.unit_serials():
+        return []
+    return [run for run in store.read_passport(serial).runs if run.method in (BEGUN, OVER, BACK)]
+
+
+def _begun_in(store: PassportStore, serial: str) -> list[str]:
+    return [str(run.provenance["flight"]) for run in _runs(store, serial) if run.method == BEGUN]
+
+
+def _over_in(store: PassportStore, serial: str) -> list[str]:
+    return [str(run.provenance["flight"]) for run in _runs(store, serial) if run.method == OVER]
+
+
+def _put(
+    store: PassportStore,
+    serial: str,
+    kind: str,
+    method: str,
+    key: str,
+    more: dict[str, Any],
+    quantities: tuple[Measured, ...] = (),
+    covariance: Covariance | None = None,
+) -> None:
+    provenance = {"flight": key, **more}
+    values = [[q.name, q.value] for q in quantities]
+    text = json.dumps([method, provenance, values, covariance.matrix if covariance else None], sort_keys=True)
+    run = UnitRun(
+        method=method,
+        begun=key,
+        version=version("psabench"),
+        data_sha256=hashlib.sha256(text.encode()).hexdigest(),
+        quantities=quantities,
+        covariance=covariance,
+        provenance=provenance,
+    )
+    store.put_run(serial, kind, run)
+
+
+def _iso(when: datetime) -> str:
+    return when.astimezone(UTC).isoformat()

@@ -1,0 +1,106 @@
+"""When an aircraft takes off, what it did before, and whether its unit may correct itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from psabench.koi.take_off import Decision, Evidence, Gate, TakeOffDetector, Taxi, decide, taxi_of
+from psabench.link.signals import Floats
+
+NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
+PRIOR = np.full(10, 2.0)
+GOOD = Gate(taken=300, gated=2, nis_sum=910.0, nis_dof=900)
+RATIO = np.array([0.1, 0.1, 0.1, 0.1, 0.9, 0.3, 0.5, 0.2, 0.69, 0.71])
+EVIDENCE = Evidence(
+    names=NAMES,
+    x=np.full(10, 1.0),
+    sd=RATIO * PRIOR,
+    prior_sd=PRIOR,
+    gates={"position": GOOD, "velocity": GOOD},
+    alone_s=1.0,
+    taxi=Taxi(turns=3, stops=2),
+)
+
+
+def detect(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
+    d = TakeOffDetector()
+    ok = np.ones(len(t_s)) if valid is None else valid
+    return [float(t) for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, valid=bool(good))]
+
+
+def test_a_run_is_seen_once_and_a_taxi_never() -> None:
+    t = np.arange(0.0, 900.0)
+    taxi = 8.0 + 7.0 * np.sin(0.05 * t)
+    run = np.where(t < 600.0, taxi, np.minimum(taxi[600] + 4.0 * (t - 600.0), 250.0))
+    (at,) = detect(t, run)
+    assert 600.0 + (40.0 - taxi[600]) / 4.0 <= at < 600.0 + (40.0 - taxi[600]) / 4.0 + 4.0
+    assert detect(t, taxi) == []
+    assert detect(t, 16.0 + 0.03 * t) == []  # never so slow again: too little acceleration for a run
+
+
+def test_outliers_of_the_receiver_are_no_take_off() -> None:
+    t = np.arange(0.0, 300.0)
+    speed, valid = np.full(300, 6.0), np.ones(300)
+    speed[100:102] = 90.0  # two in a row
+    speed[150:160], valid[150:160] = 90.0, 0.0  # and ten that say so themselves
+    speed[200] = np.nan
+    assert detect(t, speed, valid) == []
+    speed[100:104] = [40.0, 41.0, 42.0, 43.0]
+    assert detect(t, speed, valid) == [102.0]
+
+
+def test_turns_and_stops_of_a_taxi() -> None:
+    t = np.arange(0.0, 600.0)
+    heading = np.interp(t, [0, 100, 115, 250, 265, 400, 600], [3.0, 3.0, 4.57, 4.57, 6.14, 6.14, 7.1])
+    speed = np.where((t > 50) & (t < 80) | (t > 300) & (t < 303) | (t > 500), 0.1, 7.0)
+    wrapped = (heading + np.pi) % (2 * np.pi) - np.pi
+    assert taxi_of(t, wrapped, speed) == Taxi(turns=2, stops=2)  # the last turn takes 200 s, the stop of 2 s is none
+    assert taxi_of(t[:1], wrapped[:1], speed[:1]) == Taxi(turns=0, stops=0)
+
+
+def test_what_has_converged_is_corrected_and_the_solution_whole() -> None:
+    d = decide(EVIDENCE)
+    assert d.passed
+    assert d.take.tolist() == [True] * 7 + [True, True, False]
+
+
+def reasons(**changes: object) -> Decision:
+    return decide(replace(EVIDENCE, **changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"alone_s": 12.0}, "expected a measurement in the last 5 s, got the last 12.0 s ago"),
+        ({"alone_s": float("nan")}, "expected a measurement in the last 5 s"),
+        (
+            {"gates": {"velocity": replace(GOOD, taken=20, gated=0)}},
+            "expected 60 measurements of velocity or more, got 20",
+        ),
+        (
+            {"gates": {"position": replace(GOOD, gated=30)}},
+            "expected at most 5% of position outside its gate, got 9.1%",
+        ),
+        ({"gates": {"position": replace(GOOD, nis_sum=1800.0)}}, "got a mean square of 2.00"),
+        ({"gates": {"position": replace(GOOD, nis_sum=450.0)}}, "got a mean square of 0.50"),
+        ({"gates": {"position": replace(GOOD, nis_sum=float("nan"))}}, "got a mean square of nan"),
+        ({"x": np.append(np.full(9, 1.0), -9.0)}, "of their priors, got 4.5 for nu3"),
+        ({"x": np.full(10, np.nan)}, "expected finite estimates"),
+        ({"sd": PRIOR * 0.8}, "expected a heading known to 0.7 of its prior, got 0.80"),
+        ({"taxi": Taxi(turns=0, stops=2)}, "expected 1 turns of the taxi or more, got 0"),
+        ({"taxi": Taxi(turns=3, stops=0)}, "expected 1 stops of the taxi or more, got 0"),
+    ],
+)
+def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str, object], said: str) -> None:
+    d = reasons(**changes)
+    assert not d.passed
+    assert not d.take.any()
+    (reason,) = d.reasons
+    assert reason.startswith("correction at take-off: expected")
+    assert said in reason
+
+
+def test_all_reasons_are_given_together() -> None:
+    assert len(reasons(alone_s=99.0, taxi=Taxi(turns=0, stops=0), sd=PRIOR).reasons) == 4
