@@ -111,11 +111,23 @@ static void add_sums(struct sha256 *s, const struct bins_sums *m)
     for (unsigned i = 0; i < m->count; i++) add_latch(s, &m->latch[(m->first + i) % BINS_LATCHES]);
 }
 
+/* Nothing of a gyro without one: digests of healthy units stay what they were. */
+static void add_gyro_fault(struct sha256 *s, unsigned axis, const struct board_gyro_fault *f)
+{
+    const double value[] = {f->limit_radps, f->bias_radps, f->scale, f->lock_in_radps};
+    bool any = f->stuck;
+    for (unsigned i = 0; i < sizeof value / sizeof *value; i++) any |= value[i] != 0.0;
+    if (!any) return;
+    board_digest_u64(s, (uint64_t)axis << 1 | f->stuck);
+    for (unsigned i = 0; i < sizeof value / sizeof *value; i++) board_digest_real(s, value[i]);
+}
+
 static void add_gyros(struct sha256 *s, const struct bins_gyros *g)
 {
     board_digest_u64(s, (uint64_t)g->t_ns);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, g->angle_rad[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_noise(s, &g->noise[i]);
+    for (unsigned i = 0; i < 3; i++) add_gyro_fault(s, i, &g->fault[i]);
 }
 
 static void add_latest(struct sha256 *s, const struct bins_reading *r)
@@ -169,6 +181,7 @@ const struct board_type bins_board = {
     .part_count = sizeof parts / sizeof *parts,
     .controller_faults = controller_faults,
     .can = &bins_can,
+    .gyros = &bins_gyros_faults,
     BOARD_LIFE_FUNCTIONS,
     .ready = is_ready,
     .digest = add_digest,
