@@ -20,7 +20,7 @@
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
-#define BOARD_NOISES_MAX 6u
+#define BOARD_NOISES_MAX 9u
 
 struct board {
     const struct board_type *type; /* set by the unit */

@@ -11,6 +11,7 @@
 #include "board/bins/profile.h"
 #include "board/psa2/inside.h"
 #include "phys/sensor/inertial.h"
+#include "phys/sensor/noise.h"
 
 #define BINS_TICK_PULSE_NS 100000
 #define BINS_LATCHES       8u /* that wait for their words */
@@ -70,6 +71,7 @@ struct bins_gyros {
     double angle_rad[3];
     double walk_rad; /* of the noise in a step */
     struct draws noise[3];
+    struct noise slow[3]; /* rad/s: bias instability */
     struct board_gyro_fault fault[3];
     bool limited[3]; /* at its fault's limit */
     struct sched_ev ev;

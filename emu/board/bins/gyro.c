@@ -50,6 +50,7 @@ static void integrate_smooth(struct bins *b, int64_t to_ns)
     add_measured(b, g->t_ns + off_ns, 0.5 * dt_s, angle_rad);
     add_measured(b, to_ns - off_ns, 0.5 * dt_s, angle_rad);
     const double lock_in_radps = b->profile.gyro_lock_in_degph * RAD_PER_DEG / 3600.0;
+    for (unsigned i = 0; i < 3; i++) angle_rad[i] += dt_s * noise_slow_u(&g->slow[i], g->t_ns);
     for (unsigned i = 0; i < 3; i++) g->angle_rad[i] += counted_rad(g, i, angle_rad[i], lock_in_radps, dt_s);
     g->t_ns = to_ns;
 }
@@ -108,11 +109,16 @@ static void keep_up(void *ctx, int64_t t_ns)
 
 void bins_gyro_init(struct bins *b)
 {
-    static const char *const noise[] = {"bins.gyro.x", "bins.gyro.y", "bins.gyro.z"};
+    static const char *const noise[] = {"bins.gyro.x", "bins.gyro.y", "bins.gyro.z"}, *const slow[] = {
+                                                                                          "bins.gyro.slow.x",
+                                                                                          "bins.gyro.slow.y",
+                                                                                          "bins.gyro.slow.z"};
     struct bins_gyros *g = &b->gyros;
     g->t_ns = -1;
     g->walk_rad = b->profile.gyro_noise_degph * RAD_PER_DEG / 3600.0 * sqrt((double)PANEL_NS / NS_PER_SECOND);
+    const struct noise_cfg cfg = {.bias_instability_u = b->profile.gyro_instability_degph * RAD_PER_DEG / 3600.0};
     for (unsigned i = 0; i < 3; i++) g->noise[i] = board_draws(&b->psa2.base, noise[i]);
+    for (unsigned i = 0; i < 3; i++) noise_init(&g->slow[i], &cfg, board_draws(&b->psa2.base, slow[i]));
     sched_ev_inner(&g->ev, keep_up, b);
 }
 
