@@ -158,6 +158,11 @@ static void add_nav(struct sha256 *s, const struct bins_nav *n)
                             n->lat_rad,     n->lon_rad,     n->v_mps[0], n->v_mps[1],        n->q[0],
                             n->q[1],        n->q[2],        n->q[3]};
     for (unsigned i = 0; i < sizeof value / sizeof *value; i++) board_digest_real(s, value[i]);
+    const bool changed = n->taken.h_m != n->set.h_m || n->taken.alignment_s != n->set.alignment_s;
+    if (changed && n->state != BINS_NAV_OFF) { /* else the digest is what it was before `taken` was there */
+        board_digest_real(s, n->taken.h_m);
+        board_digest_real(s, n->taken.alignment_s);
+    }
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->rate[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->force[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->a_before[i]);

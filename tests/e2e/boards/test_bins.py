@@ -206,6 +206,17 @@ def test_three_cycles_of_fifteen_minutes_in_seconds() -> None:
     print(f"{time.monotonic() - begun_s:.1f} s")
 
 
+def test_weight_and_delay_are_those_of_the_converters_as_they_are_set() -> None:
+    """Before set-up those of their registers after reset."""
+    with Bench.start("sins_table") as bench:
+        node = bench.board(Bins).node
+        first = (node.read(0x2220, 2), node.read(0x2221, 3))
+        bench.board(Bins).wait_ready()
+        ready = (node.read(0x2220, 2), node.read(0x2221, 3))
+    assert first == (pytest.approx(19.4835, abs=1e-4), pytest.approx(30.909e6, abs=1e3))
+    assert ready == (pytest.approx(19.4808, abs=1e-4), pytest.approx(10.1135e6, abs=1e2))
+
+
 def test_tick_is_where_the_interval_ends(tmp_path: Path) -> None:
     with Bench.start(ideal(tmp_path)) as bench:
         bench.board(Bins).wait_ready()
