@@ -12,6 +12,7 @@
 #include "board/can.h"
 #include "board/cfg.h"
 #include "board/field.h"
+#include "board/gyros.h"
 #include "board/part.h"
 #include "board/satellite.h"
 #include "board/serial.h"
@@ -19,7 +20,7 @@
 #include "trace/line_fault.h"
 #include "trace/trace.h"
 
-#define BOARD_NOISES_MAX 6u
+#define BOARD_NOISES_MAX 9u
 
 struct board {
     const struct board_type *type; /* set by the unit */
@@ -85,6 +86,7 @@ struct board_type {
     const struct board_bus *bus;           /* NULL: no parallel bus */
     const struct board_platform *platform; /* NULL: it controls none */
     const struct board_receiver *receiver; /* NULL: it is none */
+    const struct board_gyros *gyros;       /* that count; NULL: it has none */
     const struct board_serial *serial;     /* NULL: it has no serial port */
     /* life */
     void (*init)(struct board *b, const void *profile, const struct board_cfg *cfg, const struct board_io *io,

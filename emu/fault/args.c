@@ -50,6 +50,8 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_JUMP_M] = {"jump_m", CONTROL_REAL, true, "m", -1e5, 1e5, .what = "step of a receiver's position", .least = 0.1},
     [FAULT_AZIMUTH_DEG] = {"azimuth_deg", CONTROL_REAL, true, "deg", -360, 360, .what = "direction from north, clockwise; default: 0, north"},
     [FAULT_WEEKS] = {"weeks", CONTROL_REAL, true, NULL, -1024, 1024, .what = "whole weeks by which a receiver's date is off; -1024: a rollover of the GPS week", .least = 1},
+    [FAULT_LIMIT_DPS] = {"limit_dps", CONTROL_REAL, true, "deg/s", 1e-3, 10000, .what = "rate that a gyro's counter does not exceed"},
+    [FAULT_LOCK_IN_DEGPH] = {"lock_in_degph", CONTROL_REAL, true, "deg/h", 1e-3, 360000, .what = "rate by which a gyro's zone of lock-in is wider"},
 };
 // clang-format on
 _Static_assert(FAULT_ARGS <= CONTROL_ARGS_MAX, "all values of a command fit");

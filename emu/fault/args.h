@@ -57,6 +57,8 @@ enum fault_arg {
     FAULT_JUMP_M,
     FAULT_AZIMUTH_DEG,
     FAULT_WEEKS,
+    FAULT_LIMIT_DPS,
+    FAULT_LOCK_IN_DEGPH,
     FAULT_ARGS
 };
 

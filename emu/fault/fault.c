@@ -10,7 +10,7 @@
 
 static const struct fault_table *const tables[] = {&fault_sensor,   &fault_analog, &fault_chip, &fault_controller,
                                                    &fault_line,     &fault_link,   &fault_lab,  &fault_scpi,
-                                                   &fault_receiver, NULL};
+                                                   &fault_receiver, &fault_gyro,   NULL};
 
 const struct fault_kind *fault_kind(unsigned i)
 {

@@ -5,7 +5,7 @@
 #include "fault/fault.h"
 
 extern const struct fault_table fault_sensor, fault_analog, fault_chip, fault_controller, fault_line, fault_link,
-    fault_lab, fault_scpi, fault_receiver;
+    fault_lab, fault_scpi, fault_receiver, fault_gyro;
 
 static inline struct unit *fault_unit(const struct fault *f)
 {

@@ -16,6 +16,7 @@ static const struct {
     [FAULT_AT_CONTROLLER] = {"UNIT.CONTROLLER", "the controller of a board"},
     [FAULT_AT_LINE] = {"UNIT.line.NAME", "a line of a board"},
     [FAULT_AT_NODE] = {"UNIT.can", "the CAN node of a board"},
+    [FAULT_AT_GYRO] = {"UNIT.gyro.x|y|z", "a gyro that counts angle"},
     [FAULT_AT_BUS] = {"bus.NAME", "a CAN bus"},
     [FAULT_AT_CLIENT] = {"client.N", "a program on the CAN bus"},
     [FAULT_AT_SUPPLY] = {"supply", "the power supply"},
@@ -44,7 +45,7 @@ static const struct {
     const char *infix;
 } of_unit[] = {
     {FAULT_AT_SENSOR, "sensor."}, {FAULT_AT_AFE, "afe."},   {FAULT_AT_TEMP, "temp."}, {FAULT_AT_CHIP, ""},
-    {FAULT_AT_CONTROLLER, ""},    {FAULT_AT_LINE, "line."}, {FAULT_AT_NODE, "can"},
+    {FAULT_AT_CONTROLLER, ""},    {FAULT_AT_LINE, "line."}, {FAULT_AT_NODE, "can"},   {FAULT_AT_GYRO, "gyro."},
 };
 
 enum { OF_UNIT = sizeof of_unit / sizeof *of_unit };
@@ -56,6 +57,7 @@ static const char *point_suffix(const struct board_type *t, enum fault_place pla
     switch (place) {
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
+    case FAULT_AT_GYRO:
         return axis[index];
     case FAULT_AT_TEMP:
         return t->temps[index];
@@ -84,6 +86,8 @@ static unsigned index_count(const struct board_type *t, enum fault_place place, 
     case FAULT_AT_SENSOR:
     case FAULT_AT_AFE:
         return t->analog ? UNIT_AXES : 0;
+    case FAULT_AT_GYRO:
+        return t->gyros ? UNIT_AXES : 0;
     case FAULT_AT_TEMP:
         return temp_count(t);
     case FAULT_AT_CHIP:

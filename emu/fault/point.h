@@ -14,6 +14,7 @@ enum fault_place {
     FAULT_AT_CONTROLLER, /* a.kpsa: the first */
     FAULT_AT_LINE,       /* a.line.Int */
     FAULT_AT_NODE,       /* a.can */
+    FAULT_AT_GYRO,       /* a.gyro.x: board_type.gyros */
     FAULT_AT_BUS,        /* bus.can0 */
     FAULT_AT_CLIENT,     /* client.1, by struct control_client.connection */
     FAULT_AT_SUPPLY,     /* supply */

@@ -11,6 +11,7 @@
 #include "board/bins/profile.h"
 #include "board/psa2/inside.h"
 #include "phys/sensor/inertial.h"
+#include "phys/sensor/noise.h"
 
 #define BINS_TICK_PULSE_NS 100000
 #define BINS_LATCHES       8u /* that wait for their words */
@@ -78,6 +79,9 @@ struct bins_gyros {
     double angle_rad[3];
     double walk_rad; /* of the noise in a step */
     struct draws noise[3];
+    struct noise slow[3]; /* rad/s: bias instability */
+    struct board_gyro_fault fault[3];
+    bool limited[3]; /* at its fault's limit */
     struct sched_ev ev;
 };
 
@@ -130,5 +134,6 @@ void bins_gyro_init(struct bins *b);
 void bins_gyro_power(struct bins *b, bool on, int64_t t_ns);
 void bins_gyro_until(struct bins *b, int64_t t_ns);
 void bins_gyro_counts(struct bins *b, int64_t t_ns, int64_t count[3]);
+extern const struct board_gyros bins_gyros_faults;
 
 #endif

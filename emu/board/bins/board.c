@@ -54,6 +54,7 @@ static void fit_accelerometer(const struct board *board, unsigned axis, double g
     m->kz_v_per_g = -row[(axis + 2) % 3] * v_per_mps2 * g_mps2;
     m->noise_v_rthz =
         b->profile.accel_noise_mps2 * v_per_mps2 * 1.4142135623730951; /* one-sided: a mean of 1 s passes half */
+    m->bias_instability_v = b->profile.accel_instability_mps2 * v_per_mps2;
 }
 
 /* ---- life ---- */
@@ -71,7 +72,8 @@ static unsigned list_noises(struct board *board, struct draws *at[BOARD_NOISES_M
     struct bins *b = (struct bins *)board;
     for (unsigned i = 0; i < 3; i++) at[i] = &b->psa2.adc[i].noise;
     for (unsigned i = 0; i < 3; i++) at[3 + i] = &b->gyros.noise[i];
-    return 6;
+    for (unsigned i = 0; i < 3; i++) at[6 + i] = &b->gyros.slow[i].draws;
+    return 9;
 }
 
 static void put_matrix(board_truth_fn *put, void *ctx, const char *name, const double m[3][3])
@@ -111,11 +113,33 @@ static void add_sums(struct sha256 *s, const struct bins_sums *m)
     for (unsigned i = 0; i < m->count; i++) add_latch(s, &m->latch[(m->first + i) % BINS_LATCHES]);
 }
 
+/* Nothing of a gyro without one: digests of healthy units stay what they were. */
+static void add_gyro_fault(struct sha256 *s, unsigned axis, const struct board_gyro_fault *f)
+{
+    const double value[] = {f->limit_radps, f->bias_radps, f->scale, f->lock_in_radps};
+    bool any = f->stuck;
+    for (unsigned i = 0; i < sizeof value / sizeof *value; i++) any |= value[i] != 0.0;
+    if (!any) return;
+    board_digest_u64(s, (uint64_t)axis << 1 | f->stuck);
+    for (unsigned i = 0; i < sizeof value / sizeof *value; i++) board_digest_real(s, value[i]);
+}
+
+/* The same of what does not move. */
+static void add_slow(struct sha256 *s, const struct noise *n)
+{
+    if (!n->moves) return;
+    board_digest_u64(s, (uint64_t)n->step);
+    for (unsigned i = 0; i < NOISE_MARKOVS; i++) board_digest_real(s, n->markov_u[i]);
+    board_digest_noise(s, &n->draws);
+}
+
 static void add_gyros(struct sha256 *s, const struct bins_gyros *g)
 {
     board_digest_u64(s, (uint64_t)g->t_ns);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, g->angle_rad[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_noise(s, &g->noise[i]);
+    for (unsigned i = 0; i < 3; i++) add_gyro_fault(s, i, &g->fault[i]);
+    for (unsigned i = 0; i < 3; i++) add_slow(s, &g->slow[i]);
 }
 
 static void add_latest(struct sha256 *s, const struct bins_reading *r)
@@ -134,6 +158,11 @@ static void add_nav(struct sha256 *s, const struct bins_nav *n)
                             n->lat_rad,     n->lon_rad,     n->v_mps[0], n->v_mps[1],        n->q[0],
                             n->q[1],        n->q[2],        n->q[3]};
     for (unsigned i = 0; i < sizeof value / sizeof *value; i++) board_digest_real(s, value[i]);
+    const bool changed = n->taken.h_m != n->set.h_m || n->taken.alignment_s != n->set.alignment_s;
+    if (changed && n->state != BINS_NAV_OFF) { /* else the digest is what it was before `taken` was there */
+        board_digest_real(s, n->taken.h_m);
+        board_digest_real(s, n->taken.alignment_s);
+    }
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->rate[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->force[i]);
     for (unsigned i = 0; i < 3; i++) board_digest_real(s, n->a_before[i]);
@@ -171,6 +200,7 @@ const struct board_type bins_board = {
     .part_count = sizeof parts / sizeof *parts,
     .controller_faults = controller_faults,
     .can = &bins_can,
+    .gyros = &bins_gyros_faults,
     BOARD_LIFE_FUNCTIONS,
     .ready = is_ready,
     .digest = add_digest,

@@ -119,7 +119,7 @@ static void align_on(struct bins_nav *n, const double a[3], const double v[3], d
         n->force[i] += v[i];
     }
     n->time_s += dt_s;
-    if (n->time_s + 0.5 * dt_s < n->set.alignment_s) return;
+    if (n->time_s + 0.5 * dt_s < n->taken.alignment_s) return;
     n->state = find_attitude(n) ? BINS_NAV_RUNNING : BINS_NAV_FAILED;
     n->due = true;
     n->since = 0;
@@ -135,7 +135,7 @@ static struct level level_at(const struct bins_nav *n)
 {
     const struct det_pair lat = det_sin_cos(n->lat_rad);
     const struct radii r = ellipsoid_radii(lat.sin, lat.cos);
-    return (struct level){lat.sin, lat.cos, r.meridian_m + n->set.h_m, r.vertical_m + n->set.h_m};
+    return (struct level){lat.sin, lat.cos, r.meridian_m + n->taken.h_m, r.vertical_m + n->taken.h_m};
 }
 
 /* Of n against the Earth. */
@@ -219,6 +219,7 @@ void bins_nav_start(struct bins_nav *n, const struct bins_reading *from, uint32_
                     double accel_mps)
 {
     bins_nav_stop(n);
+    n->taken = n->set;
     n->state = BINS_NAV_ALIGNING;
     n->every = every;
     n->t_ns = n->shown_ns = from->t_ns;

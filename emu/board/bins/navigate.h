@@ -18,7 +18,7 @@ struct bins_nav_settings {
 
 /* The unit's own navigation; n is east, north, up. */
 struct bins_nav {
-    struct bins_nav_settings set;
+    struct bins_nav_settings set, taken; /* for the next start; at the last one */
     enum bins_nav_state state;
     bool due; /* outputs, after this reading */
     uint32_t since, every;

@@ -17,7 +17,8 @@ Ints = npt.NDArray[np.int64]
 
 CHANNELS = ("gyro x", "gyro y", "gyro z", "accelerometer x", "accelerometer y", "accelerometer z")
 STUCK_S = 1.0  # of equal values where neighbours differ elsewhere
-NOISY = 0.9  # share of neighbours that differ: below it equal values say nothing (a recording without noise)
+NOISY = 0.9  # share of neighbours that differ: from it on any such run says something
+OUTSTANDS = 5  # else those that are this many times as long as the longest elsewhere: of counts with noise of one count
 SATURATED = 5  # equal values in a row at the extreme of a channel
 STILL_RADPS = np.radians(0.1)  # 24 times the Earth's rate
 TURN_RAD = np.radians(30.0)  # that a recording needs before axes can be compared
@@ -46,22 +47,24 @@ def _equal_values(data: Increments) -> list[str]:
         if len(x) < LEAST_ROWS:
             continue
         extreme = np.abs(x[first]) == np.abs(x).max()
-        limited = extreme & (length >= SATURATED)
-        if limited.any() and _differs(length[~extreme], len(x)):
+        limited = extreme & (length >= max(SATURATED, _least_run(length[~extreme], len(x))))
+        if limited.any():
             count, at_s = int(length[limited].sum()), data.end_s[first[limited][0]]
             what = f"{name} is at its limit for {count} intervals, the first at {at_s:.2f} s: saturated"
             found.append(what)
             continue
         k = int(length.argmax())
-        if length[k] * data.dt_s >= STUCK_S and _differs(np.delete(length, k), len(x)):
+        if length[k] * data.dt_s >= STUCK_S and length[k] >= _least_run(np.delete(length, k), len(x)):
             what = f"{name} sticks for {length[k] * data.dt_s:.2f} s from {data.end_s[first[k]]:.2f} s on"
             found.append(what)
     return found
 
 
-def _differs(length: Ints, rows: int) -> bool:
-    """Whether neighbours differ in runs of these lengths, so that equal values say something."""
-    return len(length) >= max(NOISY * int(length.sum()), rows / 10)
+def _least_run(length: Ints, rows: int) -> int:
+    """Equal values in a row that say something where the runs elsewhere have these lengths; none do without noise."""
+    if len(length) < rows / 10:
+        return rows + 1
+    return 1 if len(length) >= NOISY * int(length.sum()) else OUTSTANDS * int(length.max())
 
 
 def _no_turn(data: Increments) -> list[str]:

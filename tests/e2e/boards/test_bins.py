@@ -157,6 +157,37 @@ def test_faults_show_in_the_flags_and_end(tmp_path: Path) -> None:
         assert unit.node.read(0x1001) == 0
 
 
+@pytest.mark.parametrize(
+    ("kind", "values", "due_dps"),
+    [
+        ("gyro.stuck", {}, 0.0),
+        ("gyro.saturation", {"limit_dps": 4.0}, 4.0),
+        ("gyro.bias", {"drift_degph": 360.0}, 10.1),
+        ("gyro.scale", {"scale_ppm": -1e4}, 9.9),
+        ("gyro.lock_in", {"lock_in_degph": 21_600.0}, 8.0),  # 6 deg/s: 10^2 - 6^2 = 8^2
+    ],
+)
+def test_a_fault_of_a_gyro_shows_in_its_increments_alone_and_ends(
+    tmp_path: Path, kind: str, values: dict[str, float], due_dps: float
+) -> None:
+    earth = EARTH_RADPS * np.cos(LATITUDE)
+
+    def rate_dps() -> float:
+        got = taken(bench, 110)
+        assert got.whole.all()
+        assert np.abs(got.dtheta_rad[10:, 1:]).max() < 2 * EARTH_RADPS * 0.01
+        return float(np.degrees(got.dtheta_rad[10:, 0].mean() / 0.01 - earth))
+
+    with Bench.start(ideal(tmp_path)) as bench:
+        bench.board(Bins).wait_ready()
+        bench.table.rate(10.0)
+        bench.run_for(3.0)
+        assert rate_dps() == pytest.approx(10.0, abs=1e-5)
+        with bench.fault(kind, "sins.gyro.x", **values):
+            assert rate_dps() == pytest.approx(due_dps, abs=5e-3)  # a multiple of the Earth's rate, 0.0024 deg/s
+        assert rate_dps() == pytest.approx(10.0, abs=1e-5)
+
+
 def test_three_cycles_of_fifteen_minutes_in_seconds() -> None:
     """The article's plan through CAN: 45 minutes. What is printed is the wall time of emulator and host together."""
     begun_s = time.monotonic()
@@ -173,6 +204,17 @@ def test_three_cycles_of_fifteen_minutes_in_seconds() -> None:
             assert np.degrees(most[axis]) == pytest.approx(4500.0, abs=15.0)
             assert np.degrees(np.delete(most, axis)).max() < 20.0
     print(f"{time.monotonic() - begun_s:.1f} s")
+
+
+def test_weight_and_delay_are_those_of_the_converters_as_they_are_set() -> None:
+    """Before set-up those of their registers after reset."""
+    with Bench.start("sins_table") as bench:
+        node = bench.board(Bins).node
+        first = (node.read(0x2220, 2), node.read(0x2221, 3))
+        bench.board(Bins).wait_ready()
+        ready = (node.read(0x2220, 2), node.read(0x2221, 3))
+    assert first == (pytest.approx(19.4835, abs=1e-4), pytest.approx(30.909e6, abs=1e3))
+    assert ready == (pytest.approx(19.4808, abs=1e-4), pytest.approx(10.1135e6, abs=1e2))
 
 
 def test_tick_is_where_the_interval_ends(tmp_path: Path) -> None:

@@ -78,6 +78,7 @@ ELSEWHERE = (
     *("chamber.slow", "chamber.readout", "chamber.overshoot", "table.ripple"),  # test_faults_instruments.py
     *("receiver.outage", "receiver.spoof", "receiver.jump"),  # test_receiver.py
     *("receiver.frozen_time", "receiver.bad_checksum", "receiver.wrong_week"),
+    *("gyro.stuck", "gyro.saturation", "gyro.bias", "gyro.scale", "gyro.lock_in"),  # test_bins_faults.c, test_bins.py
 )
 EVERYWHERE = ("head.stick", "head.slip", "scpi.silent", "scpi.late", "scpi.garbled")  # the same file
 

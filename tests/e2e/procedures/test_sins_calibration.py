@@ -143,6 +143,26 @@ def test_a_unit_that_stands_still_is_no_calibration(tmp_path: Path, capsys: Line
     assert (tmp_path / "a/increments.bin").stat().st_size > 7000 * 56  # what was measured is kept
 
 
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("{kind: gyro.stuck, point: sins.gyro.y, at_s: 100, for_s: 20}", r"gyro y sticks for (20\.0|19\.9)\d s from "),
+        (
+            "{kind: gyro.saturation, point: sins.gyro.x, limit_dps: 15}",  # x turns at 20 deg/s
+            r"gyro x is at its limit for \d{4} intervals, the first at .* saturated",
+        ),
+    ],
+)
+def test_a_gyro_that_sticks_or_saturates_is_named(tmp_path: Path, capsys: Lines, fault: str, said: str) -> None:
+    """No flag of the frames says it, the data do; of the same plan without it nothing is said (the first test)."""
+    scenario = tmp_path / "faulty.yaml"
+    scenario.write_text((ROOT / "proto/scenarios/sins_table.yaml").read_text() + f"faults:\n  - {fault}\n")
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--scenario", scenario, "--seed", "4") == 2
+    error = capsys.readouterr().err
+    assert re.search(f"expected a recording without findings, got .*{said}", error), error
+    assert (tmp_path / "a/increments.bin").stat().st_size > 20_000 * 56  # what was measured is kept
+
+
 def test_a_coarse_table_and_its_plan_s_azimuth(tmp_path: Path) -> None:
     """The scenario whose table shows no angles; where a plan says that its axis points is believed, here wrongly."""
     assert run(tmp_path / "a", "--plan", plan(tmp_path), "--stand", "no", "--seed", "57") == 0

@@ -70,6 +70,7 @@ ACCEPTED = {
     "supply": r"supply",
     "platform": r"platform\..*",  # there is none here
     "receiver": r".*\.solver",  # there is none here
+    "gyro": r".*\.gyro\.[xyz]",  # nor these
     "chamber": r"chamber",  # nor this
     "table": r"table\.\d",  # nor this
     "head": r"head",

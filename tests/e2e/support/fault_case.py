@@ -42,6 +42,10 @@ VALUES: dict[str, dict[str, object]] = {
     "receiver.spoof": {"ramp_mps": 1},
     "receiver.jump": {"jump_m": 1},
     "receiver.wrong_week": {"weeks": 1},
+    "gyro.saturation": {"limit_dps": 1},
+    "gyro.bias": {"drift_degph": 1},
+    "gyro.scale": {"scale_ppm": 1},
+    "gyro.lock_in": {"lock_in_degph": 1},
 }
 
 

@@ -49,6 +49,31 @@ def test_a_stuck_and_a_saturated_channel_are_named() -> None:
     ]
 
 
+def counted(x: np.ndarray, quantum: float) -> np.ndarray:
+    return np.asarray(np.floor(x / quantum) * quantum, np.float64)
+
+
+def test_counts_with_noise_of_one_count_name_the_channel_as_well() -> None:
+    """A quarter of the neighbours are equal; of a tenth of that noise nearly all are, and nothing is said."""
+    good = recording()
+    quantum = 1e-8  # 0.002 arcsec; the noise of an increment
+    counts = counted(good.dtheta_rad, quantum)
+    equal = np.mean(np.diff(counts[:, 1]) == 0.0)
+    assert 0.2 < equal < 0.35
+    assert findings(replace(good, dtheta_rad=counts)) == []
+    stuck = counts.copy()
+    stuck[500:700, 1] = 0.0
+    assert findings(replace(good, dtheta_rad=stuck)) == ["gyro y sticks for 2.00 s from 5.01 s on"]
+    limit = np.radians(9.0) * DT_S
+    limited = counted(np.clip(good.dtheta_rad, -limit, limit), quantum)
+    assert findings(replace(good, dtheta_rad=limited))[0] == (
+        "gyro x is at its limit for 900 intervals, the first at 2.01 s: saturated"
+    )
+    coarse = counted(recording(noise=0.1).dtheta_rad + 0.5 * quantum, quantum)  # between two steps
+    coarse[500:700, 1] = 0.0
+    assert findings(replace(good, dtheta_rad=coarse)) == []
+
+
 def long_recording(theta: np.ndarray) -> Increments:
     """Half a cycle of 4500 deg about x and a turn about y, of a unit with errors of scale and misalignment."""
     n, rng = 46_800, np.random.default_rng(6)

@@ -17,7 +17,7 @@ static struct bins b;
 static void bare(bool aligned)
 {
     memset(&b, 0, sizeof b);
-    b.nav.set = (struct bins_nav_settings){.lat_rad = RIG_LATITUDE, .alignment_s = 10.0};
+    b.nav.set = b.nav.taken = (struct bins_nav_settings){.lat_rad = RIG_LATITUDE, .alignment_s = 10.0};
     b.profile.nav_every = 20;
     b.nav.state = aligned ? BINS_NAV_RUNNING : BINS_NAV_ALIGNING;
     b.nav.every = 20;
@@ -174,6 +174,27 @@ static void it_follows_the_table(void **state)
     assert_true(shown > 190);
 }
 
+/* What is written while it aligns or navigates is for the next start (proto/bins.yaml, 2212h). */
+static void settings_are_taken_at_the_start(void **state)
+{
+    const double none[3] = {0.0, 0.0, 0.0};
+    double lat_rad[2];
+    (void)state;
+    for (unsigned i = 0; i < 2; i++) {
+        bare(false);
+        bins_nav_start(&b.nav, &(struct bins_reading){.t_ns = 0}, 20, COUNT_RAD, CODE_MPS);
+        if (i) b.nav.set.alignment_s = 5.0;
+        for (unsigned k = 0; k < 999; k++) (void)still(level, none);
+        assert_int_equal(b.nav.state, BINS_NAV_ALIGNING);
+        assert_true(still(level, none));
+        if (i) b.nav.set.h_m = 20000.0;
+        b.nav.v_mps[1] = 200.0;
+        for (unsigned k = 0; k < 1000; k++) (void)still(level, none);
+        lat_rad[i] = b.nav.lat_rad;
+    }
+    assert_true(lat_rad[0] == lat_rad[1] && lat_rad[0] > RIG_LATITUDE);
+}
+
 static void a_reset_ends_it(void **state)
 {
     const struct bins_profile p = rig_ideal();
@@ -196,6 +217,7 @@ int main(void)
         cmocka_unit_test(aligns_in_any_attitude),
         cmocka_unit_test(what_moves_does_not_align),
         cmocka_unit_test(it_follows_the_table),
+        cmocka_unit_test(settings_are_taken_at_the_start),
         cmocka_unit_test(a_reset_ends_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
