@@ -175,9 +175,14 @@ class Unit:
             )
 
 
+def tpdo_numbers(node: CanopenNode) -> list[int]:
+    """Of the TPDOs that the EDS has, from 0."""
+    return [k for k in range(Common.TPDO_MAPPING - Common.TPDO) if node.has(Common.TPDO + k)]
+
+
 def tpdos_of(node: CanopenNode) -> dict[str, int]:
     """Index of the communication parameters of each message."""
-    return {node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k for k in node.tpdos}
+    return {node.title(Common.TPDO + k).partition(":")[0]: Common.TPDO + k for k in tpdo_numbers(node)}
 
 
 class BusUnit(Unit):

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from functools import wraps
 
 from psabench.boards.objects import Common
+from psabench.boards.unit import tpdo_numbers
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.dut import Dut, Take
@@ -261,7 +262,7 @@ class Talk:
         """Identifiers of the messages that the board sends as it comes, by number of the TPDO (from 1)."""
         found = {}
         node = self.s.unit.node
-        for k in node.tpdos:
+        for k in tpdo_numbers(node):
             default = node.default(Common.TPDO + k, 1)
             if isinstance(default, int) and not default & OFF:
                 found[k + 1] = default & 0x7FF

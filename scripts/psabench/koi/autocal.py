@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psabench.errors import expected
 from psabench.link.signals import Floats
 
 YEAR_S = 365.25 * 86_400
@@ -37,7 +38,7 @@ class InstrumentClass:
         for name in ("persistent_sd", "run_sd", "aging_sd"):
             sd = getattr(self, name)
             if sd.shape != (len(self.names),) or not (np.isfinite(sd).all() and (sd >= 0.0).all()):
-                raise ValueError(f"{name}: expected {len(self.names)} numbers of 0 or more, got {sd}")
+                raise ValueError(expected(f"{len(self.names)} numbers of 0 or more", sd, name))
 
     @property
     def run_covariance(self) -> Floats:
@@ -72,30 +73,33 @@ def nothing_known(kind: InstrumentClass, serial: str) -> Knowledge:
     return Knowledge(serial=serial, p=np.zeros(len(kind.names)), covariance=np.diag(kind.persistent_sd**2))
 
 
-def aged(known: Knowledge, kind: InstrumentClass, time_s: float) -> Knowledge:
+def age_knowledge(known: Knowledge, kind: InstrumentClass, time_s: float) -> Knowledge:
     """As it is known at a later time. Raises ValueError for an earlier one."""
     if known.time_s is None:
         return known
     years = (time_s - known.time_s) / YEAR_S
     if years < 0.0:
-        raise ValueError(f"flight of unit {known.serial}: expected a time after {known.time_s:.0f} s, got {time_s:.0f}")
+        after, got = f"a time after {known.time_s:.0f} s", f"{time_s:.0f}"
+        raise ValueError(expected(after, got, f"flight of unit {known.serial}"))
     return replace(known, covariance=known.covariance + np.diag(kind.aging_sd**2 * years))
 
 
 def filter_prior(known: Knowledge, kind: InstrumentClass, time_s: float) -> tuple[Floats, Floats]:
     """What the sensors are corrected by in a flight at that time, and the covariance that its filter begins with."""
-    now = aged(known, kind, time_s)
+    now = age_knowledge(known, kind, time_s)
     return now.p, now.covariance + kind.run_covariance
 
 
-def learnt(known: Knowledge, kind: InstrumentClass, flight: FlightEstimate, *, whole: bool = True) -> Knowledge:
+def update_knowledge(
+    known: Knowledge, kind: InstrumentClass, flight: FlightEstimate, *, whole: bool = True
+) -> Knowledge:
     """Knowledge after a flight, which began with filter_prior(). Of another serial number: that unit starts afresh.
 
     whole: by the equations above; else each component by itself, of those that have converged.
     """
     if flight.serial != known.serial:
         known = nothing_known(kind, flight.serial)
-    now = replace(aged(known, kind, flight.time_s), time_s=flight.time_s)
+    now = replace(age_knowledge(known, kind, flight.time_s), time_s=flight.time_s)
     if flight.weight <= 0.0:
         return now
     prior = now.covariance + kind.run_covariance
@@ -167,7 +171,7 @@ def standing_flights(events: Iterable[FlightEstimate | RollBack]) -> list[tuple[
     for event in events:
         if isinstance(event, RollBack):
             if not 0 <= event.number <= number:
-                raise ValueError(f"roll-back: expected a flight of 0 to {number}, got {event.number}")
+                raise ValueError(expected(f"a flight of 0 to {number}", event.number, "roll-back"))
             kept = [(n, flight) for n, flight in kept if n <= event.number]
         else:
             number += 1
@@ -181,5 +185,5 @@ def knowledge_after(
     """Of a unit with this history."""
     known = nothing_known(kind, serial)
     for _, flight in standing_flights(events):
-        known = learnt(known, kind, flight, whole=whole)
+        known = update_knowledge(known, kind, flight, whole=whole)
     return known

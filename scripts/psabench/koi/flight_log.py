@@ -89,7 +89,7 @@ def read_log(store: PassportStore, serial: str) -> FlightLog:
 
 def _estimate_of(serial: str, run: UnitRun) -> FlightEstimate:
     if run.covariance is None:
-        raise ValueError("no covariance")
+        raise KeyError("covariance")
     return FlightEstimate(
         serial=serial,
         time_s=datetime.fromisoformat(run.begun).timestamp(),

@@ -133,7 +133,7 @@ class Decision:
 NAVIGATION = ("dr", "dV", "alpha", "beta3")  # blocks that are corrected whole; the others where they have converged
 
 
-def decide(e: Evidence, limits: DecisionLimits | None = None, heading: str = "beta3") -> Decision:
+def decide_correction(e: Evidence, limits: DecisionLimits | None = None, heading: str = "beta3") -> Decision:
     """The analysis at take-off."""
     limits = limits or DecisionLimits()
     reasons = (*_measurement_reasons(e, limits), *_estimate_reasons(e, limits, heading), *_taxi_reasons(e, limits))

@@ -20,7 +20,6 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from psabench.errors import DeviceError, LinkError
 from psabench.link.can_host import CanHost
 
-TPDO_NUMBERS = 0x200  # CiA 301: parameters at 1800h to 19FFh
 ANSWER_S = 5.0  # bench time: the controller may wait for a conversion, and in wall pace the machine may be busy
 # Command specifiers, bits 7..5 of the first byte (CiA 301, 7.2.4.3): begins a transfer, and its answers or an abort.
 INITIATE, ABORT = {0x20: 0x60, 0x40: 0x40}, 0x80
@@ -148,11 +147,6 @@ class CanopenNode:
     def has(self, index: int) -> bool:
         """Whether the EDS has the object."""
         return index in self._od
-
-    @property
-    def tpdos(self) -> list[int]:
-        """Of each TPDO that the EDS has, its number from 0: parameters at 1800h, mapping at 1A00h."""
-        return [k for k in range(TPDO_NUMBERS) if self.has(0x1800 + k)]
 
     def is_text(self, index: int, sub: int = 0) -> bool:
         """Whether the EDS has it as characters."""

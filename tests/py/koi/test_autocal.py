@@ -11,12 +11,12 @@ from psabench.koi.autocal import (
     FlightEstimate,
     InstrumentClass,
     RollBack,
-    aged,
+    age_knowledge,
     filter_prior,
     knowledge_after,
-    learnt,
     nothing_known,
     standing_flights,
+    update_knowledge,
 )
 from psabench.link.signals import Floats
 from scipy.stats import chi2
@@ -35,7 +35,7 @@ SEED = 20261128
 DAY_S = 86_400.0
 
 
-def flown(rng: np.random.Generator, total: Floats, known: object, time_s: float) -> FlightEstimate:
+def fly_unit(rng: np.random.Generator, total: Floats, known: object, time_s: float) -> FlightEstimate:
     """A flight that sees three combinations of the errors with noise: its exact posterior."""
     p, prior = filter_prior(known, KIND, time_s)  # type: ignore[arg-type]
     z = SEES @ (total - p) + NOISE_SD * rng.standard_normal(3)
@@ -44,7 +44,7 @@ def flown(rng: np.random.Generator, total: Floats, known: object, time_s: float)
     return FlightEstimate(serial="A1", time_s=time_s, x=p + gain @ z, covariance=(after + after.T) / 2)
 
 
-def drawn(rng: np.random.Generator, sd: Floats) -> Floats:
+def draw_errors(rng: np.random.Generator, sd: Floats) -> Floats:
     return sd * rng.standard_normal(M)
 
 
@@ -52,7 +52,7 @@ def test_one_flight_is_the_posterior_of_both_parts() -> None:
     """Beside a Kalman filter of (p, r) together, which knows nothing of G."""
     rng = np.random.default_rng(SEED)
     known = nothing_known(KIND, "A1")
-    flight = flown(rng, drawn(rng, KIND.persistent_sd) + drawn(rng, KIND.run_sd), known, 0.0)
+    flight = fly_unit(rng, draw_errors(rng, KIND.persistent_sd) + draw_errors(rng, KIND.run_sd), known, 0.0)
     both = np.zeros((2 * M, 2 * M))
     both[:M, :M], both[M:, M:] = known.covariance, KIND.run_covariance
     sees = np.hstack([SEES, SEES])
@@ -61,7 +61,7 @@ def test_one_flight_is_the_posterior_of_both_parts() -> None:
     innovation = SEES @ prior @ SEES.T + NOISE_SD**2 * np.eye(3)
     z = innovation @ np.linalg.lstsq(prior @ SEES.T, flight.x, rcond=1e-15)[0]
     gain = both @ sees.T @ np.linalg.inv(innovation)
-    after = learnt(known, KIND, flight)
+    after = update_knowledge(known, KIND, flight)
     scale = np.where(KIND.persistent_sd > 0, KIND.persistent_sd, 1.0)
     assert after.p / scale == pytest.approx((gain @ z)[:M] / scale, abs=1e-9)
     want = (both - gain @ sees @ both)[:M, :M]
@@ -74,13 +74,13 @@ def test_eight_flights_of_many_units_are_as_uncertain_as_is_said(whole: bool) ->
     units, at = 400, np.flatnonzero(KIND.persistent_sd > 0)
     sums, shrunk = np.zeros(units), np.zeros(units)
     for u in range(units):
-        p, known = drawn(rng, KIND.persistent_sd), nothing_known(KIND, "A1")
+        p, known = draw_errors(rng, KIND.persistent_sd), nothing_known(KIND, "A1")
         for k in range(8):
             time_s = k * 30 * DAY_S
             if k:
-                p = p + drawn(rng, KIND.aging_sd) * np.sqrt(30 * DAY_S / YEAR_S)
-            flight = flown(rng, p + drawn(rng, KIND.run_sd), known, time_s)
-            known = learnt(known, KIND, flight, whole=whole)
+                p = p + draw_errors(rng, KIND.aging_sd) * np.sqrt(30 * DAY_S / YEAR_S)
+            flight = fly_unit(rng, p + draw_errors(rng, KIND.run_sd), known, time_s)
+            known = update_knowledge(known, KIND, flight, whole=whole)
         error = (known.p - p)[at]
         sums[u] = error @ np.linalg.solve(known.covariance[np.ix_(at, at)], error)
         shrunk[u] = known.covariance[0, 0] / KIND.persistent_sd[0] ** 2
@@ -95,10 +95,10 @@ def test_eight_flights_of_many_units_are_as_uncertain_as_is_said(whole: bool) ->
 def test_weights_between_0_and_1_give_that_much_information() -> None:
     rng = np.random.default_rng(SEED)
     known = nothing_known(KIND, "A1")
-    flight = flown(rng, drawn(rng, KIND.persistent_sd), known, 0.0)
-    assert np.array_equal(learnt(known, KIND, replace(flight, weight=0.0)).p, known.p)
-    assert learnt(known, KIND, replace(flight, weight=0.0)).flights == 0
-    less, more, full = (learnt(known, KIND, replace(flight, weight=w)) for w in (0.3, 1.0 - 1e-12, 1.0))
+    flight = fly_unit(rng, draw_errors(rng, KIND.persistent_sd), known, 0.0)
+    assert np.array_equal(update_knowledge(known, KIND, replace(flight, weight=0.0)).p, known.p)
+    assert update_knowledge(known, KIND, replace(flight, weight=0.0)).flights == 0
+    less, more, full = (update_knowledge(known, KIND, replace(flight, weight=w)) for w in (0.3, 1.0 - 1e-12, 1.0))
     scale = np.where(KIND.persistent_sd > 0, KIND.persistent_sd, 1.0)
     assert more.p / scale == pytest.approx(full.p / scale, abs=1e-6)
     assert more.covariance / np.outer(scale, scale) == pytest.approx(full.covariance / np.outer(scale, scale), abs=1e-6)
@@ -115,7 +115,7 @@ def test_a_weight_divides_the_variance_of_what_was_measured() -> None:
         k = 10.0 / (10.0 + variance)
         return FlightEstimate(serial="A1", time_s=0.0, x=np.array([k * z]), covariance=np.array([[10.0 * (1.0 - k)]]))
 
-    got, want = learnt(known, kind, replace(seen(r), weight=w)), learnt(known, kind, seen(r / w))
+    got, want = update_knowledge(known, kind, replace(seen(r), weight=w)), update_knowledge(known, kind, seen(r / w))
     assert got.p == pytest.approx(want.p, rel=1e-12)
     assert got.covariance == pytest.approx(want.covariance, rel=1e-12)
 
@@ -129,7 +129,7 @@ def test_a_drift_that_ages_is_followed() -> None:
     for year in range(10):
         now = p + step * year
         for kind, known in ((KIND, follows), (still, stays)):
-            after = learnt(known, kind, flown(rng, now, known, year * YEAR_S))
+            after = update_knowledge(known, kind, fly_unit(rng, now, known, year * YEAR_S))
             follows, stays = (after, stays) if kind is KIND else (follows, after)
     error = abs((follows.p - now)[0]), abs((stays.p - now)[0])
     assert error[0] < 0.5 * error[1]
@@ -138,20 +138,22 @@ def test_a_drift_that_ages_is_followed() -> None:
 def test_another_serial_number_starts_afresh_and_time_runs_forward() -> None:
     rng = np.random.default_rng(SEED)
     known = nothing_known(KIND, "A1")
-    first = learnt(known, KIND, flown(rng, drawn(rng, KIND.persistent_sd), known, DAY_S))
-    other = learnt(first, KIND, replace(flown(rng, np.zeros(M), known, 2 * DAY_S), serial="B2", weight=0.0))
+    first = update_knowledge(known, KIND, fly_unit(rng, draw_errors(rng, KIND.persistent_sd), known, DAY_S))
+    other = update_knowledge(
+        first, KIND, replace(fly_unit(rng, np.zeros(M), known, 2 * DAY_S), serial="B2", weight=0.0)
+    )
     assert other.serial == "B2"
     assert not other.p.any()
     assert np.array_equal(other.covariance, known.covariance)
     with pytest.raises(ValueError, match="expected a time after 86400 s, got 0"):
-        aged(first, KIND, 0.0)
+        age_knowledge(first, KIND, 0.0)
 
 
 def test_a_roll_back_is_as_if_the_flights_had_not_been() -> None:
     rng = np.random.default_rng(SEED)
     known, flights = nothing_known(KIND, "A1"), list[FlightEstimate]()
     for k in range(5):
-        flights.append(flown(rng, drawn(rng, KIND.persistent_sd), known, k * DAY_S))
+        flights.append(fly_unit(rng, draw_errors(rng, KIND.persistent_sd), known, k * DAY_S))
     want = knowledge_after(KIND, "A1", [flights[0], flights[1], flights[4]])
     got = knowledge_after(KIND, "A1", [*flights[:4], RollBack(2), flights[4]])
     assert np.array_equal(got.p, want.p)

@@ -22,29 +22,29 @@ KIND = InstrumentClass(
 DAY = datetime(2026, 5, 1, 6, 30, tzinfo=UTC)
 
 
-def estimate(k: int, weight: float = 1.0) -> FlightEstimate:
+def estimate_of(k: int, weight: float = 1.0) -> FlightEstimate:
     p = np.array([[1e-16, 1e-13], [1e-13, 1e-8]]) * (1 + k / 7)
     x = np.array([1e-8 / 3, -2e-4]) * (k + 1)
     return FlightEstimate(serial="S7", time_s=(DAY + timedelta(days=k)).timestamp(), x=x, covariance=p, weight=weight)
 
 
-def fly(store: PassportStore, k: int, weight: float = 1.0, verdict: str = "") -> None:
+def fly_flight(store: PassportStore, k: int, weight: float = 1.0, verdict: str = "") -> None:
     key = begin_flight(store, "S7", "sins", DAY + timedelta(days=k))
-    end_flight(store, "sins", key, estimate(k, weight), NAMES, verdict=verdict)
+    end_flight(store, "sins", key, estimate_of(k, weight), NAMES, verdict=verdict)
 
 
 def test_flights_come_back_to_the_bit_and_roll_back_by_number(tmp_path: Path) -> None:
     with PassportStore(tmp_path / "units.sqlite") as store:
         for k in range(3):
-            fly(store, k, weight=0.0 if k == 1 else 1.0, verdict="outage" if k == 1 else "")
+            fly_flight(store, k, weight=0.0 if k == 1 else 1.0, verdict="outage" if k == 1 else "")
         begin_flight(store, "S7", "sins", DAY + timedelta(days=3))
-        fly(store, 4)
+        fly_flight(store, 4)
         log = read_log(store, "S7")
         assert log.verdicts == ("", "outage", "", "")
         assert log.incomplete == ("2026-05-04T06:30:00+00:00",)
         for k, event in zip((0, 1, 2, 4), log.events, strict=True):
             assert isinstance(event, FlightEstimate)
-            want = estimate(k, weight=0.0 if k == 1 else 1.0)
+            want = estimate_of(k, weight=0.0 if k == 1 else 1.0)
             assert np.array_equal(event.x, want.x)
             assert np.array_equal(event.covariance, want.covariance)
             assert (event.weight, event.time_s) == (want.weight, want.time_s)
@@ -60,15 +60,15 @@ def test_flights_come_back_to_the_bit_and_roll_back_by_number(tmp_path: Path) ->
     ("do", "said"),
     [
         (lambda s: begin_flight(s, "S7", "sins", DAY), "expected a flight that has not begun yet"),
-        (lambda s: end_flight(s, "sins", "x", estimate(0), NAMES), "expected a flight that has begun, got x"),
-        (lambda s: end_flight(s, "sins", DAY.isoformat(), estimate(0), NAMES), "expected a flight that is not over"),
+        (lambda s: end_flight(s, "sins", "x", estimate_of(0), NAMES), "expected a flight that has begun, got x"),
+        (lambda s: end_flight(s, "sins", DAY.isoformat(), estimate_of(0), NAMES), "expected a flight that is not over"),
         (lambda s: roll_back(s, "S7", "sins", 2, DAY), "expected a flight of 0 to 1, got 2"),
         (lambda s: fly_other(s), "expected a unit of type sins, got mems"),
     ],
 )
 def test_what_does_not_follow_is_rejected_and_nothing_enters(do: object, said: str, tmp_path: Path) -> None:
     with PassportStore(tmp_path / "units.sqlite") as store:
-        fly(store, 0)
+        fly_flight(store, 0)
         with pytest.raises(BadInput, match=said):
             do(store)  # type: ignore[operator]
         assert len(read_log(store, "S7").events) == 1
@@ -82,7 +82,7 @@ def fly_other(store: PassportStore) -> None:
 def test_an_entry_that_is_none_is_named(tmp_path: Path) -> None:
     path = tmp_path / "units.sqlite"
     with PassportStore(path) as store:
-        fly(store, 0)
+        fly_flight(store, 0)
     with sqlite3.connect(path) as db:
         db.execute("UPDATE run SET provenance = '{}' WHERE number = 2")
     with (
@@ -105,7 +105,7 @@ def _season(path: Path, until: int) -> None:
     with PassportStore(path) as store:
         store._db._db.set_trace_callback(trace)  # each statement, those of transactions too
         for k in range(2):
-            fly(store, k)
+            fly_flight(store, k)
     os._exit(0)
 
 
@@ -126,7 +126,7 @@ def test_the_power_may_go_at_any_statement_of_a_season(tmp_path: Path) -> None:
             assert len(log.incomplete) <= 1
             for k, event in enumerate(log.events):
                 assert isinstance(event, FlightEstimate)
-                assert np.array_equal(event.covariance, estimate(k).covariance)
-            fly(store, 9)
+                assert np.array_equal(event.covariance, estimate_of(k).covariance)
+            fly_flight(store, 9)
             assert len(read_log(store, "S7").events) == len(log.events) + 1
     assert seen == {(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)}

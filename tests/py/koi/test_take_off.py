@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from psabench.koi.take_off import Decision, Evidence, Gate, TakeOffDetector, Taxi, decide, taxi_of
+from psabench.koi.take_off import Decision, Evidence, Gate, TakeOffDetector, Taxi, decide_correction, taxi_of
 from psabench.link.signals import Floats
 
 NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
@@ -24,7 +24,7 @@ EVIDENCE = Evidence(
 )
 
 
-def detect(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
+def detect_runs(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
     d = TakeOffDetector()
     ok = np.ones(len(t_s)) if valid is None else valid
     return [float(t) for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, valid=bool(good))]
@@ -34,10 +34,10 @@ def test_a_run_is_seen_once_and_a_taxi_never() -> None:
     t = np.arange(0.0, 900.0)
     taxi = 8.0 + 7.0 * np.sin(0.05 * t)
     run = np.where(t < 600.0, taxi, np.minimum(taxi[600] + 4.0 * (t - 600.0), 250.0))
-    (at,) = detect(t, run)
+    (at,) = detect_runs(t, run)
     assert 600.0 + (40.0 - taxi[600]) / 4.0 <= at < 600.0 + (40.0 - taxi[600]) / 4.0 + 4.0
-    assert detect(t, taxi) == []
-    assert detect(t, 16.0 + 0.03 * t) == []  # never so slow again: too little acceleration for a run
+    assert detect_runs(t, taxi) == []
+    assert detect_runs(t, 16.0 + 0.03 * t) == []  # never so slow again: too little acceleration for a run
 
 
 def test_outliers_of_the_receiver_are_no_take_off() -> None:
@@ -46,9 +46,9 @@ def test_outliers_of_the_receiver_are_no_take_off() -> None:
     speed[100:102] = 90.0  # two in a row
     speed[150:160], valid[150:160] = 90.0, 0.0  # and ten that say so themselves
     speed[200] = np.nan
-    assert detect(t, speed, valid) == []
+    assert detect_runs(t, speed, valid) == []
     speed[100:104] = [40.0, 41.0, 42.0, 43.0]
-    assert detect(t, speed, valid) == [102.0]
+    assert detect_runs(t, speed, valid) == [102.0]
 
 
 def test_turns_and_stops_of_a_taxi() -> None:
@@ -61,13 +61,13 @@ def test_turns_and_stops_of_a_taxi() -> None:
 
 
 def test_what_has_converged_is_corrected_and_the_solution_whole() -> None:
-    d = decide(EVIDENCE)
+    d = decide_correction(EVIDENCE)
     assert d.passed
     assert d.take.tolist() == [True] * 7 + [True, True, False]
 
 
-def reasons(**changes: object) -> Decision:
-    return decide(replace(EVIDENCE, **changes))  # type: ignore[arg-type]
+def decide_with(**changes: object) -> Decision:
+    return decide_correction(replace(EVIDENCE, **changes))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def reasons(**changes: object) -> Decision:
     ],
 )
 def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str, object], said: str) -> None:
-    d = reasons(**changes)
+    d = decide_with(**changes)
     assert not d.passed
     assert not d.take.any()
     (reason,) = d.reasons
@@ -103,4 +103,4 @@ def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str,
 
 
 def test_all_reasons_are_given_together() -> None:
-    assert len(reasons(alone_s=99.0, taxi=Taxi(turns=0, stops=0), sd=PRIOR).reasons) == 4
+    assert len(decide_with(alone_s=99.0, taxi=Taxi(turns=0, stops=0), sd=PRIOR).reasons) == 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from psabench.boards.objects import Common
+from psabench.boards.unit import tpdo_numbers
 from psabench.conform.active.can_sdo import NOWHERE, put
 from psabench.conform.capture.canbits import frame_bits
 from psabench.conform.dictionary import encoded
@@ -140,7 +141,7 @@ def mappings_lay_out_the_messages(t: Talk) -> str:
     """Upload each mapping and lay it beside the DBC; try to write it."""
     code = requirements().rows["BUS-SDO-10"].limit("read_only_code")
     node, told = t.s.unit.node, []
-    for k in node.tpdos:
+    for k in tpdo_numbers(node):
         name = node.title(Common.TPDO + k).partition(":")[0]
         count = t.number(Common.TPDO_MAPPING + k)
         entries = [t.number(Common.TPDO_MAPPING + k, sub) for sub in range(1, min(count, 64) + 1)]

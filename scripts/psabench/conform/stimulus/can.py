@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from psabench.boards.objects import Common
 from psabench.boards.registry import BOARDS
+from psabench.boards.unit import tpdo_numbers
 from psabench.conform.capture.log import Capture
 from psabench.conform.dut import Dut
 from psabench.conform.plan import stimulus
@@ -68,7 +69,7 @@ def everything_on(t: Talk) -> None:
     node = t.s.unit.node
     if t.s.variant.family == "psa2":
         return
-    for k in node.tpdos:
+    for k in tpdo_numbers(node):
         cob = t.number(Common.TPDO + k, 1)
         if cob & OFF:
             t.download(Common.TPDO + k, 1, (cob & ~OFF).to_bytes(4, "little"))
