@@ -71,8 +71,7 @@ struct board_type {
     unsigned pulse_line;                       /* whose pulses have their number in a frame */
     unsigned (*pulses)(const struct board *b); /* how many of them; NULL: no line has such pulses */
     /* what a fault of a sensor must come to, to be seen */
-    double (*code_v)(
-        const struct board *b); /* a code at the load, V (of an integrator: a count in a second); NULL: 2 uV */
+    double (*code_v)(const struct board *b);  /* a code at the load, V (integrator: a count a second); NULL: 2 uV */
     double (*range_v)(const struct board *b); /* full scale at the load; NULL: 10 V */
     const char *const *events;
     unsigned event_count;
@@ -100,8 +99,7 @@ struct board_type {
     const char *(*why_eager)(struct board *b, int64_t t_ns);
     void (*set_faults)(struct board *b, uint32_t faults); /* where more than board.faults changes; may be NULL */
     void (*observe)(struct board *b, bool on);            /* board.observed is about to change; may be NULL */
-    unsigned (*noises)(struct board *b,
-                       struct draws *at[BOARD_NOISES_MAX]); /* of its converters and gyros; NULL: none */
+    unsigned (*noises)(struct board *b, struct draws *at[BOARD_NOISES_MAX]); /* converters, gyros; NULL: none */
     /* Its own accelerometer of a channel, where the bench puts no other sensor there; g: the site's. NULL: it has none. */
     void (*accelerometer)(const struct board *b, unsigned axis, double g_mps2, struct mems_g *m);
     bool analog; /* it has analog inputs; for faults: sample_until() first */

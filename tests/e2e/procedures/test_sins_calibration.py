@@ -163,6 +163,21 @@ def test_a_gyro_that_sticks_or_saturates_is_named(tmp_path: Path, capsys: Lines,
     assert (tmp_path / "a/increments.bin").stat().st_size > 20_000 * 56  # what was measured is kept
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "{kind: gyro.bias, point: sins.gyro.x, drift_degph: 20, at_s: 120}",
+        "{kind: gyro.scale, point: sins.gyro.y, scale_ppm: 500, at_s: 140}",
+        "{kind: gyro.lock_in, point: sins.gyro.x, lock_in_degph: 100}",
+    ],
+)
+def test_a_gyro_whose_errors_change_is_a_doubt(tmp_path: Path, capsys: Lines, fault: str) -> None:
+    scenario = tmp_path / "faulty.yaml"
+    scenario.write_text((ROOT / "proto/scenarios/sins_table.yaml").read_text() + f"faults:\n  - {fault}\n")
+    assert run(tmp_path / "a", "--plan", plan(tmp_path), "--scenario", scenario, "--seed", "4") == 1
+    assert "DOUBT: mean of innovation²/variance of the accelerometers: expected 1" in capsys.readouterr().out
+
+
 def test_a_coarse_table_and_its_plan_s_azimuth(tmp_path: Path) -> None:
     """The scenario whose table shows no angles; where a plan says that its axis points is believed, here wrongly."""
     assert run(tmp_path / "a", "--plan", plan(tmp_path), "--stand", "no", "--seed", "57") == 0
