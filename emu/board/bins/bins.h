@@ -43,6 +43,7 @@ struct bins_reading {
     int32_t gyro[3];  /* counts */
     int32_t accel[3]; /* sums of codes; a code is truncated: half of one is missing in each word */
     uint8_t words, flags;
+    int32_t baro_mm; /* height that the barometric altimeter shows at t_ns */
 };
 
 struct bins_counters {
@@ -52,17 +53,9 @@ struct bins_counters {
     uint32_t saturated;      /* readings with a word at its limit */
 };
 
-/* Barometric height at the end of a reading. */
-struct bins_baro {
-    uint16_t seq;
-    int32_t height_mm;
-    int64_t t_ns;
-};
-
 struct bins_host {
     void *ctx;
     void (*reading)(void *ctx, const struct bins_reading *r, int64_t t_ns);
-    void (*baro)(void *ctx, const struct bins_baro *b, int64_t t_ns); /* after its reading */
     void (*navigated)(void *ctx, int64_t t_ns);            /* after the reading: outputs of bins.nav are due */
     void (*fault)(void *ctx, uint16_t code, int64_t t_ns); /* enum psa2_fault */
 };
@@ -111,7 +104,6 @@ struct bins {
     struct bins_sums sums;
     struct bins_counters counters;
     struct bins_reading latest;
-    struct bins_baro baro; /* the latest */
     uint16_t temp_code[4];
     struct bins_nav nav;
 };

@@ -146,6 +146,7 @@ static void add_latest(struct sha256 *s, const struct bins_reading *r)
 {
     board_digest_u64(s, (uint64_t)r->seq << 32 | (uint64_t)r->words << 8 | r->flags);
     board_digest_u64(s, (uint64_t)r->t_ns);
+    board_digest_u64(s, (uint32_t)r->baro_mm);
     for (unsigned i = 0; i < 3; i++) board_digest_u64(s, (uint64_t)(uint32_t)r->gyro[i] << 32 | (uint32_t)r->accel[i]);
 }
 
@@ -179,8 +180,6 @@ static void add_digest(const struct board *board, struct sha256 *s)
     add_sums(s, &b->sums);
     add_latest(s, &b->latest);
     add_nav(s, &b->nav);
-    board_digest_u64(s, (uint64_t)b->baro.seq << 32 | (uint32_t)b->baro.height_mm);
-    board_digest_u64(s, (uint64_t)b->baro.t_ns);
     sha256_add(s, &b->counters, sizeof b->counters);
     for (unsigned i = 0; i < 4; i++) board_digest_u64(s, b->temp_code[i]);
 }

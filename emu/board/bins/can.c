@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-enum { FRAMES = 4, SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
+enum { FRAMES = 5, NAV_FRAMES = 4, SOURCE_ACCEL_PORT = 1, SOURCE_TEMP_PORT = 2 };
 #define NM_PER_M       1e9
 #define UAS_PER_ARCSEC 1e6
 
@@ -36,11 +36,6 @@ static struct psabench_bins_gyro_z_t gyro_z_of(const struct bins_reading *r)
     };
 }
 
-static uint16_t stamp_ms(int64_t t_ns)
-{
-    return (uint16_t)((t_ns + 500000) / 1000000);
-}
-
 static void end_conditions(struct board_node *n, const struct bins_reading *r, int64_t t_ns)
 {
     co_node_error_end(&n->node, BINS_EMCY_ACCEL_PORT, t_ns);
@@ -50,25 +45,19 @@ static void end_conditions(struct board_node *n, const struct bins_reading *r, i
 static void on_reading(void *ctx, const struct bins_reading *r, int64_t t_ns)
 {
     struct board_node *n = ctx;
-    struct can_msg m[FRAMES] = {{0}, {0}, {0}, {0}};
+    struct can_msg m[FRAMES] = {{0}, {0}, {0}, {0}, {0}};
     const struct psabench_bins_gyro_xy_t gyro_xy = {r->gyro[0], r->gyro[1]};
     const struct psabench_bins_gyro_z_t gyro_z = gyro_z_of(r);
     const struct psabench_bins_accel_xy_t accel_xy = {r->accel[0], r->accel[1]};
     const struct psabench_bins_accel_z_t accel_z = {r->accel[2], tstamp_us(r)};
+    const struct psabench_bins_baro_t baro = {r->baro_mm};
     m[0].len = (uint8_t)psabench_bins_gyro_xy_pack(m[0].data, &gyro_xy, sizeof m[0].data);
     m[1].len = (uint8_t)psabench_bins_gyro_z_pack(m[1].data, &gyro_z, sizeof m[1].data);
     m[2].len = (uint8_t)psabench_bins_accel_xy_pack(m[2].data, &accel_xy, sizeof m[2].data);
     m[3].len = (uint8_t)psabench_bins_accel_z_pack(m[3].data, &accel_z, sizeof m[3].data);
+    m[4].len = (uint8_t)psabench_bins_baro_pack(m[4].data, &baro, sizeof m[4].data);
     end_conditions(n, r, t_ns);
     board_node_stream(n, BINS_GYRO_XY_TPDO, m, FRAMES, t_ns);
-}
-
-static void on_baro(void *ctx, const struct bins_baro *b, int64_t t_ns)
-{
-    struct can_msg m = {0};
-    const struct psabench_bins_baro_t baro = {b->height_mm, b->seq, stamp_ms(b->t_ns)};
-    m.len = (uint8_t)psabench_bins_baro_pack(m.data, &baro, sizeof m.data);
-    board_node_stream(ctx, BINS_BARO_TPDO, &m, 1, t_ns);
 }
 
 /* ---- the unit's own navigation ---- */
@@ -90,7 +79,7 @@ static void nav_fields(const struct bins *b, double field[BINS_NAV_FIELDS])
     field[4] = (uint16_t)(n->since / n->every + 1);
     for (unsigned i = 0; i < 4; i++) field[5 + i] = limited_to(n->q[i] * 32768.0, 32768.0);
     for (unsigned i = 0; i < 3; i++) field[9 + i] = limited_to(w_radps[i] / RAD_PER_DEG / 0.004, 32768.0);
-    field[12] = stamp_ms(n->t_ns);
+    field[12] = (uint16_t)((n->t_ns + 500000) / 1000000);
 }
 
 static void on_navigated(void *ctx, int64_t t_ns)
@@ -99,7 +88,7 @@ static void on_navigated(void *ctx, int64_t t_ns)
     struct bins_can *can = ctx;
     double *f = can->nav;
     nav_fields(bins_of(n), f);
-    struct can_msg m[FRAMES] = {{0}, {0}, {0}, {0}};
+    struct can_msg m[NAV_FRAMES] = {{0}, {0}, {0}, {0}};
     const struct psabench_bins_nav_place_t place = {(int32_t)f[0], (int32_t)f[1]};
     const struct psabench_bins_nav_speed_t speed = {(int32_t)f[2], (int32_t)f[3], (uint16_t)f[4]};
     const struct psabench_bins_nav_turn_t turn = {(int16_t)f[5], (int16_t)f[6], (int16_t)f[7], (int16_t)f[8]};
@@ -108,7 +97,7 @@ static void on_navigated(void *ctx, int64_t t_ns)
     m[1].len = (uint8_t)psabench_bins_nav_speed_pack(m[1].data, &speed, sizeof m[1].data);
     m[2].len = (uint8_t)psabench_bins_nav_turn_pack(m[2].data, &turn, sizeof m[2].data);
     m[3].len = (uint8_t)psabench_bins_nav_rate_pack(m[3].data, &rate, sizeof m[3].data);
-    board_node_stream(n, BINS_NAV_PLACE_TPDO, m, FRAMES, t_ns);
+    board_node_stream(n, BINS_NAV_PLACE_TPDO, m, NAV_FRAMES, t_ns);
 }
 
 static void on_fault(void *ctx, uint16_t code, int64_t t_ns)
@@ -155,9 +144,8 @@ static double read_timing(const struct board_node *n, const struct co_entry *e)
 
 static double read_baro(const struct board_node *n, const struct co_entry *e)
 {
-    const struct bins_baro *b = &bins_of(n)->baro;
-    const double value[] = {0.0, b->height_mm, b->seq, stamp_ms(b->t_ns)};
-    return value[e->sub];
+    (void)e;
+    return bins_of(n)->latest.baro_mm;
 }
 
 static double read_nav(const struct board_node *n, const struct co_entry *e)
@@ -237,8 +225,8 @@ static void init_can(void *can, const struct board_can_cfg *cfg, struct board *b
                      struct sched *s)
 {
     board_node_init(can, &type, cfg, board, bus, s);
-    ((struct bins *)board)->host = (struct bins_host){
-        .ctx = can, .reading = on_reading, .baro = on_baro, .navigated = on_navigated, .fault = on_fault};
+    ((struct bins *)board)->host =
+        (struct bins_host){.ctx = can, .reading = on_reading, .navigated = on_navigated, .fault = on_fault};
 }
 
 const struct board_can bins_can = {.size = sizeof(struct bins_can), .init = init_can, BOARD_NODE_LIFE};

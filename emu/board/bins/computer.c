@@ -69,13 +69,11 @@ static void take_increments(struct bins *b, const struct bins_latch *at)
     r->flags = flags_of(b, at);
 }
 
-static void show_baro(struct bins *b, int64_t t_ns)
+static int32_t baro_mm(const struct bins *b)
 {
-    const double mm = b->psa2.base.io.baro_m(b->psa2.base.io.ctx, b->latest.t_ns) * 1e3;
-    b->baro.seq++;
-    b->baro.height_mm = (int32_t)floor(fmin(fmax(mm, INT32_MIN), INT32_MAX - 1.0) + 0.5);
-    b->baro.t_ns = b->latest.t_ns;
-    if (b->host.baro) b->host.baro(b->host.ctx, &b->baro, t_ns);
+    const struct board_io *io = &b->psa2.base.io;
+    if (!io->baro_m) return 0;
+    return (int32_t)floor(fmin(fmax(io->baro_m(io->ctx, b->latest.t_ns) * 1e3, INT32_MIN), INT32_MAX - 1.0) + 0.5);
 }
 
 static void send_reading(struct bins *b, const struct bins_latch *at, int64_t t_ns)
@@ -83,11 +81,11 @@ static void send_reading(struct bins *b, const struct bins_latch *at, int64_t t_
     if (!(b->psa2.base.faults & BINS_FAULT_FROZEN_WORDS)) take_increments(b, at);
     b->latest.seq++;
     b->latest.t_ns = at->t_ns;
+    b->latest.baro_mm = baro_mm(b);
     b->counters.readings++;
     b->counters.saturated += (b->latest.flags & BINS_CLIP) != 0;
     board_notify(&b->psa2.base, BINS_EV_READING, t_ns);
     if (b->host.reading) b->host.reading(b->host.ctx, &b->latest, t_ns);
-    if (b->psa2.base.io.baro_m && b->latest.seq % b->profile.baro_every == 0) show_baro(b, t_ns);
     if (!bins_nav_take(&b->nav, &b->latest)) return;
     if (b->host.navigated) b->host.navigated(b->host.ctx, t_ns);
     bins_nav_shown(&b->nav);
@@ -222,7 +220,6 @@ static void clear_sums(struct bins *b)
     b->sums = (struct bins_sums){.word_ns = -1};
     sched_ev_inner(&b->sums.ev, latch_gyros, b);
     b->latest = (struct bins_reading){.seq = 0};
-    b->baro = (struct bins_baro){.seq = 0};
     bins_nav_stop(&b->nav);
     memset(b->temp_code, 0, sizeof b->temp_code);
 }

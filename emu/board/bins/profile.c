@@ -34,7 +34,6 @@ static const struct field rows[] = {
     ROW(gyro_noise_degph, REAL, 0.1, 0, 1000, "White noise of a gyro: standard deviation of a mean of one second."),
     ROW(accel_noise_mps2, REAL, 1e-3, 0, 1, "White noise of an accelerometer: standard deviation of a mean of one second."),
     ROW(nav_every, U32, 20, 1, 1000, "Readings between two outputs of the unit's own navigation: 20 are 0.2 s."),
-    ROW(baro_every, U32, 10, 1, 1000, "Readings between two barometric heights: 10 are 0.1 s."),
     ROW(gyro_lock_in_degph, REAL, 0.0, 0, 3600, "Lock-in of a gyro: it counts sqrt(w^2 - lock-in^2), and nothing below; 0: its dither removes it."),
     ROW(gyro_instability_degph, REAL, 0.0, 0, 1000, "Bias instability B of a gyro, flicker: the Allan deviation is 0.664 of it from 1 s to 300 s."),
     ROW(accel_instability_mps2, REAL, 0.0, 0, 1, "The same of an accelerometer."),

@@ -27,7 +27,6 @@ struct bins_profile {
     /* noise: standard deviation of a mean of one second */
     double gyro_noise_degph, accel_noise_mps2;
     uint32_t nav_every;        /* readings between two outputs of the unit's own navigation */
-    uint32_t baro_every;       /* readings between two barometric heights */
     double gyro_lock_in_degph; /* rates below it are not seen; 0: dithered away */
     double gyro_instability_degph, accel_instability_mps2; /* B of IEEE Std 952: flicker (phys/sensor/noise.h) */
 };

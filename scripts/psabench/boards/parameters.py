@@ -408,8 +408,6 @@ PARAMETERS: Mapping[str, Mapping[str, tuple[int, int]]] = {
         "NAV_START_HEIGHT": (0x2212, 3),
         "2212_4_ALIGNMENT": (0x2212, 4),
         "BARO_HEIGHT": (0x2213, 1),
-        "BARO_NUMBER": (0x2213, 2),
-        "BARO_INSTANT": (0x2213, 3),
         "2220_1_COUNT_OF": (0x2220, 1),
         "2220_2_CODE_OF_A": (0x2220, 2),
         "TIMING_WORDS": (0x2221, 1),

@@ -95,25 +95,16 @@ class Bins(BusUnit):
         self.node.write(OD.NAV_MODE, 1, 1)
         for name in MESSAGES:
             self._switch(name, on=increments)
-        return self._read_also(NAV_MESSAGES, counter="NSEQ", stamp="NTIME")
-
-    def barometer(self) -> ReadingReader:
-        """Barometric heights from now on, HBARO in m, come to the reader returned."""
-        return self._read_also(("BINS_BARO",), counter="BSEQ", stamp="BTIME")
+        for name in NAV_MESSAGES:
+            self._switch(name, on=True)
+        layout = ReadingLayout(board=self.board, messages=NAV_MESSAGES, counter="NSEQ", stamp="NTIME")
+        outputs = ReadingReader(layout, self.node.node_id)
+        self.host.listeners.append(outputs.on_message)
+        return outputs
 
     def navigation(self) -> NavState:
         """What the unit's own navigation does."""
         return NavState(int(self.node.read(OD.NAV_MODE, 2)))
-
-    def _read_also(self, messages: tuple[str, ...], counter: str, stamp: str) -> ReadingReader:
-        """Messages that are off until a host wants them."""
-        for name in messages:
-            self._switch(name, on=True)
-        reader = ReadingReader(
-            ReadingLayout(board=self.board, messages=messages, counter=counter, stamp=stamp), self.node.node_id
-        )
-        self.host.listeners.append(reader.on_message)
-        return reader
 
     def _switch(self, message: str, *, on: bool) -> None:
         index = tpdos_of(self.node)[message]
