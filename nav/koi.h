@@ -110,11 +110,12 @@ struct nav_koi_sensors {
     double nu_radps[3], theta[9], df_mps2[3], gamma[9]; /* row-major */
 };
 
-/* C_nb at the end of n increments of a unit that stays where it is and may sway: apparent gravity, which the gyros hold against inertial
- * space, turns with the Earth. ratio (or NULL): of the turn seen to the Earth's, 1 for a unit at rest. NAV_SINGULAR: below 0.5 or
+/* C_nb at the beginning and at the end (either may be NULL) of n increments of a unit that stays where it is and may sway: apparent
+ * gravity, which the gyros hold against inertial space, turns with the Earth. A filter that begins at the beginning has all data for
+ * its fine alignment by zero velocity. ratio (or NULL): of the turn seen to the Earth's, 1 for a unit at rest. NAV_SINGULAR: below 0.5 or
  * above 1.5. Latitude within 85 deg, n sample_s from 10 s; heading to 1 deg of a good unit in 120 s. */
 NAV_API int nav_koi_coarse(const double *dtheta_rad, const double *dv_mps, int64_t n, double sample_s, double lat_rad,
-                           double C_nb[9], double *ratio);
+                           double C_nb_begin[9], double C_nb_end[9], double *ratio);
 
 typedef struct nav_koi nav_koi;
 NAV_API size_t nav_koi_bytes(void);

@@ -24,7 +24,7 @@ static held hold_force(const double *dtheta_rad, const double *dv_mps, int64_t n
 }
 
 int nav_koi_coarse(const double *dtheta_rad, const double *dv_mps, int64_t n, double sample_s, double lat_rad,
-                   double C_nb[9], double *ratio)
+                   double C_nb_begin[9], double C_nb_end[9], double *ratio)
 {
     const double half_s = (double)(n / 2) * sample_s;
     if (n < 2 || !(sample_s > 0.0 && half_s >= 5.0)) return NAV_RANGE;
@@ -43,6 +43,8 @@ int nav_koi_coarse(const double *dtheta_rad, const double *dv_mps, int64_t n, do
     c.row(1) = up.cross(east);
     c.row(2) = up;
     const vec3 u(0.0, NAV_EARTH_RADPS * nav_cos(lat_rad), NAV_EARTH_RADPS * nav_sin(lat_rad));
-    nav_store_rows(nav_nearest_rotation(nav_rotation_by(-u * half_s) * c * s.end), C_nb);
+    const mat3 half_turn = nav_rotation_by(u * half_s); /* of n in inertial space */
+    if (C_nb_begin) nav_store_rows(nav_nearest_rotation(half_turn * c), C_nb_begin);
+    if (C_nb_end) nav_store_rows(nav_nearest_rotation(half_turn.transpose() * c * s.end), C_nb_end);
     return NAV_OK;
 }

@@ -110,6 +110,15 @@ class Integrated:
     taken: dict[Kind, Taken]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoarseAlignment:
+    """Attitude by apparent gravity that turns with the Earth."""
+
+    begin_C_nb: Floats  # (3, 3)
+    end_C_nb: Floats
+    ratio: float  # of the turn seen to the Earth's
+
+
 def koi_default(unit_class: UnitClass = UnitClass.GOOD) -> KoiConfig:
     """Prior and noise of a class."""
     cfg = KoiConfig()
@@ -134,15 +143,16 @@ def koi_prior(cfg: KoiConfig, at: State) -> Floats:
     return p
 
 
-def coarse_alignment(dtheta_rad: Floats, dv_mps: Floats, sample_s: float, lat_rad: float) -> tuple[Floats, float]:
-    """C_nb at the end of increments at rest, and the ratio of the turn seen to the Earth's. Raises Refused."""
+def coarse_alignment(dtheta_rad: Floats, dv_mps: Floats, sample_s: float, lat_rad: float) -> CoarseAlignment:
+    """Of increments at rest, with sway. Raises Refused."""
     a, v = _increment_rows(dtheta_rad, dv_mps)
-    found, ratio = np.empty((3, 3)), c.c_double()
+    found, ratio = [np.empty((3, 3)) for _ in range(2)], c.c_double()
+    where = (m.ctypes.data for m in found)
     status = library().koi_coarse(
-        a.ctypes.data, v.ctypes.data, len(a), sample_s, lat_rad, found.ctypes.data, c.byref(ratio)
+        a.ctypes.data, v.ctypes.data, len(a), sample_s, lat_rad, *where, c.byref(ratio)
     )
     _check_status("coarse alignment", status)
-    return found, ratio.value
+    return CoarseAlignment(begin_C_nb=found[0], end_C_nb=found[1], ratio=ratio.value)
 
 
 class Koi:

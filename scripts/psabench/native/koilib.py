@@ -86,7 +86,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "koi_block_name": (c.c_char_p, _I),
     "koi_reason_text": (c.c_char_p, _I),
     "koi_prior": (_I, _CFG, _V, _V),
-    "koi_coarse": (_I, _V, _V, _L, _D, _D, _V, _DOUBLES),
+    "koi_coarse": (_I, _V, _V, _L, _D, _D, _V, _V, _DOUBLES),
     "koi_bytes": (c.c_size_t,),
     "koi_start": (_I, _V, c.c_size_t, _CFG, _D, _V, _V, _V, _P(SensorsStruct), _P(_V)),
     "koi_push": (_I, _V, _V, _V, _L),

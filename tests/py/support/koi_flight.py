@@ -159,8 +159,9 @@ class Drawn:
     @staticmethod
     def of(cfg: KoiConfig, truth: Truth, p: Floats, seed: int) -> Drawn:
         rng = np.random.default_rng(seed)
-        values, vectors = np.linalg.eigh(p)
-        x = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(p)))
+        sd = np.sqrt(np.diag(p))  # of the correlations: of P itself the small ones would drown in rounding
+        values, vectors = np.linalg.eigh(p / np.outer(sd, sd))
+        x = sd * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(p))))
         angle, speed = measured(truth, sensors_of(cfg, x))
         n = len(truth)
         walk = np.cumsum(rng.normal(0.0, cfg.nu_walk_radps_rts * math.sqrt(DT_S), (n, 3)), axis=0)
