@@ -145,17 +145,27 @@ static int finish_step(struct nav_koi *k)
     return status;
 }
 
-static int push_one(struct nav_koi *k, const double *dtheta_rad, const double *dv_mps)
+/* count increments, no more than the step still takes. */
+static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *dv_mps, int count)
 {
     const double dt = k->cfg.sample_s;
-    const vec3 nu(k->sensors.nu_radps), df(k->sensors.df_mps2);
-    const vec3 a = k->gyro_back * (Eigen::Map<const vec3>(dtheta_rad) - nu * dt);
-    const vec3 v = k->accel_back * (Eigen::Map<const vec3>(dv_mps) - df * dt);
-    const int status = nav_integrate(&k->unit, a.data(), v.data(), 1, dt, nullptr, nullptr);
+    const vec3 nu = vec3(k->sensors.nu_radps) * dt, df = vec3(k->sensors.df_mps2) * dt;
+    double angle[3 * KOI_STEP_MAX], speed[3 * KOI_STEP_MAX];
+    vec3 dtheta_sum = k->dtheta_sum, dv_sum = k->dv_sum;
+    for (int i = 0; i < 3 * count; i += 3) {
+        const vec3 a = k->gyro_back * (Eigen::Map<const vec3>(dtheta_rad + i) - nu);
+        const vec3 v = k->accel_back * (Eigen::Map<const vec3>(dv_mps + i) - df);
+        Eigen::Map<vec3>(angle + i) = a;
+        Eigen::Map<vec3>(speed + i) = v;
+        dtheta_sum += a;
+        dv_sum += v;
+    }
+    const int status = nav_integrate(&k->unit, angle, speed, count, dt, nullptr, nullptr);
     if (status != NAV_OK) return status;
-    k->dtheta_sum += a;
-    k->dv_sum += v;
-    return ++k->in_step == k->per_step ? finish_step(k) : NAV_OK;
+    k->dtheta_sum = dtheta_sum;
+    k->dv_sum = dv_sum;
+    k->in_step += count;
+    return k->in_step == k->per_step ? finish_step(k) : NAV_OK;
 }
 
 int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int64_t count)
@@ -163,6 +173,11 @@ int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int
     if (count < 0) return NAV_RANGE;
     if (!are_finite(dtheta_rad, 3 * count) || !are_finite(dv_mps, 3 * count)) return NAV_NOT_FINITE;
     int status = NAV_OK;
-    for (int64_t i = 0; i < count && status == NAV_OK; i++) status = push_one(k, dtheta_rad + 3 * i, dv_mps + 3 * i);
+    for (int64_t i = 0; i < count && status == NAV_OK;) {
+        const int64_t left = k->per_step - k->in_step;
+        const int part = (int)(count - i < left ? count - i : left);
+        status = push_part(k, dtheta_rad + 3 * i, dv_mps + 3 * i, part);
+        i += part;
+    }
     return status;
 }

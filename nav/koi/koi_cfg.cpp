@@ -118,7 +118,7 @@ int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why)
     const int status = check_all(cfg, rules, why);
     if (status != NAV_OK) return status;
     const double per_step = nav_floor(cfg->step_s / cfg->sample_s + 0.5);
-    if (per_step < 1.0 || per_step > 64.0 || std::fabs(per_step * cfg->sample_s - cfg->step_s) > 1e-9)
+    if (per_step < 1.0 || per_step > KOI_STEP_MAX || std::fabs(per_step * cfg->sample_s - cfg->step_s) > 1e-9)
         return check_refuse(why, NAV_RANGE, "step_s", cfg->step_s, "1 to 64 whole samples");
     return NAV_OK;
 }

@@ -13,6 +13,7 @@ enum koi_moving { KOI_R1, KOI_R2, KOI_V1, KOI_V2, KOI_A1, KOI_A2, KOI_B3, KOI_R3
 constexpr int KOI_OF_ERROR[KOI_ERRORS] = {KOI_R1, KOI_R2, KOI_R3, KOI_V1, KOI_V2, KOI_V3, KOI_A1, KOI_A2, KOI_B3};
 
 constexpr double KOI_NEVER_S = -1e300;
+constexpr int KOI_STEP_MAX = 64; /* samples */
 
 /* What T hangs on: t = tan(lat)/(N + h) and V. */
 struct koi_map {
