@@ -29,26 +29,23 @@
 extern "C" {
 #endif
 
-enum nav_koi_block {
-    NAV_KOI_DR,
-    NAV_KOI_DV,
-    NAV_KOI_ALPHA,
-    NAV_KOI_BETA3,
-    NAV_KOI_VERTICAL,
-    NAV_KOI_BARO,
-    NAV_KOI_NU,
-    NAV_KOI_DF,
-    NAV_KOI_GAMMA,
-    NAV_KOI_THETA,
-    NAV_KOI_DT,
-    NAV_KOI_BLOCKS,
+enum nav_koi_block { /* in the order of the state */
+                     NAV_KOI_DR,
+                     NAV_KOI_DV,
+                     NAV_KOI_ALPHA,
+                     NAV_KOI_BETA3,
+                     NAV_KOI_VERTICAL,
+                     NAV_KOI_BARO,
+                     NAV_KOI_NU,
+                     NAV_KOI_DF,
+                     NAV_KOI_GAMMA,
+                     NAV_KOI_THETA,
+                     NAV_KOI_DT,
+                     NAV_KOI_BLOCKS
 };
 
-enum nav_koi_class { /* of the unit, E0: prior and noise */
-                     NAV_KOI_GOOD,
-                     NAV_KOI_BINS,
-                     NAV_KOI_CLASSES,
-};
+/* Prior and noise of a unit, E0. */
+enum nav_koi_class { NAV_KOI_GOOD, NAV_KOI_BINS, NAV_KOI_CLASSES };
 
 enum nav_koi_kind {                   /* of a measurement, with its value */
                     NAV_KOI_POSITION, /* latitude, longitude, height; sd in m east, north, up */
@@ -73,47 +70,34 @@ enum nav_koi_reason { /* the first one that holds */
 };
 
 struct nav_koi_cfg {
-    double sample_s, step_s; /* of increments and of the filter; 1 to 64 samples */
-    int form;                /* enum nav_kf_form */
-    int gauge;               /* enum nav_sins_gauge: which Gamma */
-    double
-        alignment_s; /* length of the alignment before; its errors by nu0, Df0, Gamma, Theta and noise are in P. 0: none */
-    double dr_sd_m[3]; /* standard deviations of the prior; 0: known */
-    double dv_sd_mps[3];
+    double sample_s, step_s;           /* of increments and of the filter; 1 to 64 samples */
+    int form, gauge;                   /* enum nav_kf_form; enum nav_sins_gauge: which Gamma */
+    double alignment_s;                /* of the alignment before, whose errors are in P; 0: none */
+    double dr_sd_m[3], dv_sd_mps[3];   /* standard deviations of the prior; 0: known */
     double alpha_sd_rad, beta3_sd_rad; /* besides what the alignment gives */
-    double nu_sd_radps, nu_run_radps;  /* persistent part, and from run to run: squares add */
-    double df_sd_mps2, df_run_mps2;
-    double gamma_scale_sd, gamma_angle_sd_rad;
-    double theta_scale_sd, theta_angle_sd_rad;
-    double dt1_sd_s, dt2_sd_s;
+    double nu_sd_radps, nu_run_radps, df_sd_mps2, df_run_mps2; /* persistent part, from run to run: squares add */
+    double gamma_scale_sd, gamma_angle_sd_rad, theta_scale_sd, theta_angle_sd_rad, dt1_sd_s, dt2_sd_s;
     double baro_sd_m;                                  /* 0: the barometer is right, and baro is not in the state */
     double gyro_noise_radps_rts, accel_noise_mps2_rts; /* standard deviation of a mean over 1 s */
-    double nu_walk_radps_rts, df_walk_mps2_rts;        /* random walks: standard deviation after 1 s; 0: constants */
-    double baro_walk_m_rts;
-    double position_sd_m[3], velocity_sd_mps[3]; /* of measurements that do not give their own */
-    double stop_sd_mps, height_sd_m;
-    double damping_per_s, damping_per_s2; /* k1, k2 of the vertical channel */
-    double gate_nis[2];                   /* of one scalar (height), of three */
-    double outlier_nis;
-    double max_age_s;
+    double nu_walk_radps_rts, df_walk_mps2_rts, baro_walk_m_rts;    /* random walks: after 1 s; 0: constants */
+    double position_sd_m[3], velocity_sd_mps[3];                    /* of measurements that do not give their own */
+    double stop_sd_mps, height_sd_m, damping_per_s, damping_per_s2; /* k1, k2 of the vertical channel */
+    double gate_nis[2], outlier_nis, max_age_s;                     /* gates: of one scalar (height), of three */
 };
 NAV_API int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg); /* NAV_RANGE: no such class */
 NAV_API int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why);
 NAV_API int nav_koi_layout(const struct nav_koi_cfg *cfg, struct nav_sins_rows rows[NAV_KOI_BLOCKS]); /* states */
 NAV_API const char *nav_koi_block_name(int block);
 NAV_API const char *nav_koi_reason_text(int reason);
-/* Prior covariance (n x n) of a unit at rest or in motion in this state. */
+/* Prior covariance (n x n) in this state. */
 NAV_API int nav_koi_prior(const struct nav_koi_cfg *cfg, const struct nav_state *at, double *p);
-
 /* Errors of the sensors: what is taken off the increments. */
 struct nav_koi_sensors {
     double nu_radps[3], theta[9], df_mps2[3], gamma[9]; /* row-major */
 };
-
 /* C_nb at the beginning and at the end (either may be NULL) of n increments of a unit that stays where it is and may sway: apparent
- * gravity, which the gyros hold against inertial space, turns with the Earth. A filter that begins at the beginning has all data for
- * its fine alignment by zero velocity. ratio (or NULL): of the turn seen to the Earth's, 1 for a unit at rest. NAV_SINGULAR: below 0.5 or
- * above 1.5. Latitude within 85 deg, n sample_s from 10 s; heading to 1 deg of a good unit in 120 s. */
+ * gravity, which the gyros hold against inertial space, turns with the Earth. ratio (or NULL): of
+ * the turn seen to the Earth's; NAV_SINGULAR: not 0.5 to 1.5. Latitude within 85 deg, n sample_s from 10 s; 1 deg in 120 s. */
 NAV_API int nav_koi_coarse(const double *dtheta_rad, const double *dv_mps, int64_t n, double sample_s, double lat_rad,
                            double C_nb_begin[9], double C_nb_end[9], double *ratio);
 
@@ -124,16 +108,12 @@ NAV_API size_t nav_koi_bytes(void);
 NAV_API int nav_koi_start(void *memory, size_t bytes, const struct nav_koi_cfg *cfg, double t_s,
                           const struct nav_state *at, const double *x, const double *p,
                           const struct nav_koi_sensors *sensors, nav_koi **out);
-
 /* count raw increments, rows of three, the next ones; after each step_s the filter predicts. */
 NAV_API int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int64_t count);
-
 struct nav_koi_measurement {
-    int kind;   /* enum nav_koi_kind */
-    int valid;  /* 0: the device says that it is not */
-    double t_s; /* of the value, as far as it is known: Dt1, Dt2 are what is left */
-    double value[3];
-    double sd[3]; /* 0: that of the configuration */
+    int kind, valid;        /* enum nav_koi_kind; 0: the device says that it is not */
+    double t_s;             /* of the value, as far as it is known: Dt1, Dt2 are what is left */
+    double value[3], sd[3]; /* 0: that of the configuration */
 };
 /* Returns a reason, 0: accepted; below zero: unknown kind. */
 NAV_API int nav_koi_take(nav_koi *k, const struct nav_koi_measurement *m);
@@ -159,8 +139,7 @@ struct nav_koi_state {
     struct nav_koi_last last[NAV_KOI_KINDS];
 };
 NAV_API int nav_koi_get(const nav_koi *k, struct nav_koi_state *state);
-/* n, n x n, n standard deviations; each may be NULL. */
-NAV_API int nav_koi_covariance(const nav_koi *k, double *x, double *p, double *sd);
+NAV_API int nav_koi_covariance(const nav_koi *k, double *x, double *p, double *sd); /* each may be NULL */
 /* Of the last step: phi (moving x n), q (moving x moving); returns moving. For tests and smoothers. Each may be NULL. */
 NAV_API int nav_koi_jacobians(const nav_koi *k, double *phi, double *q);
 

@@ -26,7 +26,8 @@ static held hold_force(const double *dtheta_rad, const double *dv_mps, int64_t n
 int nav_koi_coarse(const double *dtheta_rad, const double *dv_mps, int64_t n, double sample_s, double lat_rad,
                    double C_nb_begin[9], double C_nb_end[9], double *ratio)
 {
-    const double half_s = (double)(n / 2) * sample_s;
+    const int64_t half = n / 2;
+    const double half_s = (double)half * sample_s;
     if (n < 2 || !(sample_s > 0.0 && half_s >= 5.0)) return NAV_RANGE;
     if (!(std::fabs(lat_rad) <= 85.0 * NAV_DEG)) return NAV_LATITUDE;
     const held s = hold_force(dtheta_rad, dv_mps, n);

@@ -25,7 +25,7 @@ struct Seen {
     double age_s, dt1_s, dt2_s;
 };
 
-Seen see(const nav_koi *k, const nav_koi_measurement *m)
+Seen see_hybrid(const nav_koi *k, const nav_koi_measurement *m)
 {
     const double *dt = k->kf.x + k->at[NAV_KOI_DT].offset;
     Seen s = {koi_hybrid(k), {},   vec3(k->acceleration_mps2), koi_map_at(&k->before), koi_time_s(k) - m->t_s,
@@ -49,7 +49,7 @@ void add_velocity(const nav_koi *k, const Seen &s, double factor, double *h)
 
 void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
-    const Seen s = see(k, m);
+    const Seen s = see_hybrid(k, m);
     const earth_place place = earth_place_at(s.at.lat_rad, s.at.h_m);
     const double late = s.age_s + s.dt1_s;
     const vec3 moved = late * s.v - 0.5 * late * late * s.a; /* since the value's time */
@@ -65,7 +65,7 @@ void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 
 void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
-    const Seen s = see(k, m);
+    const Seen s = see_hybrid(k, m);
     const int dt = k->at[NAV_KOI_DT].offset;
     add_velocity(k, s, 1.0, rows->h);
     for (int i = 0; i < 3; i++) {
@@ -76,14 +76,14 @@ void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 
 void stop_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
-    const Seen s = see(k, m);
+    const Seen s = see_hybrid(k, m);
     add_velocity(k, s, 1.0, rows->h);
     for (int i = 0; i < 3; i++) rows->y[i] = s.v[i];
 }
 
 void height_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
-    const Seen s = see(k, m);
+    const Seen s = see_hybrid(k, m);
     rows->y[0] = s.at.h_m - s.age_s * s.v[2] - m->value[0];
     rows->h[KOI_R3] = 1.0;
     if (!k->at[NAV_KOI_BARO].size) return;

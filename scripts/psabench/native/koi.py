@@ -81,7 +81,7 @@ class Sensors:
     def as_struct(self) -> SensorsStruct:
         """What the library takes."""
         out = SensorsStruct()
-        for name, _ in SensorsStruct._fields_:
+        for name in ("nu_radps", "theta", "df_mps2", "gamma"):
             getattr(out, name)[:] = list(np.ravel(getattr(self, name)))
         return out
 
@@ -148,9 +148,7 @@ def coarse_alignment(dtheta_rad: Floats, dv_mps: Floats, sample_s: float, lat_ra
     a, v = _increment_rows(dtheta_rad, dv_mps)
     found, ratio = [np.empty((3, 3)) for _ in range(2)], c.c_double()
     where = (m.ctypes.data for m in found)
-    status = library().koi_coarse(
-        a.ctypes.data, v.ctypes.data, len(a), sample_s, lat_rad, *where, c.byref(ratio)
-    )
+    status = library().koi_coarse(a.ctypes.data, v.ctypes.data, len(a), sample_s, lat_rad, *where, c.byref(ratio))
     _check_status("coarse alignment", status)
     return CoarseAlignment(begin_C_nb=found[0], end_C_nb=found[1], ratio=ratio.value)
 
@@ -175,9 +173,7 @@ class Koi:
         arrays = [None if a is None else np.ascontiguousarray(a, np.float64) for a in (x, p)]
         given = [None if a is None else a.ctypes.data for a in arrays]
         struct = None if sensors is None else c.byref(sensors.as_struct())
-        status = lib.koi_start(
-            place, lib.koi_bytes(), cfg, t_s, row.ctypes.data, *given, struct, c.byref(self.handle)
-        )
+        status = lib.koi_start(place, lib.koi_bytes(), cfg, t_s, row.ctypes.data, *given, struct, c.byref(self.handle))
         _check_status("start", status)
 
     def push(self, dtheta_rad: Floats, dv_mps: Floats) -> None:

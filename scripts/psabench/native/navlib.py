@@ -1,5 +1,5 @@
-"""libpsabench-nav as ctypes sees it: declared here, in `sinslib`, `errorslib` and `koilib`, used by `nav`, `nav_mc`, `sins`.
-Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here, in `sinslib`, `errorslib` and `koilib`, used
+by `nav`, `nav_mc`, `sins`. Manual: nav.h."""
 
 from __future__ import annotations
 

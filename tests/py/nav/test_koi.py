@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 import flight
 import numpy as np
@@ -143,7 +144,7 @@ def fix(koi: Koi, **change: float) -> list[float]:
 
 
 FINE = (5.0, 5.0, 8.0)
-GATES = {
+GATES: dict[str, tuple[Reason, dict[str, Any]]] = {
     "fine": (Reason.ACCEPTED, {}),
     "its status": (Reason.INVALID, {"valid": False}),
     "no number": (Reason.NOT_FINITE, {"lat_rad": math.nan}),
@@ -187,7 +188,7 @@ def test_the_gate_is_the_normalised_innovation_of_all_three_together(taxied: tup
     koi.push(d.angle[10_090:10_100], d.speed[10_090:10_100])
     at, h, dt = koi.state, np.zeros((3, koi.n)), koi.layout["dt"]
     a = (at.autonomous.v_n_mps - v_before) / 0.1
-    v1, v2 = at.autonomous.v_n_mps[:2]
+    v1, v2 = (float(v) for v in at.autonomous.v_n_mps[:2])
     t = moving_of(np.eye(9)[0], at.autonomous)[6]
     h[0, [2, 6, 0]], h[1, [3, 6, 0]], h[2, 8] = (1.0, -v2, t * v2), (1.0, v1, -t * v1), 1.0
     h[:, dt] = a[:, None]
@@ -229,8 +230,8 @@ def test_spikes_are_left_and_the_flight_goes_on(ground: Truth) -> None:
             koi.take(Kind.POSITION, t, [true.lat_rad[0] + off, true.lon_rad[0], true.h_m[0]])
     assert spiked.state.taken[Kind.POSITION].counts[Reason.OUTLIER] == seconds // 10
     assert np.abs(spiked.x - clean.x).max() < 1.0
-    off = error_between(spiked.state.hybrid, ground.state(100 * seconds))
-    assert np.abs(off[:3]).max() < 3.0
+    left = error_between(spiked.state.hybrid, ground.state(100 * seconds))
+    assert np.abs(left[:3]).max() < 3.0
 
 
 # ---- one-off correction
@@ -333,8 +334,8 @@ def test_both_forms_of_the_covariance_agree(ground: Truth) -> None:
 
 
 def aligned(d: Drawn, cfg: KoiConfig) -> Koi:
-    """Coarse by two minutes, then zero velocity by the filter from the beginning, then a correction; sensors stay as they
-    are."""
+    """Coarse by two minutes, then zero velocity by the filter from the beginning, then a correction of all but the
+    sensors."""
     truth, coarse = d.truth, 12_000
     true = truth.state(0)
     found = coarse_alignment(d.angle[:coarse], d.speed[:coarse], DT_S, true.lat_rad)

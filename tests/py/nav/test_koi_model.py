@@ -4,12 +4,23 @@ a flight with turns and climbs, and the matrix against the article's equations w
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import flight
 import numpy as np
 import pytest
-from koi_flight import DT_S, LEGS, Floats, Truth, error_between, errors_of, measured, moving_of, sensors_of, t_per_m, with_errors
+from koi_flight import (
+    DT_S,
+    LEGS,
+    Floats,
+    Truth,
+    error_between,
+    errors_of,
+    measured,
+    moving_of,
+    sensors_of,
+    t_per_m,
+    with_errors,
+)
 from psabench.native.koi import Koi, KoiConfig, UnitClass, koi_default, koi_layout
 from psabench.native.nav import Refused
 from psabench.native.sins import Gauge
@@ -76,8 +87,8 @@ def reference(truth: Truth, cfg: KoiConfig) -> Floats:
 
 @pytest.mark.parametrize("gauge", [Gauge.ARTICLE, Gauge.FREE9])
 def test_every_column_is_the_central_difference_of_the_nonlinear_integration(truth: Truth, gauge: Gauge) -> None:
-    """Within 1 % of each column's largest element among the rows of one kind. beta3 is what remains of two terms, betaU and
-    t dr1, and errs by a part of them."""
+    """Within 1 % of each column's largest element among the rows of one kind. beta3 is what remains of betaU and t dr1,
+    and errs by a part of them."""
     cfg = config(gauge)
     model, slopes = transition(truth, cfg), reference(truth, cfg)
     assert model.shape[1] == (33 if gauge is Gauge.ARTICLE else 36)
@@ -95,8 +106,8 @@ def test_every_column_is_the_central_difference_of_the_nonlinear_integration(tru
 
 
 def article(truth: Truth, k: int) -> Floats:
-    """The horizontal equations on a sphere at interval k, by states dr1 dr2 dV1 dV2 alpha1 alpha2 beta3, then nu1 nu2 nu3
-    and Df1 Df2 in n."""
+    """The horizontal equations on a sphere at interval k, by states dr1 dr2 dV1 dV2 alpha1 alpha2 beta3, then nu1 nu2
+    nu3 and Df1 Df2 in n."""
     at = truth.state(k)
     f = at.C_nb @ truth.dv_mps[k] / DT_S
     meridian, vertical = radii_m(at.lat_rad, at.h_m)
