@@ -126,6 +126,26 @@ def test_latencies_of_the_receiver_are_found(whole: Truth) -> None:
     assert np.abs(koi.x[dt] - d.x[dt]).max() < 4.0 * koi.sd[dt].max()
 
 
+@pytest.mark.parametrize("late_s", [0.35, 0.08, 0.0, -0.07])
+def test_a_value_is_compared_with_its_own_time(whole: Truth, late_s: float) -> None:
+    """A unit without errors in a turn; values late by up to max_age_s, and between two steps."""
+    begin = 74_000
+    cfg, unit = koi_default(), slice(begin, begin + 1007)
+    koi = Koi(cfg, 0.0, whole.state(begin))
+    koi.push(whole.dtheta_rad[unit], whole.dv_mps[unit])
+    true = whole.times(np.array([(begin + 1000) * DT_S - late_s]))
+    speed = float(np.hypot(*true.v_enu_mps[0, :2]))
+    assert speed > 80.0
+    koi.take(Kind.POSITION, 10.0 - late_s, [true.lat_rad[0], true.lon_rad[0], true.h_m[0]])
+    koi.take(Kind.HEIGHT, 10.0 - late_s, [true.h_m[0]])
+    koi.take(Kind.VELOCITY, 10.0 - late_s, true.v_enu_mps[0])
+    taken = koi.state.taken
+    limit = 0.02 + 2.0 * late_s**2  # the jerk's share
+    assert np.abs(taken[Kind.POSITION].innovation[:, 0]).max() < limit
+    assert abs(taken[Kind.HEIGHT].innovation[0, 0]) < limit
+    assert np.abs(taken[Kind.VELOCITY].innovation[:, 0]).max() < limit
+
+
 # ---- gates
 
 

@@ -184,7 +184,7 @@ class Drawn:
         return x
 
     def fly(self, koi: Koi, first_s: int, last_s: int, *, height: bool = True) -> None:
-        """Seconds of increments; after each a fix, the barometer and at rest a stop."""
+        """Seconds of increments; after each a fix and the barometer."""
         rng = np.random.default_rng([self.seed, first_s])
         dt = self.x[koi_layout(self.cfg)["dt"]]
         t_s = np.arange(first_s + 1, last_s + 1, dtype=np.float64)
