@@ -149,6 +149,23 @@ def test_the_equations_are_the_articles(path: flight.Flight) -> None:
     assert off.max() < 0.01, off.round(4)
 
 
+def test_noise_of_the_gyros_moves_the_dynamic_velocity_too(truth: Truth) -> None:
+    """Q = T diag(density^2) T' of a step in flight, then the walks."""
+    cfg, at = koi_default(UnitClass.BINS), truth.state(40_000)
+    koi = Koi(cfg, 0.0, at)
+    koi.push(truth.dtheta_rad[40_000:40_010], truth.dv_mps[40_000:40_010])
+    to = np.stack([moving_of(row, koi.state.autonomous) for row in np.eye(9)], -1)
+    density = np.repeat([0.0, cfg.accel_noise_mps2_rts, cfg.gyro_noise_radps_rts], 3)
+    want = np.zeros((13, 13))
+    want[:9, :9] = 0.1 * to @ np.diag(density**2) @ to.T
+    want[9:, 9:] = 0.1 * np.diag([cfg.baro_walk_m_rts**2] + [cfg.nu_walk_radps_rts**2] * 3)
+    _, q = koi.jacobians()
+    scale = np.sqrt(np.outer(np.diag(want), np.diag(want)))
+    assert q.shape == want.shape
+    assert np.abs(want[2, 6]) > 0.0
+    assert (np.abs(q - want) <= 1e-9 * scale + 1e-30).all()
+
+
 def test_a_configuration_out_of_range_is_refused_with_its_field() -> None:
     cfg = config(Gauge.ARTICLE)
     cfg.velocity_sd_mps[1] = 0.0
