@@ -21,10 +21,12 @@ from koi_flight import (
     t_per_m,
     with_errors,
 )
-from psabench.native.koi import Koi, KoiConfig, UnitClass, koi_default, koi_layout
+from psabench.native.koi import Koi, KoiConfig, UnitClass, koi_default, koi_layout, koi_prior
 from psabench.native.nav import Refused
+from psabench.native.nav_errors import ErrorsConfig
 from psabench.native.sins import Gauge
 from psabench.native.strapdown import Strapdown, gravity_mps2, radii_m
+from psabench.sins.alignment import aligned_state
 
 DEGPH, EARTH_RADPS = math.radians(1.0) / 3600.0, 7.292115e-5
 STEPS = {"dr": 100.0, "dV": 0.1, "alpha": 3e-4, "beta3": 3e-4, "vertical": 1.0, "nu": 0.01 * DEGPH, "df": 1e-4}
@@ -147,6 +149,26 @@ def test_the_equations_are_the_articles(path: flight.Flight) -> None:
     least = np.array([1.0, 1.0, 2e-3, 2e-3, 2e-7, 2e-7, 2e-7])
     off = np.abs(found - want) * size / np.maximum(np.abs(want * size).max(axis=1), least)[:, None]
     assert off.max() < 0.01, off.round(4)
+
+
+def test_the_prior_is_that_of_an_alignment_at_rest(truth: Truth) -> None:
+    """The calibration's page makes the same of the same sensors: attitude, and its correlations with them."""
+    cfg, at = koi_default(UnitClass.BINS), truth.state(0)
+    cfg.dr_sd_m[:] = [0.0] * 3
+    p, rows = koi_prior(cfg, at), koi_layout(cfg)
+    order = [k for name in ("nu", "theta", "df", "gamma") for k in range(rows[name].start, rows[name].stop)]
+    model = ErrorsConfig(
+        height_fixed=False,
+        gyro_noise_radps_rts=cfg.gyro_noise_radps_rts,
+        accel_noise_mps2_rts=cfg.accel_noise_mps2_rts,
+    )
+    constants = p[np.ix_(order, order)]
+    _, full = aligned_state(model, at.row(), np.zeros(len(order)), constants, cfg.alignment_s)
+    kept = [4, 5, 6, *order]
+    sd = np.sqrt(np.diag(full)[6:])
+    assert p[np.ix_(kept, kept)] / np.outer(sd, sd) == pytest.approx(full[6:, 6:] / np.outer(sd, sd), abs=1e-6)
+    assert constants.diagonal()[0] == pytest.approx(cfg.nu_sd_radps**2 + cfg.nu_run_radps**2)
+    assert abs(p[4, rows["df"].start + 1]) > 0.0
 
 
 def test_noise_of_the_gyros_moves_the_dynamic_velocity_too(truth: Truth) -> None:
