@@ -108,7 +108,7 @@ NAV_API size_t nav_koi_bytes(void);
 NAV_API int nav_koi_start(void *memory, size_t bytes, const struct nav_koi_cfg *cfg, double t_s,
                           const struct nav_state *at, const double *x, const double *p,
                           const struct nav_koi_sensors *sensors, nav_koi **out);
-/* count raw increments, rows of three, the next ones; after each step_s the filter predicts. */
+/* The next raw increments, rows of three; after each step_s the filter predicts. NAV_RANGE: 0.5 rad in a step; ends before it. */
 NAV_API int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int64_t count);
 struct nav_koi_measurement {
     int kind, valid;        /* enum nav_koi_kind; 0: the device says that it is not */

@@ -135,6 +135,7 @@ static int finish_step(struct nav_koi *k)
 {
     int status = find_transition(k);
     if (status == NAV_OK) status = nav_kf_predict(&k->kf, k->phi, k->q);
+    if (status != NAV_OK) return status;
     for (int i = 0; i < 3; i++)
         k->acceleration_mps2[i] = (k->unit.at.v_n_mps[i] - k->before.v_n_mps[i]) / k->cfg.step_s;
     k->before = k->unit.at;
@@ -142,8 +143,15 @@ static int finish_step(struct nav_koi *k)
     k->dv_sum.setZero();
     k->in_step = 0;
     k->steps++;
-    return status;
+    return NAV_OK;
 }
+
+/* What a part of a step moves before the filter may reject it. */
+struct part {
+    struct nav_strapdown unit;
+    vec3 dtheta_sum, dv_sum;
+    int in_step;
+};
 
 /* count increments, no more than the step still takes. */
 static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *dv_mps, int count)
@@ -160,12 +168,19 @@ static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *
         dtheta_sum += a;
         dv_sum += v;
     }
-    const int status = nav_integrate(&k->unit, angle, speed, count, dt, nullptr, nullptr);
+    const struct part before = {k->unit, k->dtheta_sum, k->dv_sum, k->in_step};
+    int status = nav_integrate(&k->unit, angle, speed, count, dt, nullptr, nullptr);
     if (status != NAV_OK) return status;
     k->dtheta_sum = dtheta_sum;
     k->dv_sum = dv_sum;
     k->in_step += count;
-    return k->in_step == k->per_step ? finish_step(k) : NAV_OK;
+    if (k->in_step == k->per_step) status = finish_step(k);
+    if (status == NAV_OK) return status;
+    k->unit = before.unit; /* as if these increments had not come */
+    k->dtheta_sum = before.dtheta_sum;
+    k->dv_sum = before.dv_sum;
+    k->in_step = before.in_step;
+    return status;
 }
 
 int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int64_t count)

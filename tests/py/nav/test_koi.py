@@ -267,7 +267,7 @@ def error_map(n: int, at: State) -> np.ndarray:
 def test_a_correction_moves_the_estimates_into_the_autonomous_solution(ground: Truth) -> None:
     d = drawn(ground, 7)
     koi = flown(d, 270)
-    before, p = koi.state, koi.p
+    before, p, found = koi.state, koi.p, sensors_of(d.cfg, koi.x)
     koi.correct(np.ones(koi.n, bool))
     after = koi.state
     assert np.abs(error_between(after.autonomous, before.hybrid)).max() < 1e-9
@@ -278,6 +278,7 @@ def test_a_correction_moves_the_estimates_into_the_autonomous_solution(ground: T
     assert koi.x[kept].all()
     for name in ("nu_radps", "df_mps2", "gamma", "theta"):
         assert np.array_equal(getattr(after.sensors, name), getattr(before.total, name))
+        assert np.array_equal(getattr(after.sensors, name), getattr(found, name))
     now, then = (error_map(koi.n, at.autonomous) for at in (after, before))
     errors = np.sqrt(np.diag(then @ p @ then.T))
     assert np.sqrt(np.diag(now @ koi.p @ now.T)) == pytest.approx(errors, rel=1e-9)

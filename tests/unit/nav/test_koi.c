@@ -117,6 +117,32 @@ static void what_is_not_finite_changes_nothing(void **state)
     assert_memory_equal(&before, &after, sizeof before);
 }
 
+/* A step that turns by more than half a radian, in the second of two. */
+static void a_step_that_is_rejected_has_not_come(void **state)
+{
+    struct koi_rig *r = *state;
+    struct nav_koi_state before, after;
+    double twice[60] = {0}, force[60];
+    memset(&before, 0, sizeof before);
+    memset(&after, 0, sizeof after);
+    memcpy(twice, r->dtheta, sizeof r->dtheta);
+    memcpy(force, r->dv, sizeof r->dv);
+    memcpy(force + 30, r->dv, sizeof r->dv);
+    for (int i = 30; i < 60; i += 3) twice[i] = 0.06;
+    assert_int_equal(start(r), NAV_OK);
+    assert_int_equal(nav_koi_push(r->k, twice, force, 10), NAV_OK);
+    assert_int_equal(nav_koi_push(r->k, r->dtheta, r->dv, 10), NAV_OK);
+    assert_int_equal(nav_koi_get(r->k, &before), NAV_OK);
+    assert_int_equal(start(r), NAV_OK);
+    assert_int_equal(nav_koi_push(r->k, twice, force, 20), NAV_RANGE);
+    unsigned char take[NAV_KF_MAX] = {0};
+    assert_int_equal(nav_koi_correct(r->k, take), NAV_OK); /* between two steps */
+    assert_int_equal(nav_koi_push(r->k, r->dtheta, r->dv, 10), NAV_OK);
+    assert_int_equal(nav_koi_get(r->k, &after), NAV_OK);
+    assert_memory_equal(before.autonomous.C_nb, after.autonomous.C_nb, sizeof before.autonomous.C_nb);
+    assert_true(after.t_s == before.t_s);
+}
+
 int main(void)
 {
 #define CASE(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
@@ -124,6 +150,7 @@ int main(void)
         CASE(a_minute_at_rest_takes_no_memory_and_moves_nothing),
         CASE(a_start_that_cannot_be_is_rejected),
         CASE(what_is_not_finite_changes_nothing),
+        CASE(a_step_that_is_rejected_has_not_come),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
