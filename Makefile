@@ -112,7 +112,7 @@ $(BUILD)/obj/tests/unit/%.o: CFLAGS := $(if $(SAN),$(CFLAGS:-O1=-O0),$(CFLAGS))#
 $(BUILD)/obj/tests/bench/%.o: CPPFLAGS += -D_POSIX_C_SOURCE=199309L#                clock_gettime
 $(UNIT_BIN): LINK_LIBS += -lcmocka
 $(FUZZ_BIN): LINK_LIBS += -fsanitize=fuzzer
-$(BUILD)/tests/test_nav $(BUILD)/tests/test_sins: $(BUILD)/libpsabench-nav.a
+$(BUILD)/tests/test_koi $(BUILD)/tests/test_nav $(BUILD)/tests/test_sins: $(BUILD)/libpsabench-nav.a
 $(BUILD)/tests/test_kf_kernels: $(BUILD)/obj/nav/filter/kf_kernels.o
 $(foreach t,$(UNIT),$(eval $(BUILD)/tests/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))
 $(foreach t,$(FUZZ_SRC),$(eval $(BUILD)/fuzz/$(basename $(notdir $(t))): $(BUILD)/obj/$(t:.c=.o)))

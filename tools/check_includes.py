@@ -29,6 +29,7 @@ MAY_INCLUDE = {
     "nav/sins": {"nav", "nav/common", "nav/filter"},
     "nav/errors": {"nav", "nav/common", "nav/filter", "nav/sins"},
     "nav/strapdown": {"nav", "nav/common"},
+    "nav/koi": {"nav", "nav/common", "nav/filter", "nav/sins"},
     "gen": {"base", "canopen"},
     "link": {"base"},
     "board": _MODELS,  # the contract of boards, and what boards share

@@ -33,6 +33,7 @@ MONTE_CARLO = {
 NAV = {  # unit, first count
     "kf-filterpy": ("steps", 1000),
     "sins-plan": ("plans", 2),
+    "koi": ("hours", 1),
     "strapdown": ("hours", 2),
     "strapdown-python-ins": ("hours", 1),
 }

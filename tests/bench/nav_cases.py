@@ -101,8 +101,34 @@ def python_ins_hours(count: int) -> str:
     return f"hours={count} ns={time.process_time_ns() - began_ns}"
 
 
+def koi_hours(count: int) -> str:
+    """Hours of the integration filter with nine Gamma and no barometer: 35 states; gates that nothing exceeds."""
+    from psabench.native.koi import Kind, Koi, Reason, koi_default
+    from psabench.native.sins import Gauge
+    from psabench.native.strapdown import State, dcm
+
+    turn, push = _hour()
+    cfg = koi_default()
+    cfg.gauge, cfg.baro_sd_m, cfg.outlier_nis = int(Gauge.FREE9), 0.0, 1e300
+    cfg.gate_nis[:] = [1e300, 1e300]
+    place, c_nb = (float(np.radians(55.7)), float(np.radians(37.5)), 150.0), dcm(*np.radians([77.0, -5.0, 3.0]))
+    at = State(lat_rad=place[0], lon_rad=place[1], h_m=150.0, v_n_mps=np.array([-20.0, 30.0, 0.0]), C_nb=c_nb)
+    began_ns = time.process_time_ns()
+    for _ in range(count):
+        koi = Koi(cfg, 0.0, at)
+        for k in range(3600):
+            koi.push(turn[100 * k : 100 * k + 100], push[100 * k : 100 * k + 100])
+            koi.take(Kind.POSITION, k + 1.0, place)
+            last = koi.take(Kind.VELOCITY, k + 1.0)
+    ns = time.process_time_ns() - began_ns
+    if koi.n != 35 or last is not Reason.ACCEPTED:
+        raise RuntimeError("koi: the last velocity is not taken")
+    return f"hours={count} ns={ns}"
+
+
 NAV_CASES: dict[str, Callable[[int], str]] = {
     "kf-filterpy": filterpy,
+    "koi": koi_hours,
     "sins-plan": sins_plan,
     "strapdown": strapdown_hours,
     "strapdown-python-ins": python_ins_hours,

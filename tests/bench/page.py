@@ -68,6 +68,11 @@ NAV = {  # label, unit of work, ms or us of one
     "kf-dense": ("the first, dense Joseph formulas in Eigen, vectorised", "µs", "kf-joseph"),
     "kf-filterpy": ("the first, filterpy", "µs", "kf-joseph"),
     "sins-plan": ("covariance of the article's three cycles, 2718 s at 100 Hz, 24 states", "ms", "sins-plan"),
+    "koi": (
+        "integration with a receiver, an hour: strapdown at 100 Hz, 35 states at 10 Hz, position and velocity at 1 Hz",
+        "ms",
+        "koi",
+    ),
     "strapdown": ("strapdown, an hour at 100 Hz, path given back", "ms", "strapdown"),
     "strapdown-python-ins": ("the same, python-ins", "ms", "strapdown"),
 }

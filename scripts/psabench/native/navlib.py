@@ -1,5 +1,5 @@
-"""libpsabench-nav as ctypes sees it: declared here, in `sinslib` and `errorslib`, used by `nav`, `nav_mc`, `sins`.
-Manual: nav.h."""
+"""libpsabench-nav as ctypes sees it: declared here, in `sinslib`, `errorslib` and `koilib`, used
+by `nav`, `nav_mc`, `sins`. Manual: nav.h."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from psabench.native.errorslib import PROTOTYPES as ERRORS_PROTOTYPES
+from psabench.native.koilib import PROTOTYPES as KOI_PROTOTYPES
 from psabench.native.shared_library import SharedLibrary
 from psabench.native.sinslib import PROTOTYPES as SINS_PROTOTYPES
 
@@ -212,13 +213,13 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
 
 
 class NavLibrary(SharedLibrary):
-    """The functions of nav.h, nav_mc.h, kf.h, sins.h, strapdown.h and errors.h."""
+    """The functions of nav.h, nav_mc.h, kf.h, sins.h, strapdown.h, errors.h and koi.h."""
 
     abi, prefix, variable, prototypes = (
         ABI,
         "nav_",
         "PSABENCH_NAV_LIB",
-        PROTOTYPES | SINS_PROTOTYPES | ERRORS_PROTOTYPES,
+        PROTOTYPES | SINS_PROTOTYPES | ERRORS_PROTOTYPES | KOI_PROTOTYPES,
     )
 
 
