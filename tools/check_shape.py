@@ -163,10 +163,10 @@ RULES = {
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
-    # 61,700, 62,300 and 2,050 before the satellite receiver.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 63_700, 63_700),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 62_548, 62_548),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_101, 2_101),
+    # 61,700, 62,300 and 2,050 before the satellite receiver, the filter with it and faults of gyros.
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 63_900, 63_900),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 63_460, 63_460),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_130, 2_130),
 }
 
 

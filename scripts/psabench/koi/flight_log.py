@@ -72,6 +72,7 @@ def read_log(store: PassportStore, serial: str) -> FlightLog:
     """In the order in which things were entered. Raises BadInput for what is no flight's entry."""
     events, verdicts, open_keys = list[FlightEstimate | RollBack](), list[str](), list[str]()
     for run in _runs(store, serial):
+        where = f"{store.path}: {serial}@{run.number}"
         try:
             key = str(run.provenance["flight"])
             if run.method == BEGUN:
@@ -80,16 +81,16 @@ def read_log(store: PassportStore, serial: str) -> FlightLog:
                 events.append(RollBack(int(run.provenance["number"])))
             else:
                 open_keys.remove(key)
-                events.append(_estimate_of(serial, run))
+                events.append(_estimate_of(serial, run, where))
                 verdicts.append(str(run.provenance["verdict"]))
         except (KeyError, TypeError, ValueError) as e:
-            raise BadInput(expected("an entry of a flight", e, f"{store.path}: {serial}@{run.number}")) from None
+            raise BadInput(expected("an entry of a flight", e, where)) from None
     return FlightLog(events=tuple(events), incomplete=tuple(open_keys), verdicts=tuple(verdicts))
 
 
-def _estimate_of(serial: str, run: UnitRun) -> FlightEstimate:
+def _estimate_of(serial: str, run: UnitRun, where: str) -> FlightEstimate:
     if run.covariance is None:
-        raise KeyError("covariance")
+        raise BadInput(expected("a covariance", "none", where))
     return FlightEstimate(
         serial=serial,
         time_s=datetime.fromisoformat(run.begun).timestamp(),

@@ -92,6 +92,16 @@ def test_an_entry_that_is_none_is_named(tmp_path: Path) -> None:
         read_log(store, "S7")
 
 
+def test_a_flight_without_a_covariance_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "units.sqlite"
+    with PassportStore(path) as store:
+        fly_flight(store, 0)
+    with sqlite3.connect(path) as db:
+        db.execute("DELETE FROM covariance")
+    with PassportStore(path) as store, pytest.raises(BadInput, match="S7@2: expected a covariance, got none"):
+        read_log(store, "S7")
+
+
 def _season(path: Path, until: int) -> None:
     """Flies until the given write to the store's files, then is gone as when the power is lost."""
     count = 0
