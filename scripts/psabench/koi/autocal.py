@@ -103,9 +103,9 @@ def update_knowledge(
     if flight.weight <= 0.0:
         return now
     prior = now.covariance + kind.run_covariance
-    beyond, p = _weighed(flight.x - now.p, flight.covariance, prior, flight.weight)
+    beyond, p = _weigh_information(flight.x - now.p, flight.covariance, prior, flight.weight)
     if whole:
-        gain = _ratio(now.covariance, prior)
+        gain = _gain_ratio(now.covariance, prior)
         off = gain @ (prior - p) @ gain.T
     else:
         gain = np.diag(_component_gains(now.covariance, kind.run_covariance, p, prior))
@@ -122,12 +122,12 @@ def _component_gains(persistent: Floats, run: Floats, p: Floats, prior: Floats) 
     return np.where(found, before / np.where(spread > 0.0, spread, 1.0), 0.0)
 
 
-def _weighed(x: Floats, p: Floats, prior: Floats, weight: float) -> tuple[Floats, Floats]:
+def _weigh_information(x: Floats, p: Floats, prior: Floats, weight: float) -> tuple[Floats, Floats]:
     """Estimate and covariance when only so much of the flight's information is believed."""
     if weight >= 1.0:
         return x, p
-    inverse = _inverse(prior, prior)
-    posterior = _inverse(p, prior)
+    inverse = _inverse_of(prior, prior)
+    posterior = _inverse_of(p, prior)
     information = inverse + weight * (posterior - inverse)
     scale = _scale_of(prior)
     known = np.diag(prior) == 0.0
@@ -142,16 +142,16 @@ def _scale_of(prior: Floats) -> Floats:
     return np.where(sd > 0.0, sd, 1.0)
 
 
-def _inverse(p: Floats, prior: Floats) -> Floats:
+def _inverse_of(p: Floats, prior: Floats) -> Floats:
     """By the prior's scale: drifts and scale errors differ by orders. What is known, of variance 0, becomes 1."""
     scale = _scale_of(prior)
     square = p / np.outer(scale, scale) + np.diag((np.diag(prior) == 0.0).astype(float))
     return np.asarray(np.linalg.inv(square) / np.outer(scale, scale))
 
 
-def _ratio(persistent: Floats, prior: Floats) -> Floats:
+def _gain_ratio(persistent: Floats, prior: Floats) -> Floats:
     """G = Pp (Pp + Q)^-1."""
-    return persistent @ _inverse(prior, prior)
+    return persistent @ _inverse_of(prior, prior)
 
 
 # ---- a unit's history

@@ -33,10 +33,10 @@ class FlightLog:
 
 def begin_flight(store: PassportStore, serial: str, kind: str, begun: datetime) -> str:
     """Enter a flight that begins; its key. Raises BadInput for one that has begun at that instant."""
-    key = _iso(begun)
+    key = _iso_time(begun)
     if key in _begun_in(store, serial):
         raise BadInput(expected("a flight that has not begun yet", key, serial))
-    _put(store, serial, kind, BEGUN, key, {})
+    _put_entry(store, serial, kind, BEGUN, key, {})
     return key
 
 
@@ -55,7 +55,7 @@ def end_flight(
     )
     covariance = Covariance(names=names, matrix=tuple(tuple(row) for row in found.covariance.tolist()))
     more = {"weight": found.weight, "verdict": verdict}
-    _put(store, found.serial, kind, OVER, key, more, quantities, covariance)
+    _put_entry(store, found.serial, kind, OVER, key, more, quantities, covariance)
 
 
 def roll_back(store: PassportStore, serial: str, kind: str, number: int, now: datetime) -> None:
@@ -65,13 +65,13 @@ def roll_back(store: PassportStore, serial: str, kind: str, number: int, now: da
         standing_flights((*log.events, RollBack(number)))
     except ValueError as e:
         raise BadInput(f"{serial}: {e}") from None
-    _put(store, serial, kind, BACK, _iso(now), {"number": number})
+    _put_entry(store, serial, kind, BACK, _iso_time(now), {"number": number})
 
 
 def read_log(store: PassportStore, serial: str) -> FlightLog:
     """In the order in which things were entered. Raises BadInput for what is no flight's entry."""
     events, verdicts, open_keys = list[FlightEstimate | RollBack](), list[str](), list[str]()
-    for run in _runs(store, serial):
+    for run in _flight_runs(store, serial):
         where = f"{store.path}: {serial}@{run.number}"
         try:
             key = str(run.provenance["flight"])
@@ -100,21 +100,21 @@ def _estimate_of(serial: str, run: UnitRun, where: str) -> FlightEstimate:
     )
 
 
-def _runs(store: PassportStore, serial: str) -> list[UnitRun]:
+def _flight_runs(store: PassportStore, serial: str) -> list[UnitRun]:
     if serial not in store.unit_serials():
         return []
     return [run for run in store.read_passport(serial).runs if run.method in (BEGUN, OVER, BACK)]
 
 
 def _begun_in(store: PassportStore, serial: str) -> list[str]:
-    return [str(run.provenance["flight"]) for run in _runs(store, serial) if run.method == BEGUN]
+    return [str(run.provenance["flight"]) for run in _flight_runs(store, serial) if run.method == BEGUN]
 
 
 def _over_in(store: PassportStore, serial: str) -> list[str]:
-    return [str(run.provenance["flight"]) for run in _runs(store, serial) if run.method == OVER]
+    return [str(run.provenance["flight"]) for run in _flight_runs(store, serial) if run.method == OVER]
 
 
-def _put(
+def _put_entry(
     store: PassportStore,
     serial: str,
     kind: str,
@@ -139,5 +139,5 @@ def _put(
     store.put_run(serial, kind, run)
 
 
-def _iso(when: datetime) -> str:
+def _iso_time(when: datetime) -> str:
     return when.astimezone(UTC).isoformat()

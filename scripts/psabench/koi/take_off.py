@@ -139,12 +139,12 @@ def decide_correction(e: Evidence, limits: DecisionLimits | None = None, heading
     reasons = (*_measurement_reasons(e, limits), *_estimate_reasons(e, limits, heading), *_taxi_reasons(e, limits))
     if reasons:
         return Decision(reasons=reasons, take=np.zeros(len(e.names), np.bool_))
-    ratio = _ratios(e)
+    ratio = _sd_ratios(e)
     whole = np.array([name.startswith(NAVIGATION) for name in e.names])
     return Decision(reasons=(), take=whole | (ratio < limits.converged))
 
 
-def _ratios(e: Evidence) -> Floats:
+def _sd_ratios(e: Evidence) -> Floats:
     return np.where(e.prior_sd > 0.0, e.sd / np.where(e.prior_sd > 0.0, e.prior_sd, 1.0), 1.0)
 
 
@@ -175,7 +175,7 @@ def _estimate_reasons(e: Evidence, limits: DecisionLimits, heading: str) -> Iter
     if sigmas[worst] > limits.sigmas:
         what = f"estimates within {limits.sigmas:g} standard deviations of their priors"
         yield expected(what, f"{sigmas[worst]:.1f} for {e.names[worst]}", WHERE)
-    ratio = float(_ratios(e)[e.names.index(heading)])
+    ratio = float(_sd_ratios(e)[e.names.index(heading)])
     if ratio > limits.heading_ratio:
         yield expected(f"a heading known to {limits.heading_ratio:g} of its prior", f"{ratio:.2f}", WHERE)
 
