@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from psabench.conform.capture.log import CanFrame, Capture
-from psabench.conform.verdict import Failed, conclusive, expect
+from psabench.conform.capture.log import CanFrame, CanLog, Capture
+from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
 from psabench.link.protocol_files import message
+from psabench.link.signals import Ints
 
 EMCY_BYTES = 8
 
@@ -59,3 +60,15 @@ def late_readings(e: Capture, heartbeat: str, name: str, first_s: float, period_
     told = [f for f in e.frames_of(name).frames if f.t_s > boot.t_s]
     conclusive(told, f"no {name} came after the boot-up message")
     return 0 if e.facts.get("prompt") else max(0, round((told[0].t_s - boot.t_s - first_s) / period_s))
+
+
+def reading_columns(e: Capture, messages: Sequence[str], least: int) -> Mapping[str, Ints]:
+    """Raw signals of the whole readings of these messages. Raises Inconclusive where there are fewer than `least`."""
+    logs = [e.frames_of(name) for name in messages]
+    n = min(len(log) for log in logs)
+    conclusive(n >= least, ", ".join(f"{len(log)} {name}" for log, name in zip(logs, messages, strict=True)))
+    found: dict[str, Ints] = {}
+    with damaged_data_are(Inconclusive):
+        for name, log in zip(messages, logs, strict=True):
+            found |= CanLog(frames=log.frames[:n]).raw(name)
+    return found

@@ -9,10 +9,10 @@ import numpy as np
 from psabench.boards.bins.device import MESSAGES
 from psabench.conform.capture.intervals import counted, interval, rises_at_rate
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.capture.messages import as_laid_out, booted, in_turn
+from psabench.conform.capture.messages import as_laid_out, booted, in_turn, reading_columns
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.signals import Ints
 
 LEAST = 20
@@ -20,16 +20,9 @@ US = 1e3
 WRAP_US = 1 << 32
 
 
-def reading_columns(e: Capture) -> Mapping[str, Ints]:
+def columns_of(e: Capture) -> Mapping[str, Ints]:
     """Raw signals of whole readings. Raises Inconclusive."""
-    logs = [e.frames_of(name) for name in MESSAGES]
-    n = min(len(log) for log in logs)
-    conclusive(n >= LEAST, ", ".join(f"{len(log)} {name}" for log, name in zip(logs, MESSAGES, strict=True)))
-    found: dict[str, Ints] = {}
-    with damaged_data_are(Inconclusive):
-        for name, log in zip(MESSAGES, logs, strict=True):
-            found |= CanLog(frames=log.frames[:n]).raw(name)
-    return found
+    return reading_columns(e, MESSAGES, LEAST)
 
 
 @check("stream", "BINS-CAN-01", needs={"can"})
@@ -47,7 +40,7 @@ def messages_have_their_lengths(e: Capture) -> str:
 @check("stream", "BINS-CAN-02", needs={"can"})
 def readings_are_counted(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
-    return counted(reading_columns(e)["SEQ"], int(row.limit("modulo")), "SEQ")
+    return counted(columns_of(e)["SEQ"], int(row.limit("modulo")), "SEQ")
 
 
 @check("stream", "BINS-CAN-02", needs={"line"}, wires=("TICK",))
@@ -67,7 +60,7 @@ def tick_is_a_pulse(e: Capture, row: Requirement) -> str:
 @check("stream", "BINS-INC-01", needs={"can"})
 def intervals_follow_one_another(e: Capture, row: Requirement) -> str:
     """Compare TSTAMP from reading to reading, and look at WORDS and the flags of a whole one."""
-    c = reading_columns(e)
+    c = columns_of(e)
     stamps: Ints = c["TSTAMP"].astype(np.int64)
     steps_us = np.diff(stamps) % WRAP_US
     off_us = np.abs(steps_us - row.limit("period_us"))

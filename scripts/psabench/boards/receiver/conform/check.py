@@ -9,26 +9,19 @@ import numpy as np
 from psabench.boards.receiver.device import MESSAGES, NO_FIX, WEEK_S
 from psabench.conform.capture.intervals import counted, interval, rises_at_rate
 from psabench.conform.capture.log import CanLog, Capture
-from psabench.conform.capture.messages import as_laid_out, booted, in_turn
+from psabench.conform.capture.messages import as_laid_out, booted, in_turn, reading_columns
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
-from psabench.conform.verdict import Failed, Inconclusive, conclusive, damaged_data_are, expect
+from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.signals import Ints
 
 LEAST = 8
 US = 1e3
 
 
-def reading_columns(e: Capture) -> Mapping[str, Ints]:
+def columns_of(e: Capture) -> Mapping[str, Ints]:
     """Raw signals of whole readings. Raises Inconclusive."""
-    logs = [e.frames_of(name) for name in MESSAGES]
-    n = min(len(log) for log in logs)
-    conclusive(n >= LEAST, ", ".join(f"{len(log)} {name}" for log, name in zip(logs, MESSAGES, strict=True)))
-    found: dict[str, Ints] = {}
-    with damaged_data_are(Inconclusive):
-        for name, log in zip(MESSAGES, logs, strict=True):
-            found |= CanLog(frames=log.frames[:n]).raw(name)
-    return found
+    return reading_columns(e, MESSAGES, LEAST)
 
 
 @check("stream", "RECEIVER-CAN-01", needs={"can"})
@@ -40,7 +33,7 @@ def four_messages_make_a_reading(e: Capture) -> str:
 @check("stream", "RECEIVER-CAN-02", needs={"can"})
 def readings_are_counted(e: Capture, row: Requirement) -> str:
     """Look at SEQ from reading to reading."""
-    return counted(reading_columns(e)["SEQ"], int(row.limit("modulo")), "SEQ")
+    return counted(columns_of(e)["SEQ"], int(row.limit("modulo")), "SEQ")
 
 
 @check("stream", "RECEIVER-CAN-02", needs={"line"}, wires=("SOL",))
@@ -58,7 +51,7 @@ def messages_have_their_lengths(e: Capture) -> str:
 @check("stream", "RECEIVER-TIME-01", needs={"can"})
 def time_goes_on_by_the_period(e: Capture, row: Requirement) -> str:
     """Compare WEEK and TOW from reading to reading."""
-    c = reading_columns(e)
+    c = columns_of(e)
     ms: Ints = c["WEEK"].astype(np.int64) * WEEK_S * 1000 + c["TOW"].astype(np.int64)
     steps = np.unique(np.diff(ms))
     due = row.limit("period_us") / US
@@ -68,7 +61,7 @@ def time_goes_on_by_the_period(e: Capture, row: Requirement) -> str:
 @check("stream", "RECEIVER-POS-01", needs={"can"})
 def a_fix_is_on_the_earth(e: Capture, row: Requirement) -> str:
     """Look at latitude and longitude of the readings with a fix."""
-    c = reading_columns(e)
+    c = columns_of(e)
     valid = c["FIX"] != NO_FIX
     conclusive(valid.any(), "no reading has a fix")
     lat, lon = c["LAT"].astype(np.int64)[valid], c["LON"].astype(np.int64)[valid]
