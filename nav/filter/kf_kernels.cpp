@@ -67,6 +67,7 @@ template <int LANES, int COUNT> INLINE void subtract_columns(const struct kf_squ
     for (; column < s->stride; column += LANES) subtract_tile<LANES, COUNT, 1>(s, column);
 }
 
+static_assert(KF_GROUP == 3);
 template <int LANES> INLINE void subtract_squares(const struct kf_squares *s)
 {
     if (s->count == 3) subtract_columns<LANES, 3>(s);

@@ -12,6 +12,7 @@ the years: Pp grows between flights, so that old ones are forgotten. Vectors: (m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -59,13 +60,31 @@ class Knowledge:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlightEstimate:
-    """Errors of a unit's instruments in one flight, the whole of them, and what the flight is worth."""
+    """Errors of a unit's instruments in one flight, and what the flight is worth.
+
+    x is the whole error: what the sensors were corrected by and what the filter found beyond it.
+    """
 
     serial: str
+    names: tuple[str, ...]  # (m,)
     time_s: float  # of its beginning, Unix
     x: Floats  # (m,)
     covariance: Floats  # (m, m)
     weight: float = 1.0  # 0: bad data; 1: the filter's covariance is believed
+
+    def __post_init__(self) -> None:
+        """Raises ValueError."""
+        m = len(self.names)
+        if self.x.shape != (m,) or not np.isfinite(self.x).all():
+            raise ValueError(expected(f"{m} finite estimates", self.x, f"flight of unit {self.serial}"))
+        sd_finite = self.covariance.shape == (m, m) and np.isfinite(self.covariance).all()
+        if not sd_finite or not (np.diag(self.covariance) >= 0.0).all():
+            what = f"a covariance of {m} by {m} finite numbers"
+            raise ValueError(expected(what, self.covariance, f"flight of unit {self.serial}"))
+        if not 0.0 <= self.weight <= 1.0:
+            raise ValueError(expected("a weight of 0 to 1", self.weight, f"flight of unit {self.serial}"))
+        if not math.isfinite(self.time_s):
+            raise ValueError(expected("a finite time", self.time_s, f"flight of unit {self.serial}"))
 
 
 def nothing_known(kind: InstrumentClass, serial: str) -> Knowledge:
@@ -94,9 +113,12 @@ def update_knowledge(
     known: Knowledge, kind: InstrumentClass, flight: FlightEstimate, *, whole: bool = True
 ) -> Knowledge:
     """Knowledge after a flight, which began with filter_prior(). Of another serial number: that unit starts afresh.
+    Raises ValueError for other names than the class has.
 
     whole: by the equations above; else each component by itself, of those that have converged.
     """
+    if flight.names != kind.names:
+        raise ValueError(expected(", ".join(kind.names), ", ".join(flight.names), f"flight of unit {flight.serial}"))
     if flight.serial != known.serial:
         known = nothing_known(kind, flight.serial)
     now = replace(age_knowledge(known, kind, flight.time_s), time_s=flight.time_s)

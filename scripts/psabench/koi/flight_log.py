@@ -1,7 +1,7 @@
 """A unit's flights in its passport (docs/tools/passports.md): each enters twice, when it begins and when it is over.
 
-Both entries are whole or not at all, so that a flight during which the power is lost stays there as one that only
-began: it is incomplete and has no weight. Nothing is ever changed: a roll-back is an entry, too.
+Both entries are whole or not at all. A flight during which the program ends or the power is lost, or which another one
+follows, has only begun: it is incomplete and has no weight. Nothing is ever changed: a roll-back is an entry, too.
 """
 
 from __future__ import annotations
@@ -32,28 +32,36 @@ class FlightLog:
 
 
 def begin_flight(store: PassportStore, serial: str, kind: str, begun: datetime) -> str:
-    """Enter a flight that begins; its key. Raises BadInput for one that has begun at that instant."""
-    key = _iso_time(begun)
-    if key in _begun_in(store, serial):
-        raise BadInput(expected("a flight that has not begun yet", key, serial))
+    """Enter a flight that begins; its key. Raises BadInput for a time that is not later than the last beginning."""
+    key, before = _iso_time(begun), _begun_in(store, serial)
+    if before and datetime.fromisoformat(key) <= datetime.fromisoformat(before[-1]):
+        raise BadInput(expected(f"a beginning after {before[-1]}", key, serial))
     _put_entry(store, serial, kind, BEGUN, key, {})
     return key
 
 
-def end_flight(
-    store: PassportStore, kind: str, key: str, found: FlightEstimate, names: tuple[str, ...], *, verdict: str = ""
-) -> None:
-    """Enter what a flight that has begun found. Raises BadInput for one that has not, or is over."""
-    if key not in _begun_in(store, found.serial):
+def end_flight(store: PassportStore, kind: str, key: str, found: FlightEstimate, *, verdict: str = "") -> None:
+    """Enter what a flight that has begun found. Names end with their units. verdict: why it has no weight.
+
+    Raises BadInput for one that has not begun, is over or began at another time, for a weight that its verdict denies.
+    """
+    if bool(verdict) != (found.weight == 0.0):
+        what = "weight 0" if verdict else "a verdict for weight 0"
+        raise BadInput(expected(what, f"weight {found.weight:g}, verdict {verdict!r}", found.serial))
+    if key not in (begun := _begun_in(store, found.serial)):
         raise BadInput(expected("a flight that has begun", key, found.serial))
+    if key != begun[-1]:
+        raise BadInput(expected(f"the last flight, {begun[-1]}", key, found.serial))
     if key in _over_in(store, found.serial):
         raise BadInput(expected("a flight that is not over", key, found.serial))
+    if found.time_s != (begun_s := datetime.fromisoformat(key).timestamp()):
+        raise BadInput(expected(f"a flight that began at {begun_s} s", found.time_s, found.serial))
     sd = np.sqrt(np.diag(found.covariance))
     quantities = tuple(
         Measured(name=name, unit="", value=float(x), half_width=2.0 * float(s))
-        for name, x, s in zip(names, found.x, sd, strict=True)
+        for name, x, s in zip(found.names, found.x, sd, strict=True)
     )
-    covariance = Covariance(names=names, matrix=tuple(tuple(row) for row in found.covariance.tolist()))
+    covariance = Covariance(names=found.names, matrix=tuple(tuple(row) for row in found.covariance.tolist()))
     more = {"weight": found.weight, "verdict": verdict}
     _put_entry(store, found.serial, kind, OVER, key, more, quantities, covariance)
 
@@ -69,7 +77,7 @@ def roll_back(store: PassportStore, serial: str, kind: str, number: int, now: da
 
 
 def read_log(store: PassportStore, serial: str) -> FlightLog:
-    """In the order in which things were entered. Raises BadInput for what is no flight's entry."""
+    """In the order in which things were entered. Raises BadInput for an entry that does not describe a flight."""
     events, verdicts, open_keys = list[FlightEstimate | RollBack](), list[str](), list[str]()
     for run in _flight_runs(store, serial):
         where = f"{store.path}: {serial}@{run.number}"
@@ -83,7 +91,9 @@ def read_log(store: PassportStore, serial: str) -> FlightLog:
                 open_keys.remove(key)
                 events.append(_estimate_of(serial, run, where))
                 verdicts.append(str(run.provenance["verdict"]))
-        except (KeyError, TypeError, ValueError) as e:
+        except KeyError as e:
+            raise BadInput(expected(f"an entry of a flight with the key {e}", "none", where)) from None
+        except (TypeError, ValueError) as e:
             raise BadInput(expected("an entry of a flight", e, where)) from None
     return FlightLog(events=tuple(events), incomplete=tuple(open_keys), verdicts=tuple(verdicts))
 
@@ -93,6 +103,7 @@ def _estimate_of(serial: str, run: UnitRun, where: str) -> FlightEstimate:
         raise BadInput(expected("a covariance", "none", where))
     return FlightEstimate(
         serial=serial,
+        names=run.covariance.names,
         time_s=datetime.fromisoformat(run.begun).timestamp(),
         x=np.array([q.value for q in run.quantities]),
         covariance=np.array(run.covariance.matrix),
@@ -140,4 +151,6 @@ def _put_entry(
 
 
 def _iso_time(when: datetime) -> str:
+    if when.tzinfo is None:
+        raise BadInput(expected("a time with its zone", when, "flight"))
     return when.astimezone(UTC).isoformat()

@@ -25,7 +25,8 @@ class TakeOffLimits:
     speed_mps: float = 40.0  # faster than it taxis
     rise_mps2: float = 1.5  # on average since it was slower than `slow_mps`
     slow_mps: float = 20.0
-    samples: int = 3  # in a row: one outlier of the receiver is no take-off
+    samples: int = 3  # valid ones in a row, slow as well as fast: an outlier of the receiver is no take-off
+    longest_s: float = 120.0  # since it was slow
 
 
 @dataclass
@@ -33,25 +34,31 @@ class TakeOffDetector:
     """Fed with the ground speed of the receiver, sample by sample."""
 
     limits: TakeOffLimits = field(default_factory=TakeOffLimits)
-    _slow: tuple[float, float] | None = None  # last time and speed below slow_mps
-    _fast: int = 0
+    _slow: tuple[float, float] | None = None  # last time and speed below slow_mps, of enough samples in a row
+    _slow_count: int = 0
+    _fast_count: int = 0
 
     def take(self, t_s: float, speed_mps: float, *, valid: bool = True) -> bool:
         """Whether the aircraft takes off at this sample: true once a run."""
         if not valid or not math.isfinite(speed_mps):
+            self._slow_count = self._fast_count = 0
             return False
-        if speed_mps < self.limits.slow_mps:
-            self._slow, self._fast = (t_s, speed_mps), 0
+        slow = speed_mps < self.limits.slow_mps
+        self._slow_count = self._slow_count + 1 if slow else 0
+        if self._slow_count >= self.limits.samples:
+            self._slow = t_s, speed_mps
+        self._fast_count = self._fast_count + 1 if self._is_running(t_s, speed_mps) else 0
+        if self._fast_count < self.limits.samples:
             return False
-        if self._slow is None or speed_mps < self.limits.speed_mps:
-            self._fast = 0
-            return False
-        since_s, rise = t_s - self._slow[0], speed_mps - self._slow[1]
-        self._fast = self._fast + 1 if since_s > 0.0 and rise >= self.limits.rise_mps2 * since_s else 0
-        if self._fast < self.limits.samples:
-            return False
-        self._slow, self._fast = None, 0
+        self._slow, self._fast_count = None, 0
         return True
+
+    def _is_running(self, t_s: float, speed_mps: float) -> bool:
+        """Fast, and by the acceleration of a run since it was slow."""
+        if self._slow is None or speed_mps < self.limits.speed_mps:
+            return False
+        since_s, rise_mps = t_s - self._slow[0], speed_mps - self._slow[1]
+        return 0.0 < since_s <= self.limits.longest_s and rise_mps >= self.limits.rise_mps2 * since_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +69,14 @@ class Taxi:
     stops: int  # of 5 s or more
 
 
-TURN_RAD, TURN_S = math.radians(60.0), 90.0
+TURN_RAD, TURN_S = math.radians(60.0), 90.0  # E0, as the next ones
 STOP_MPS, STOP_S = 0.3, 5.0
 
 
 def taxi_of(t_s: Floats, heading_rad: Floats, speed_mps: Floats) -> Taxi:
-    """From series before take-off, (n,)."""
-    heading = np.unwrap(heading_rad)
+    """From series before take-off, (n,); samples that are not finite are left out."""
+    finite = np.isfinite(t_s) & np.isfinite(heading_rad) & np.isfinite(speed_mps)
+    t_s, heading, speed_mps = t_s[finite], np.unwrap(heading_rad[finite]), speed_mps[finite]
     turns, begin = 0, 0
     for k in range(len(t_s)):
         while t_s[k] - t_s[begin] > TURN_S:
@@ -105,8 +113,9 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class DecisionLimits:
-    """Of the analysis (E0), but `converged`, which is that of our study (E0)."""
+    """Of the analysis (E0)."""
 
+    kinds: tuple[str, ...] = ("position", "velocity")  # measurements that there must be
     alone_s: float = 5.0
     taken: int = 60  # measurements of each kind
     gated_share: float = 0.05
@@ -134,8 +143,10 @@ NAVIGATION = ("dr", "dV", "alpha", "beta3")  # blocks that are corrected whole; 
 
 
 def decide_correction(e: Evidence, limits: DecisionLimits | None = None, heading: str = "beta3") -> Decision:
-    """The analysis at take-off."""
+    """The analysis at take-off. Raises ValueError where `heading` is not one of the names."""
     limits = limits or DecisionLimits()
+    if heading not in e.names:
+        raise ValueError(expected(", ".join(e.names), heading, "state of the heading"))
     reasons = (*_measurement_reasons(e, limits), *_estimate_reasons(e, limits, heading), *_taxi_reasons(e, limits))
     if reasons:
         return Decision(reasons=reasons, take=np.zeros(len(e.names), np.bool_))
@@ -153,24 +164,27 @@ def _measurement_reasons(e: Evidence, limits: DecisionLimits) -> Iterator[str]:
 
     if not e.alone_s <= limits.alone_s:
         yield expected(f"a measurement in the last {limits.alone_s:g} s", f"the last {e.alone_s:.1f} s ago", WHERE)
+    for kind in (k for k in limits.kinds if k not in e.gates):
+        yield expected(f"{limits.taken} measurements of {kind} or more", "none", WHERE)
     for kind, gate in e.gates.items():
         if gate.taken < limits.taken:
             yield expected(f"{limits.taken} measurements of {kind} or more", gate.taken, WHERE)
         share = gate.gated / max(gate.taken + gate.gated, 1)
         if share > limits.gated_share:
             yield expected(f"at most {limits.gated_share:.0%} of {kind} outside its gate", f"{share:.1%}", WHERE)
-        if gate.nis_dof and not min(chdtr(gate.nis_dof, gate.nis_sum), chdtrc(gate.nis_dof, gate.nis_sum)) >= (
-            limits.nis_chance / 2.0
-        ):
-            mean = gate.nis_sum / gate.nis_dof
-            yield expected(f"innovations of {kind} as the filter has them", f"a mean square of {mean:.2f}", WHERE)
+        chance = 2.0 * min(chdtr(gate.nis_dof, gate.nis_sum), chdtrc(gate.nis_dof, gate.nis_sum))
+        if not chance >= limits.nis_chance:
+            mean = gate.nis_sum / gate.nis_dof if gate.nis_dof else math.nan
+            yield expected(f"innovations of {kind} with a mean square near 1", f"{mean:.2f}", WHERE)
 
 
 def _estimate_reasons(e: Evidence, limits: DecisionLimits, heading: str) -> Iterator[str]:
-    if not (np.isfinite(e.x).all() and np.isfinite(e.sd).all()):
-        yield expected("finite estimates", "one that is not", WHERE)
+    finite = np.isfinite(e.x) & np.isfinite(e.sd) & np.isfinite(e.prior_sd)
+    if not finite.all():
+        yield expected("finite estimates", f"one that is not for {e.names[int(np.argmin(finite))]}", WHERE)
         return
-    sigmas = np.abs(e.x) / np.where(e.prior_sd > 0.0, e.prior_sd, np.inf)
+    known = e.prior_sd <= 0.0
+    sigmas = np.where(known, np.where(e.x == 0.0, 0.0, np.inf), np.abs(e.x) / np.where(known, 1.0, e.prior_sd))
     worst = int(np.argmax(sigmas))
     if sigmas[worst] > limits.sigmas:
         what = f"estimates within {limits.sigmas:g} standard deviations of their priors"
@@ -183,4 +197,4 @@ def _estimate_reasons(e: Evidence, limits: DecisionLimits, heading: str) -> Iter
 def _taxi_reasons(e: Evidence, limits: DecisionLimits) -> Iterator[str]:
     for what, count, least in (("turns", e.taxi.turns, limits.turns), ("stops", e.taxi.stops, limits.stops)):
         if count < least:
-            yield expected(f"{least} {what} of the taxi or more", count, WHERE)
+            yield expected(f"{what} during the taxi: {least} or more", count, WHERE)

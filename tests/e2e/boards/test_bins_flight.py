@@ -11,10 +11,14 @@ import pytest
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, increments_of
 from psabench.boards.objects import BinsObjects as OD
+from psabench.boards.objects import Common
+from psabench.boards.unit import TPDO_OFF
+from psabench.errors import DeviceError
 
 pytestmark = pytest.mark.host
 
 ARCSEC = np.pi / 648_000
+NO_RTR = 1 << 30  # of a COB-ID of a TPDO
 NO_ERRORS = (
     "gyro_bias_sd_degph: 0, gyro_scale_sd: 0, gyro_misalignment_sd_arcmin: 0, accel_bias_sd_mps2: 0, "
     "accel_scale_sd: 0, accel_misalignment_sd_arcmin: 0, gyro_noise_degph: 0, accel_noise_mps2: 0"
@@ -103,6 +107,20 @@ def test_a_unit_on_a_table_shows_the_height_of_the_site(tmp_path: Path) -> None:
         unit.also("BINS_BARO")
         assert set(unit.stream(10)["HBARO"]) == {163.5}
         assert unit.node.read(OD.BARO, 1) == 163500
+
+
+def test_beyond_node_95_the_height_needs_an_identifier_of_the_host(tmp_path: Path) -> None:
+    """680h + node is in 6E0h to 6FFh there, which CiA 301 keeps from PDOs."""
+    file = tmp_path / "table.yaml"
+    file.write_text("seed: 1\nsite: {latitude_deg: 10, height_m: 20}\nunits: [{name: sins, board: bins, node: 96}]\n")
+    with Bench.start(file) as bench:
+        unit = bench.board(Bins)
+        unit.wait_ready()
+        with pytest.raises(DeviceError, match=r"0609.?0030"):
+            unit.also("BINS_BARO")
+        unit.node.write(Common.TPDO + 4, 1, TPDO_OFF | NO_RTR | 0x190)
+        unit.node.write(Common.TPDO + 4, 1, NO_RTR | 0x190)
+        assert int(unit.node.read(Common.TPDO + 4, 1)) == NO_RTR | 0x190
 
 
 def test_the_truth_port_has_the_aircraft(path: flight.Flight, tmp_path: Path) -> None:

@@ -25,12 +25,13 @@ DAY = datetime(2026, 5, 1, 6, 30, tzinfo=UTC)
 def estimate_of(k: int, weight: float = 1.0) -> FlightEstimate:
     p = np.array([[1e-16, 1e-13], [1e-13, 1e-8]]) * (1 + k / 7)
     x = np.array([1e-8 / 3, -2e-4]) * (k + 1)
-    return FlightEstimate(serial="S7", time_s=(DAY + timedelta(days=k)).timestamp(), x=x, covariance=p, weight=weight)
+    time_s = (DAY + timedelta(days=k)).timestamp()
+    return FlightEstimate(serial="S7", names=NAMES, time_s=time_s, x=x, covariance=p, weight=weight)
 
 
 def fly_flight(store: PassportStore, k: int, weight: float = 1.0, verdict: str = "") -> None:
     key = begin_flight(store, "S7", "sins", DAY + timedelta(days=k))
-    end_flight(store, "sins", key, estimate_of(k, weight), NAMES, verdict=verdict)
+    end_flight(store, "sins", key, estimate_of(k, weight), verdict=verdict)
 
 
 def test_flights_come_back_to_the_bit_and_roll_back_by_number(tmp_path: Path) -> None:
@@ -59,9 +60,13 @@ def test_flights_come_back_to_the_bit_and_roll_back_by_number(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("do", "said"),
     [
-        (lambda s: begin_flight(s, "S7", "sins", DAY), "expected a flight that has not begun yet"),
-        (lambda s: end_flight(s, "sins", "x", estimate_of(0), NAMES), "expected a flight that has begun, got x"),
-        (lambda s: end_flight(s, "sins", DAY.isoformat(), estimate_of(0), NAMES), "expected a flight that is not over"),
+        (lambda s: begin_flight(s, "S7", "sins", DAY), "expected a beginning after 2026-05-01T06:30"),
+        (lambda s: begin_flight(s, "S7", "sins", DAY - timedelta(seconds=1)), "expected a beginning after 2026-05-01"),
+        (lambda s: begin_flight(s, "S7", "sins", datetime(2027, 1, 1)), "expected a time with its zone"),
+        (lambda s: end_flight(s, "sins", "x", estimate_of(0)), "expected a flight that has begun, got x"),
+        (lambda s: end_flight(s, "sins", DAY.isoformat(), estimate_of(0)), "expected a flight that is not over"),
+        (lambda s: end_flight(s, "sins", "x", estimate_of(0), verdict="outage"), "expected weight 0, got weight 1"),
+        (lambda s: end_flight(s, "sins", "x", estimate_of(0, 0.0)), "expected a verdict for weight 0"),
         (lambda s: roll_back(s, "S7", "sins", 2, DAY), "expected a flight of 0 to 1, got 2"),
         (lambda s: fly_other(s), "expected a unit of type sins, got mems"),
     ],
@@ -73,6 +78,17 @@ def test_what_does_not_follow_is_rejected_and_nothing_enters(do: object, said: s
             do(store)  # type: ignore[operator]
         assert len(read_log(store, "S7").events) == 1
         assert read_log(store, "S7").incomplete == ()
+
+
+def test_a_flight_ends_at_its_own_time_and_before_another_begins(tmp_path: Path) -> None:
+    with PassportStore(tmp_path / "units.sqlite") as store:
+        first = begin_flight(store, "S7", "sins", DAY)
+        with pytest.raises(BadInput, match=r"expected a flight that began at 1777617000\.0 s, got 1777703400.0"):
+            end_flight(store, "sins", first, estimate_of(1))
+        begin_flight(store, "S7", "sins", DAY + timedelta(days=1))
+        with pytest.raises(BadInput, match="expected the last flight, 2026-05-02T06:30"):
+            end_flight(store, "sins", first, estimate_of(0))
+        assert read_log(store, "S7").incomplete == ("2026-05-01T06:30:00+00:00", "2026-05-02T06:30:00+00:00")
 
 
 def fly_other(store: PassportStore) -> None:
@@ -87,7 +103,7 @@ def test_an_entry_that_is_none_is_named(tmp_path: Path) -> None:
         db.execute("UPDATE run SET provenance = '{}' WHERE number = 2")
     with (
         PassportStore(path) as store,
-        pytest.raises(BadInput, match="S7@2: expected an entry of a flight, got 'flight'"),
+        pytest.raises(BadInput, match="S7@2: expected an entry of a flight with the key 'flight'"),
     ):
         read_log(store, "S7")
 

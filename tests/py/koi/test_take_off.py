@@ -12,13 +12,14 @@ from psabench.link.signals import Floats
 NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
 PRIOR = np.full(10, 2.0)
 GOOD = Gate(taken=300, gated=2, nis_sum=910.0, nis_dof=900)
+GATES = {"position": GOOD, "velocity": GOOD}
 RATIO = np.array([0.1, 0.1, 0.1, 0.1, 0.9, 0.3, 0.5, 0.2, 0.69, 0.71])
 EVIDENCE = Evidence(
     names=NAMES,
     x=np.full(10, 1.0),
     sd=RATIO * PRIOR,
     prior_sd=PRIOR,
-    gates={"position": GOOD, "velocity": GOOD},
+    gates=GATES,
     alone_s=1.0,
     taxi=Taxi(turns=3, stops=2),
 )
@@ -46,6 +47,9 @@ def test_outliers_of_the_receiver_are_no_take_off() -> None:
     speed[100:102] = 90.0  # two in a row
     speed[150:160], valid[150:160] = 90.0, 0.0  # and ten that say so themselves
     speed[200] = np.nan
+    assert detect_runs(t, 240.0 + 0.0 * t) == []  # it was never slow
+    cruise = np.where(np.isin(t, [50.0, 120.0, 121.0]), 0.0, np.where(t < 10.0, 3.0, 240.0))
+    assert detect_runs(t, np.where(t < 40.0, np.minimum(3.0, t), cruise)) == [42.0]  # low outliers are no stop
     assert detect_runs(t, speed, valid) == []
     speed[100:104] = [40.0, 41.0, 42.0, 43.0]
     assert detect_runs(t, speed, valid) == [102.0]
@@ -57,6 +61,8 @@ def test_turns_and_stops_of_a_taxi() -> None:
     speed = np.where((t > 50) & (t < 80) | (t > 300) & (t < 303) | (t > 500), 0.1, 7.0)
     wrapped = (heading + np.pi) % (2 * np.pi) - np.pi
     assert taxi_of(t, wrapped, speed) == Taxi(turns=2, stops=2)  # the last turn takes 200 s, the stop of 2 s is none
+    heading[200] = speed[400] = np.nan
+    assert taxi_of(t, heading, speed) == Taxi(turns=2, stops=2)
     assert taxi_of(t[:1], wrapped[:1], speed[:1]) == Taxi(turns=0, stops=0)
 
 
@@ -76,21 +82,25 @@ def decide_with(**changes: object) -> Decision:
         ({"alone_s": 12.0}, "expected a measurement in the last 5 s, got the last 12.0 s ago"),
         ({"alone_s": float("nan")}, "expected a measurement in the last 5 s"),
         (
-            {"gates": {"velocity": replace(GOOD, taken=20, gated=0)}},
+            {"gates": GATES | {"velocity": replace(GOOD, taken=20, gated=0)}},
             "expected 60 measurements of velocity or more, got 20",
         ),
         (
-            {"gates": {"position": replace(GOOD, gated=30)}},
+            {"gates": GATES | {"position": replace(GOOD, gated=30)}},
             "expected at most 5% of position outside its gate, got 9.1%",
         ),
-        ({"gates": {"position": replace(GOOD, nis_sum=1800.0)}}, "got a mean square of 2.00"),
-        ({"gates": {"position": replace(GOOD, nis_sum=450.0)}}, "got a mean square of 0.50"),
-        ({"gates": {"position": replace(GOOD, nis_sum=float("nan"))}}, "got a mean square of nan"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "near 1, got 2.00"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=450.0)}}, "near 1, got 0.50"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "near 1, got nan"),
         ({"x": np.append(np.full(9, 1.0), -9.0)}, "of their priors, got 4.5 for nu3"),
-        ({"x": np.full(10, np.nan)}, "expected finite estimates"),
+        ({"x": np.full(10, np.nan)}, "expected finite estimates, got one that is not for dr1"),
         ({"sd": PRIOR * 0.8}, "expected a heading known to 0.7 of its prior, got 0.80"),
-        ({"taxi": Taxi(turns=0, stops=2)}, "expected 1 turns of the taxi or more, got 0"),
-        ({"taxi": Taxi(turns=3, stops=0)}, "expected 1 stops of the taxi or more, got 0"),
+        ({"taxi": Taxi(turns=0, stops=2)}, "expected turns during the taxi: 1 or more, got 0"),
+        ({"taxi": Taxi(turns=3, stops=0)}, "expected stops during the taxi: 1 or more, got 0"),
+        ({"gates": {"position": GOOD}}, "expected 60 measurements of velocity or more, got none"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=0.0, nis_dof=0)}}, "got nan"),
+        ({"prior_sd": np.append(np.full(9, 2.0), np.nan)}, "expected finite estimates, got one that is not for nu3"),
+        ({"prior_sd": np.append(np.full(9, 2.0), 0.0)}, "of their priors, got inf for nu3"),
     ],
 )
 def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str, object], said: str) -> None:
@@ -104,3 +114,8 @@ def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str,
 
 def test_all_reasons_are_given_together() -> None:
     assert len(decide_with(alone_s=99.0, taxi=Taxi(turns=0, stops=0), sd=PRIOR).reasons) == 4
+
+
+def test_a_heading_that_is_no_state_is_rejected() -> None:
+    with pytest.raises(ValueError, match=r"state of the heading: expected dr1, .* got yaw"):
+        decide_correction(EVIDENCE, heading="yaw")
