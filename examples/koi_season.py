@@ -24,7 +24,7 @@ BEGIN = datetime(2026, 5, 1, 6, 30, tzinfo=UTC)
 def fly(
     rng: np.random.Generator, total: np.ndarray, p: np.ndarray, prior: np.ndarray, begun: datetime
 ) -> FlightEstimate:
-    """Stands for a flight: its filter begins with this prior and sees each error with noise."""
+    """Replaces a flight: its filter begins with this prior and sees each error with noise."""
     variance = np.diag(prior)
     gain = variance / (variance + FOUND_SD**2)
     beyond = gain * (total - p + FOUND_SD * rng.standard_normal(3))
