@@ -234,7 +234,7 @@ static void op_reading(struct world *w, struct script *s)
 static void op_rest(struct world *w, struct script *s)
 {
     const uint8_t how = script_byte(s);
-    const unsigned up = how % 3, north = (how % 3 + 1 + (how >> 2 & 1)) % 3;
+    const unsigned up = how % 3u, north = (up + 1u + (how >> 2 & 1u)) % 3u;
     int32_t gyro[3] = {0, 0, 0}, accel[3] = {0, 0, 0};
     accel[up] = how & 8 ? -5000000 : 5000000; /* 1 g in 5 words of 9.7 um/s^2 */
     gyro[up] = (int8_t)script_byte(s) / 8;    /* 15 counts are the Earth's rate */
