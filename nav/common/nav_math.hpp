@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 extern "C" {
 #include "emu/base/detmath.h"
@@ -16,6 +17,21 @@ constexpr double NAV_DEGPH = NAV_DEG / 3600.0;
 
 constexpr double NAV_NAN = __builtin_nan("");
 constexpr double NAV_ANGLE_MAX = 1e6; /* rad: beyond it the reduction by pi/2 has lost its digits */
+
+inline uint64_t nav_bits(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+/* One more in an exponent of all ones runs over into the sign. */
+inline bool nav_all_finite(const double *a, int64_t count)
+{
+    uint64_t over = 0;
+    for (int64_t i = 0; i < count; i++) over |= (nav_bits(a[i]) & 0x7ff0000000000000) + 0x0010000000000000;
+    return !(over >> 63);
+}
 
 /* The angle, or NaN for what is none. */
 inline double nav_angle(double x_rad)

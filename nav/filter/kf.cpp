@@ -1,17 +1,7 @@
 #include "nav/filter/kf_form.hpp"
 
-#include "nav/common/nav_math.hpp"
-
 #include <cstdint>
 #include <cstring>
-
-/* One more in an exponent of all ones runs over into the sign. */
-static bool all_finite(const double *a, int count)
-{
-    uint64_t over = 0;
-    for (int i = 0; i < count; i++) over |= (kf_bits(a[i]) & 0x7ff0000000000000) + 0x0010000000000000;
-    return !(over >> 63);
-}
 
 size_t nav_kf_bytes(void)
 {
@@ -57,7 +47,7 @@ int nav_kf_set(nav_kf *kf, const double *x, const double *p)
 {
     const int n = kf->n;
     double d[KF_MAX];
-    if (!all_finite(p, n * n) || (x && !all_finite(x, n))) return NAV_NOT_FINITE;
+    if (!nav_all_finite(p, n * n) || (x && !nav_all_finite(x, n))) return NAV_NOT_FINITE;
     if (!is_symmetric(n, p) || !kf_factor(n, p, kf->work, d)) return NAV_SINGULAR;
     if (kf->form == NAV_KF_UD) memcpy(kf->p, kf->work, sizeof *p * (size_t)(n * n));
     else kf_full_set(kf, p);
@@ -96,7 +86,8 @@ static void move_state(struct nav_kf *kf)
 
 int nav_kf_predict(nav_kf *kf, const double *phi, const double *q)
 {
-    if (!all_finite(phi, kf->dynamic * kf->n) || !all_finite(q, kf->dynamic * kf->dynamic)) return NAV_NOT_FINITE;
+    if (!nav_all_finite(phi, kf->dynamic * kf->n) || !nav_all_finite(q, kf->dynamic * kf->dynamic))
+        return NAV_NOT_FINITE;
     kf_take_phi(kf, phi);
     if (kf->form == NAV_KF_JOSEPH) kf_full_predict(kf, q);
     else if (!kf_ud_predict(kf, q)) return NAV_SINGULAR;
@@ -106,7 +97,7 @@ int nav_kf_predict(nav_kf *kf, const double *phi, const double *q)
 
 static int check_measurement(const nav_kf *kf, const double *h, double z, double r)
 {
-    if (!all_finite(h, kf->n) || !std::isfinite(z) || !std::isfinite(r)) return NAV_NOT_FINITE;
+    if (!nav_all_finite(h, kf->n) || !std::isfinite(z) || !std::isfinite(r)) return NAV_NOT_FINITE;
     return r > 0.0 ? NAV_OK : NAV_RANGE;
 }
 
@@ -139,6 +130,27 @@ int nav_kf_innovate(const nav_kf *kf, const double *h, double z, double r, struc
     status = find_innovation(kf, h, z, &g, &found);
     if (status == NAV_OK) *out = found;
     return status;
+}
+
+/* P h of each row at the beginning of g.w. */
+static void find_products(const nav_kf *kf, const double *h, int count, struct kf_gain *g)
+{
+    if (kf->form == NAV_KF_JOSEPH) kf_full_products(kf, h, count, g);
+    else
+        for (int m = 0; m < count; m++) kf_ud_gain(kf, h + m * kf->n, 0.0, &g[m]);
+}
+
+int kf_joint(const struct nav_kf *kf, const double *h, const double *r, int count, double *s)
+{
+    struct kf_gain g[KF_GROUP];
+    if (!nav_all_finite(h, (int64_t)count * kf->n) || !nav_all_finite(r, count)) return NAV_NOT_FINITE;
+    find_products(kf, h, count, g);
+    for (int i = 0; i < count; i++)
+        for (int j = 0; j <= i; j++) {
+            const double own = i == j ? r[i] : 0.0;
+            s[i * count + j] = s[j * count + i] = kf_dot(kf->n, h + j * kf->n, g[i].w) + own;
+        }
+    return NAV_OK;
 }
 
 static int update_ud(nav_kf *kf, const double *h, double z, double r, struct nav_kf_innovation *out)
@@ -198,7 +210,7 @@ double nav_kf_nees(int n, const double *error, const double *p)
 {
     double ut[KF_MAX * KF_MAX];
     double d[KF_MAX];
-    if (n < 1 || n > KF_MAX || !all_finite(p, n * n) || !kf_factor(n, p, ut, d)) return NAV_NAN;
+    if (n < 1 || n > KF_MAX || !nav_all_finite(p, n * n) || !kf_factor(n, p, ut, d)) return NAV_NAN;
     double sum = 0.0;
     double e[KF_MAX];
     memcpy(e, error, sizeof *e * (size_t)n);

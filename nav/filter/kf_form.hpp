@@ -2,20 +2,13 @@
 #ifndef PSABENCH_NAV_KF_FORM_HPP
 #define PSABENCH_NAV_KF_FORM_HPP
 
+#include "nav/common/nav_math.hpp"
 #include "nav/filter/kf_kernels.h"
 #include "nav/kf.h"
 
-#include <cstdint>
 #include <cstring>
 
 constexpr int KF_MAX = NAV_KF_MAX;
-
-inline uint64_t kf_bits(double x)
-{
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
 
 struct kf_used { /* columns of some rows that are not zero */
     int count;
@@ -60,6 +53,9 @@ double kf_dot(int n, const double *a, const double *b);
 void kf_take_phi(struct nav_kf *kf, const double *rows);
 /* Phi a of `count` columns. */
 void kf_move(const struct nav_kf *kf, const double *a, const int *at, int count, double *y);
+
+/* S = H P H' + diag r of `count` rows, KF_GROUP at most: s, count x count. */
+int kf_joint(const struct nav_kf *kf, const double *h, const double *r, int count, double *s);
 
 /* Measurements by groups of KF_GROUP, so that P is read once and written once: products of all, then for each what the ones
  * before it leave of its gain and, once it is taken, its part of P; then the parts are subtracted. */

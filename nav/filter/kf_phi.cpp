@@ -4,9 +4,9 @@
 void kf_list_used(int rows, int n, const double *a, struct kf_used *used)
 {
     uint64_t any[KF_MAX];
-    for (int k = 0; k < n; k++) any[k] = kf_bits(a[k]) << 1;
+    for (int k = 0; k < n; k++) any[k] = nav_bits(a[k]) << 1;
     for (int i = 1; i < rows; i++)
-        for (int k = 0; k < n; k++) any[k] |= kf_bits(a[i * n + k]) << 1;
+        for (int k = 0; k < n; k++) any[k] |= nav_bits(a[i * n + k]) << 1;
     int count = 0;
     for (int k = 0; k < n; k++) {
         used->at[count] = k;

@@ -15,13 +15,6 @@ double koi_time_s(const struct nav_koi *k)
     return k->start_s + (double)k->steps * k->cfg.step_s;
 }
 
-static bool are_finite(const double *a, int64_t count)
-{
-    bool finite = true;
-    for (int64_t i = 0; i < count; i++) finite &= std::isfinite(a[i]);
-    return finite;
-}
-
 void koi_use_sensors(struct nav_koi *k)
 {
     const mat3 one = mat3::Identity();
@@ -69,8 +62,8 @@ static void set_walks(struct nav_koi *k)
 
 static int check_start(const struct nav_koi_sensors *sensors, double t_s, const struct nav_state *at)
 {
-    if (!std::isfinite(t_s) || !are_finite(&at->lat_rad, NAV_STATE_DOUBLES)) return NAV_NOT_FINITE;
-    if (sensors && !are_finite(sensors->nu_radps, sizeof *sensors / sizeof(double))) return NAV_NOT_FINITE;
+    if (!std::isfinite(t_s) || !nav_all_finite(&at->lat_rad, NAV_STATE_DOUBLES)) return NAV_NOT_FINITE;
+    if (sensors && !nav_all_finite(sensors->nu_radps, sizeof *sensors / sizeof(double))) return NAV_NOT_FINITE;
     return nav_is_rotation(Eigen::Map<const mat3_rows>(at->C_nb), 1e-6) ? NAV_OK : NAV_RANGE;
 }
 
@@ -186,7 +179,7 @@ static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *
 int nav_koi_push(nav_koi *k, const double *dtheta_rad, const double *dv_mps, int64_t count)
 {
     if (count < 0) return NAV_RANGE;
-    if (!are_finite(dtheta_rad, 3 * count) || !are_finite(dv_mps, 3 * count)) return NAV_NOT_FINITE;
+    if (!nav_all_finite(dtheta_rad, 3 * count) || !nav_all_finite(dv_mps, 3 * count)) return NAV_NOT_FINITE;
     int status = NAV_OK;
     for (int64_t i = 0; i < count && status == NAV_OK;) {
         const int64_t left = k->per_step - k->in_step;

@@ -122,24 +122,14 @@ int look_at(const nav_koi *k, const nav_koi_measurement *m)
     return koi_time_s(k) - m->t_s > k->cfg.max_age_s ? NAV_KOI_STALE : NAV_KOI_ACCEPTED;
 }
 
-/* Innovations one by one, and y' S^-1 y of all: S from the variances of single rows and of sums of two. */
+/* Innovations one by one, and y' S^-1 y of all. */
 int find_nis(const nav_koi *k, const Rows *rows, nav_koi_last *last)
 {
-    const int n = k->n, count = rows->count;
-    double s[9], sum[KF_MAX];
-    nav_kf_innovation of;
-    for (int i = 0; i < count; i++)
-        for (int j = 0; j <= i; j++) {
-            for (int c = 0; c < n; c++) sum[c] = rows->h[i * n + c] + (i == j ? 0.0 : rows->h[j * n + c]);
-            const int status = nav_kf_innovate(&k->kf, sum, 0.0, i == j ? rows->r[i] : rows->r[i] + rows->r[j], &of);
-            if (status != NAV_OK) return status;
-            s[i * count + j] = of.variance;
-        }
-    for (int i = 0; i < count; i++) {
-        last->innovation[i] = {rows->y[i], s[i * (count + 1)]};
-        for (int j = 0; j < i; j++)
-            s[i * count + j] = s[j * count + i] = 0.5 * (s[i * count + j] - s[i * (count + 1)] - s[j * (count + 1)]);
-    }
+    const int count = rows->count;
+    double s[9];
+    const int status = kf_joint(&k->kf, rows->h, rows->r, count, s);
+    if (status != NAV_OK) return status;
+    for (int i = 0; i < count; i++) last->innovation[i] = {rows->y[i], s[i * (count + 1)]};
     last->nis = nav_kf_nees(count, rows->y, s);
     return std::isfinite(last->nis) ? NAV_OK : NAV_SINGULAR;
 }

@@ -35,16 +35,9 @@ int nav_sins_start(void *memory, size_t bytes, const struct nav_sins_cfg *cfg, c
     return status;
 }
 
-static bool are_finite(const double *a, int count)
-{
-    bool finite = true;
-    for (int i = 0; i < count; i++) finite &= std::isfinite(a[i]);
-    return finite;
-}
-
 int nav_sins_about(nav_sins *s, const struct nav_sins_params *model)
 {
-    if (!are_finite((const double *)model, (int)(sizeof *model / sizeof(double)))) return NAV_NOT_FINITE;
+    if (!nav_all_finite((const double *)model, sizeof *model / sizeof(double))) return NAV_NOT_FINITE;
     if (s->started) return NAV_TIMES;
     s->model = *model;
     return sins_reset(s);
@@ -62,7 +55,7 @@ static int take_time(nav_sins *s, double t_s)
 int nav_sins_samples(nav_sins *s, double t_s, const double *dtheta_rad, const double *dv_mps, int count)
 {
     if (count < 0) return NAV_RANGE;
-    if (!are_finite(dtheta_rad, 3 * count) || !are_finite(dv_mps, 3 * count)) return NAV_NOT_FINITE;
+    if (!nav_all_finite(dtheta_rad, 3 * count) || !nav_all_finite(dv_mps, 3 * count)) return NAV_NOT_FINITE;
     int status = take_time(s, t_s);
     for (int k = 0; k < count && status == NAV_OK; k++) {
         sins_take_sample(s, Eigen::Map<const vec3>(dtheta_rad + 3 * k), Eigen::Map<const vec3>(dv_mps + 3 * k));

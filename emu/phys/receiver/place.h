@@ -1,7 +1,7 @@
 /* Where an antenna is and how it moves: what a receiver is asked to find.
  *
- * Whoever moves the antenna gives a place_at_fn: the site of the bench, or a flight. It answers for instants of the past, too: a
- * receiver looks back by its latency. */
+ * place_at_fn is the motion of an antenna: at rest at the site of the bench, or that of a flight. It is defined for past instants, too:
+ * a receiver looks back by its latency. */
 #ifndef PSABENCH_PHYS_RECEIVER_PLACE_H
 #define PSABENCH_PHYS_RECEIVER_PLACE_H
 

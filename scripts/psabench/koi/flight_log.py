@@ -33,7 +33,7 @@ class FlightLog:
 
 def begin_flight(store: PassportStore, serial: str, kind: str, begun: datetime) -> str:
     """Enter a flight that begins; its key. Raises BadInput for a time that is not later than the last beginning."""
-    key, before = _iso_time(begun), _begun_in(store, serial)
+    key, before = _iso_time(begun), _keys_of(store, serial, BEGUN)
     if before and datetime.fromisoformat(key) <= datetime.fromisoformat(before[-1]):
         raise BadInput(expected(f"a beginning after {before[-1]}", key, serial))
     _put_entry(store, serial, kind, BEGUN, key, {})
@@ -48,11 +48,11 @@ def end_flight(store: PassportStore, kind: str, key: str, found: FlightEstimate,
     if bool(verdict) != (found.weight == 0.0):
         what = "weight 0" if verdict else "a verdict for weight 0"
         raise BadInput(expected(what, f"weight {found.weight:g}, verdict {verdict!r}", found.serial))
-    if key not in (begun := _begun_in(store, found.serial)):
+    if key not in (begun := _keys_of(store, found.serial, BEGUN)):
         raise BadInput(expected("a flight that has begun", key, found.serial))
     if key != begun[-1]:
         raise BadInput(expected(f"the last flight, {begun[-1]}", key, found.serial))
-    if key in _over_in(store, found.serial):
+    if key in _keys_of(store, found.serial, OVER):
         raise BadInput(expected("a flight that is not over", key, found.serial))
     if found.time_s != (begun_s := datetime.fromisoformat(key).timestamp()):
         raise BadInput(expected(f"a flight that began at {begun_s} s", found.time_s, found.serial))
@@ -117,12 +117,8 @@ def _flight_runs(store: PassportStore, serial: str) -> list[UnitRun]:
     return [run for run in store.read_passport(serial).runs if run.method in (BEGUN, OVER, BACK)]
 
 
-def _begun_in(store: PassportStore, serial: str) -> list[str]:
-    return [str(run.provenance["flight"]) for run in _flight_runs(store, serial) if run.method == BEGUN]
-
-
-def _over_in(store: PassportStore, serial: str) -> list[str]:
-    return [str(run.provenance["flight"]) for run in _flight_runs(store, serial) if run.method == OVER]
+def _keys_of(store: PassportStore, serial: str, method: str) -> list[str]:
+    return [str(run.provenance["flight"]) for run in _flight_runs(store, serial) if run.method == method]
 
 
 def _put_entry(
