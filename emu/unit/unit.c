@@ -1,5 +1,7 @@
 #include "unit/unit.h"
 
+#include "unit/surroundings.h"
+
 #include "base/detmath.h"
 #include "canopen/co_node.h"
 
@@ -185,90 +187,6 @@ static bool is_recorded(const struct unit *u)
     return any;
 }
 
-/* Of the case, wherever in it. */
-static void rate_radps(void *ctx, int64_t t_ns, double w_ib_b[3])
-{
-    static const double origin_m[3] = {0.0, 0.0, 0.0};
-    const struct unit *u = ctx;
-    struct kinematics kin;
-    lab_kinematics(u->lab, &u->cfg.mounting, origin_m, t_ns, &kin);
-    for (unsigned i = 0; i < 3; i++) w_ib_b[i] = kin.w_radps[i];
-}
-
-static void case_kinematics(void *ctx, int64_t t_ns, double f_b_mps2[3], double w_ib_b_radps[3])
-{
-    static const double origin_m[3] = {0.0, 0.0, 0.0};
-    const struct unit *u = ctx;
-    struct kinematics kin;
-    lab_kinematics(u->lab, &u->cfg.mounting, origin_m, t_ns, &kin);
-    memcpy(f_b_mps2, kin.f_mps2, sizeof kin.f_mps2);
-    memcpy(w_ib_b_radps, kin.w_radps, sizeof kin.w_radps);
-}
-
-static int64_t smooth_ns(void *ctx, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    return lab_smooth_ns(u->lab, &u->cfg.mounting, t_ns);
-}
-
-/* The antenna of a unit is at the origin of the aircraft that carries it, else at the site. */
-static void place_at(void *ctx, int64_t t_ns, struct place *out)
-{
-    const struct unit *u = ctx;
-    const struct site *s = &u->lab->site;
-    struct flight_state at;
-    if (u->cfg.mounting.on != LAB_FLIGHT) {
-        *out =
-            (struct place){.lat_rad = s->latitude_rad, .lon_rad = det_wrap_rad(s->longitude_rad), .h_m = s->height_m};
-        return;
-    }
-    flight_at(&u->lab->flight, t_ns, &at);
-    *out = (struct place){.lat_rad = at.lat_rad, .lon_rad = det_wrap_rad(at.lon_rad), .h_m = at.h_m};
-    memcpy(out->v_n_mps, at.v_enu_mps, sizeof at.v_enu_mps);
-}
-
-static double baro_m(void *ctx, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    return u->cfg.mounting.on == LAB_FLIGHT ? flight_baro_m(&u->lab->flight, t_ns) : u->lab->site.height_m;
-}
-
-/* To what the scenario has it at power-on. */
-static double supply_ratio(void *ctx, int64_t t_ns)
-{
-    const struct supply *s = &((const struct unit *)ctx)->lab->supply;
-    return s->cfg.volt_v > 0.0 ? supply_volts(s, t_ns) / s->cfg.volt_v : 0.0;
-}
-
-/* ---- the platform, for a gyro unit */
-
-static void torque_platform(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    (void)platform_torque(&u->lab->platform, u1_radps, u2_radps, t_ns);
-}
-
-static void reposition_platform(void *ctx, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    platform_reposition(&u->lab->platform, t_ns);
-}
-
-static double read_servo_rad(void *ctx, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    return platform_servo_rad(&u->lab->platform, t_ns);
-}
-
-static double read_encoder_rad(void *ctx, int64_t t_ns)
-{
-    const struct unit *u = ctx;
-    return platform_encoder_rad(&u->lab->platform, t_ns);
-}
-
-static const struct board_platform_io platform_io = {torque_platform, reposition_platform, read_servo_rad,
-                                                     read_encoder_rad};
-
 /* An observer may end its own or another's subscription: the cursor lives in the unit, where unit_unsubscribe() sees it. */
 static void on_event(void *ctx, unsigned event, int64_t t_ns)
 {
@@ -322,18 +240,12 @@ void unit_cfg_type(struct unit_cfg *cfg, const struct board_type *type)
 /* A copy of its own for the board; its name stays here. */
 static void init_board(struct unit *u, struct sched *s)
 {
-    struct board_io io = {
-        .ctx = u, .accel = accel_row, .temp_degc = temp_degc, .rate_radps = rate_radps, .event = on_event};
+    struct board_io io = {.ctx = u, .accel = accel_row, .temp_degc = temp_degc, .event = on_event};
     io.accel_range = accel_range;
     io.accel_past_ns = accel_past_ns;
     io.skip_accel = skip_accel;
-    io.kinematics = case_kinematics;
-    io.smooth_ns = smooth_ns;
-    io.place = place_at;
-    io.baro_m = baro_m;
     if (is_recorded(u)) io.accel = recorded_row;
-    if (u->lab->supply.cfg.present) io.supply_ratio = supply_ratio;
-    if (u->lab->platform.cfg.present) io.platform = &platform_io;
+    unit_put_surroundings(u, &io);
     union board_profile_store defaults;
     const void *profile = u->cfg.profile;
     if (!profile) {

@@ -2,10 +2,7 @@
 #ifndef PSABENCH_TESTS_FAULT_RIG_H
 #define PSABENCH_TESTS_FAULT_RIG_H
 
-#include "rig.h"
-
-#include "control/control.h"
-#include "fault/fault.h"
+#include "fault_call.h"
 
 #include <string.h>
 
@@ -136,21 +133,10 @@ static inline void run_to(int64_t t_ns)
     sched_run_until(&r.s, t_ns);
 }
 
-/* The number that fault.add gives; 0: refused, the reason is in the control. Single quotes for double ones. */
+/* As add_fault(). */
 static inline uint32_t add(const char *args)
 {
-    char json[512];
-    snprintf(json, sizeof json, "%s", args);
-    for (char *s = json; *s; s++) *s = *s == '\'' ? '"' : *s;
-    cJSON *j = cJSON_Parse(json);
-    cJSON *result = cJSON_CreateObject();
-    assert_non_null(j);
-    const enum control_outcome done = control_call(&r.control, "fault.add", j, result, r.s.now_ns);
-    const uint32_t id =
-        done == CONTROL_DONE ? (uint32_t)cJSON_GetObjectItemCaseSensitive(result, "id")->valuedouble : 0;
-    cJSON_Delete(result);
-    cJSON_Delete(j);
-    return id;
+    return add_fault(&r.control, args, r.s.now_ns);
 }
 
 /* The n-th event of a kind that comes after t_ns. */

@@ -1,10 +1,7 @@
 /* Faults, events, counters and truth of a board that is none of ours: all that the commands know of it is in its table. */
-#include "rig.h"
+#include "fault_call.h"
 
 #include "fake_board.h"
-
-#include "control/control.h"
-#include "fault/fault.h"
 
 static struct {
     struct sched s;
@@ -17,14 +14,6 @@ static struct {
     struct control control, truth;
     char pushed[256]; /* the latest line */
 } r;
-
-static bool no_client(void *ctx, unsigned i, struct control_client *out)
-{
-    (void)ctx;
-    (void)i;
-    (void)out;
-    return false;
-}
 
 static uint64_t on_can_rx(void *ctx)
 {
@@ -64,20 +53,11 @@ static int fresh(void **state)
     fake_unit(&r.unit[0], &r.board, "f", &r.lab, &r.s);
     const struct unit_cfg psa2 = unit_default("p");
     unit_init(&r.unit[1], &psa2, &r.lab, &r.s);
-    r.view = (struct control_bench){.lab = &r.lab,
-                                    .bus = {&r.bus},
-                                    .buses = 1,
-                                    .unit = {&r.unit[0], &r.unit[1]},
-                                    .unit_name = {"f", "p"},
-                                    .units = 2,
-                                    .sched = &r.s,
-                                    .seed = 7,
-                                    .faults = &r.engine,
-                                    .sim.run = on_run,
-                                    .sim.run_stop = on_run_stop,
-                                    .process.push = on_push,
-                                    .clients.can_rx = on_can_rx,
-                                    .clients.nth = no_client};
+    r.view = bench_of_two(r.unit, "f", "p", &r.bus, &r.s, &r.engine);
+    r.view.sim.run = on_run;
+    r.view.sim.run_stop = on_run_stop;
+    r.view.process.push = on_push;
+    r.view.clients.can_rx = on_can_rx;
     fault_init(&r.engine, &r.view, &r.s);
     control_init(&r.control, control_tables, &r.view);
     control_init(&r.truth, control_truth_tables, &r.view);

@@ -1,9 +1,7 @@
 /* Faults of a receiver: each kind of the table reaches it, those of a kind add up, and nothing is left when they are over. */
-#include "rig.h"
+#include "fault_call.h"
 
 #include "board/receiver/board.h"
-#include "control/control.h"
-#include "fault/fault.h"
 
 #include <math.h>
 #include <string.h>
@@ -20,14 +18,6 @@ static struct {
     struct control control;
 } r;
 
-static bool no_client(void *ctx, unsigned i, struct control_client *out)
-{
-    (void)ctx;
-    (void)i;
-    (void)out;
-    return false;
-}
-
 static int fresh(void **state)
 {
     const struct lab_cfg lab = lab_default();
@@ -41,35 +31,19 @@ static int fresh(void **state)
     unit_cfg_type(&receiver, &receiver_board);
     unit_init(&r.unit[0], &receiver, &r.lab, &r.s);
     unit_init(&r.unit[1], &psa2, &r.lab, &r.s);
-    r.view = (struct control_bench){.lab = &r.lab,
-                                    .bus = {&r.bus},
-                                    .buses = 1,
-                                    .unit = {&r.unit[0], &r.unit[1]},
-                                    .unit_name = {"g", "p"},
-                                    .units = 2,
-                                    .sched = &r.s,
-                                    .seed = 7,
-                                    .faults = &r.engine,
-                                    .clients.nth = no_client};
+    r.view = bench_of_two(r.unit, "g", "p", &r.bus, &r.s, &r.engine);
     fault_init(&r.engine, &r.view, &r.s);
     control_init(&r.control, control_tables, &r.view);
     unit_power_up(&r.unit[0], 0);
     return 0;
 }
 
-/* The number of the fault; 0: refused, the reason is in the control. Single quotes for double ones. */
+/* As add_fault(). */
 static uint32_t add(const char *kind, const char *point, const char *values)
 {
-    char json[300];
-    snprintf(json, sizeof json, "{'kind':'%s','point':'%s'%s%s}", kind, point, *values ? "," : "", values);
-    for (char *s = json; *s; s++) *s = *s == '\'' ? '"' : *s;
-    cJSON *const args = cJSON_Parse(json), *const result = cJSON_CreateObject();
-    assert_non_null(args);
-    const bool done = control_call(&r.control, "fault.add", args, result, r.s.now_ns) == CONTROL_DONE;
-    const uint32_t id = done ? (uint32_t)cJSON_GetObjectItemCaseSensitive(result, "id")->valuedouble : 0;
-    cJSON_Delete(args);
-    cJSON_Delete(result);
-    return id;
+    char args[300];
+    snprintf(args, sizeof args, "{'kind':'%s','point':'%s'%s%s}", kind, point, *values ? "," : "", values);
+    return add_fault(&r.control, args, r.s.now_ns);
 }
 
 static uint32_t added(const char *kind, const char *values)
