@@ -7,12 +7,13 @@ what has converged is corrected once, or nothing is touched and each reason is g
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from psabench.errors import expected
+from psabench.koi.trust import Evidence, TrustLimits, find_doubts, sd_ratios
 from psabench.link.signals import Floats
 
 WHERE = "correction at take-off"
@@ -88,39 +89,10 @@ def taxi_of(t_s: Floats, heading_rad: Floats, speed_mps: Floats) -> Taxi:
     return Taxi(turns, int((t_s[ends] - t_s[begins] >= STOP_S).sum()))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gate:
-    """Of one kind of measurement since the filter began."""
-
-    taken: int
-    gated: int  # outliers and gated, not those that the device called invalid
-    nis_sum: float  # normalised innovations squared of the taken ones
-    nis_dof: int
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
-    """What the filter knows at take-off; vectors of the state, (n,)."""
-
-    names: tuple[str, ...]
-    x: Floats
-    sd: Floats
-    prior_sd: Floats  # 0: known
-    gates: Mapping[str, Gate]  # by kind of measurement
-    alone_s: float  # since one was taken
-    taxi: Taxi
-
-
 @dataclass(frozen=True, kw_only=True)
-class DecisionLimits:
-    """Of the analysis (E0)."""
+class DecisionLimits(TrustLimits):
+    """Of the analysis at take-off (E0)."""
 
-    kinds: tuple[str, ...] = ("position", "velocity")  # measurements that there must be
-    alone_s: float = 5.0
-    taken: int = 60  # measurements of each kind
-    gated_share: float = 0.05
-    nis_chance: float = 1e-4  # of innovations as large or as small as these, if the filter is right
-    sigmas: float = 4.0  # of an estimate by its prior
     turns: int = 1
     stops: int = 1
     heading_ratio: float = 0.7  # sd of the heading's error by the prior's
@@ -142,59 +114,31 @@ class Decision:
 NAVIGATION = ("dr", "dV", "alpha", "beta3")  # blocks that are corrected whole; the others where they have converged
 
 
-def decide_correction(e: Evidence, limits: DecisionLimits | None = None, heading: str = "beta3") -> Decision:
+def decide_correction(
+    e: Evidence, taxi: Taxi, limits: DecisionLimits | None = None, heading: str = "beta3"
+) -> Decision:
     """The analysis at take-off. Raises ValueError where `heading` is not one of the names."""
     limits = limits or DecisionLimits()
     if heading not in e.names:
         raise ValueError(expected(", ".join(e.names), heading, "state of the heading"))
-    reasons = (*_measurement_reasons(e, limits), *_estimate_reasons(e, limits, heading), *_taxi_reasons(e, limits))
+    ratio = sd_ratios(e)
+    reasons = (
+        *find_doubts(e, limits, WHERE),
+        *_heading_reasons(float(ratio[e.names.index(heading)]), limits),
+        *_taxi_reasons(taxi, limits),
+    )
     if reasons:
         return Decision(reasons=reasons, take=np.zeros(len(e.names), np.bool_))
-    ratio = _sd_ratios(e)
     whole = np.array([name.startswith(NAVIGATION) for name in e.names])
     return Decision(reasons=(), take=whole | (ratio < limits.converged))
 
 
-def _sd_ratios(e: Evidence) -> Floats:
-    return np.where(e.prior_sd > 0.0, e.sd / np.where(e.prior_sd > 0.0, e.prior_sd, 1.0), 1.0)
-
-
-def _measurement_reasons(e: Evidence, limits: DecisionLimits) -> Iterator[str]:
-    from scipy.special import chdtr, chdtrc  # slow to import
-
-    if not e.alone_s <= limits.alone_s:
-        yield expected(f"a measurement in the last {limits.alone_s:g} s", f"the last {e.alone_s:.1f} s ago", WHERE)
-    for kind in (k for k in limits.kinds if k not in e.gates):
-        yield expected(f"{limits.taken} measurements of {kind} or more", "none", WHERE)
-    for kind, gate in e.gates.items():
-        if gate.taken < limits.taken:
-            yield expected(f"{limits.taken} measurements of {kind} or more", gate.taken, WHERE)
-        share = gate.gated / max(gate.taken + gate.gated, 1)
-        if share > limits.gated_share:
-            yield expected(f"at most {limits.gated_share:.0%} of {kind} outside its gate", f"{share:.1%}", WHERE)
-        chance = 2.0 * min(chdtr(gate.nis_dof, gate.nis_sum), chdtrc(gate.nis_dof, gate.nis_sum))
-        if not chance >= limits.nis_chance:
-            mean = gate.nis_sum / gate.nis_dof if gate.nis_dof else math.nan
-            yield expected(f"innovations of {kind} with a mean square near 1", f"{mean:.2f}", WHERE)
-
-
-def _estimate_reasons(e: Evidence, limits: DecisionLimits, heading: str) -> Iterator[str]:
-    finite = np.isfinite(e.x) & np.isfinite(e.sd) & np.isfinite(e.prior_sd)
-    if not finite.all():
-        yield expected("finite estimates", f"one that is not for {e.names[int(np.argmin(finite))]}", WHERE)
-        return
-    known = e.prior_sd <= 0.0
-    sigmas = np.where(known, np.where(e.x == 0.0, 0.0, np.inf), np.abs(e.x) / np.where(known, 1.0, e.prior_sd))
-    worst = int(np.argmax(sigmas))
-    if sigmas[worst] > limits.sigmas:
-        what = f"estimates within {limits.sigmas:g} standard deviations of their priors"
-        yield expected(what, f"{sigmas[worst]:.1f} for {e.names[worst]}", WHERE)
-    ratio = float(_sd_ratios(e)[e.names.index(heading)])
+def _heading_reasons(ratio: float, limits: DecisionLimits) -> Iterator[str]:
     if ratio > limits.heading_ratio:
         yield expected(f"a heading known to {limits.heading_ratio:g} of its prior", f"{ratio:.2f}", WHERE)
 
 
-def _taxi_reasons(e: Evidence, limits: DecisionLimits) -> Iterator[str]:
-    for what, count, least in (("turns", e.taxi.turns, limits.turns), ("stops", e.taxi.stops, limits.stops)):
+def _taxi_reasons(taxi: Taxi, limits: DecisionLimits) -> Iterator[str]:
+    for what, count, least in (("turns", taxi.turns, limits.turns), ("stops", taxi.stops, limits.stops)):
         if count < least:
             yield expected(f"{what} during the taxi: {least} or more", count, WHERE)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from psabench.koi.take_off import Decision, Evidence, Gate, TakeOffDetector, Taxi, decide_correction, taxi_of
+from psabench.koi.take_off import Decision, TakeOffDetector, Taxi, decide_correction, taxi_of
+from psabench.koi.trust import Evidence, Gate
 from psabench.link.signals import Floats
 
 NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
@@ -21,8 +22,8 @@ EVIDENCE = Evidence(
     prior_sd=PRIOR,
     gates=GATES,
     alone_s=1.0,
-    taxi=Taxi(turns=3, stops=2),
 )
+TAXI = Taxi(turns=3, stops=2)
 
 
 def detect_runs(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
@@ -67,13 +68,13 @@ def test_turns_and_stops_of_a_taxi() -> None:
 
 
 def test_what_has_converged_is_corrected_and_the_solution_whole() -> None:
-    d = decide_correction(EVIDENCE)
+    d = decide_correction(EVIDENCE, TAXI)
     assert d.passed
     assert d.take.tolist() == [True] * 7 + [True, True, False]
 
 
-def decide_with(**changes: object) -> Decision:
-    return decide_correction(replace(EVIDENCE, **changes))  # type: ignore[arg-type]
+def decide_with(taxi: Taxi = TAXI, **changes: object) -> Decision:
+    return decide_correction(replace(EVIDENCE, **changes), taxi)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -89,9 +90,9 @@ def decide_with(**changes: object) -> Decision:
             {"gates": GATES | {"position": replace(GOOD, gated=30)}},
             "expected at most 5% of position outside its gate, got 9.1%",
         ),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "near 1, got 2.00"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=450.0)}}, "near 1, got 0.50"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "near 1, got nan"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "of 0.1 to 1.3, got 2.00"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=45.0)}}, "of 0.1 to 1.3, got 0.05"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "of 0.1 to 1.3, got nan"),
         ({"x": np.append(np.full(9, 1.0), -9.0)}, "of their priors, got 4.5 for nu3"),
         ({"x": np.full(10, np.nan)}, "expected finite estimates, got one that is not for dr1"),
         ({"sd": PRIOR * 0.8}, "expected a heading known to 0.7 of its prior, got 0.80"),
@@ -104,7 +105,7 @@ def decide_with(**changes: object) -> Decision:
     ],
 )
 def test_each_doubt_is_a_reason_and_then_nothing_is_corrected(changes: dict[str, object], said: str) -> None:
-    d = decide_with(**changes)
+    d = decide_with(**changes)  # type: ignore[arg-type]
     assert not d.passed
     assert not d.take.any()
     (reason,) = d.reasons
@@ -118,4 +119,9 @@ def test_all_reasons_are_given_together() -> None:
 
 def test_a_heading_that_is_no_state_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"state of the heading: expected dr1, .* got yaw"):
-        decide_correction(EVIDENCE, heading="yaw")
+        decide_correction(EVIDENCE, TAXI, heading="yaw")
+
+
+def test_evidence_of_other_lengths_than_its_names_is_rejected() -> None:
+    with pytest.raises(ValueError, match=r"evidence of a filter: expected 10 numbers, got \(9,\)"):
+        replace(EVIDENCE, sd=np.ones(9))
