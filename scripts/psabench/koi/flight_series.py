@@ -31,7 +31,7 @@ class FlightSeries:
             self._nis.append([(taken[kind].nis_sum, taken[kind].nis_dof) for kind in Kind])
 
     def ground(self) -> tuple[Floats, Floats, Floats]:
-        """Time, speed and heading of the hybrid solution so far, (m,) each. The aircraft's nose is axis 1 of the unit."""
+        """Time, speed and heading of the hybrid solution so far, (m,) each. Axis 1 of the unit points ahead."""
         rows = np.array(self._hybrid).reshape(-1, 15)
         return np.array(self._t_s), np.hypot(rows[:, 3], rows[:, 4]), np.arctan2(rows[:, 6], rows[:, 9])
 

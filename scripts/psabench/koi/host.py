@@ -61,7 +61,7 @@ class FlightHost:
     @property
     def t_s(self) -> float:
         """Of the last increment."""
-        return self._samples * self.cfg.sample_s
+        return self._samples * float(self.cfg.sample_s)
 
     def push(self, dtheta_rad: Floats, dv_mps: Floats) -> None:
         """Raw increments (n, 3) each, any number."""
@@ -121,7 +121,7 @@ class FlightHost:
 
     @property
     def _per_second(self) -> int:
-        return round(1.0 / self.cfg.sample_s)
+        return round(1.0 / float(self.cfg.sample_s))
 
     def _whole_seconds(self, dtheta_rad: Floats, dv_mps: Floats) -> Iterator[tuple[Floats, Floats]]:
         """Cut where a second ends."""

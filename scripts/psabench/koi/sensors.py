@@ -1,4 +1,4 @@
-"""Errors of a unit's sensors by name: states of the filter, entries of the passport, what is taken off the increments."""
+"""Errors of a unit's sensors by name: of the filter's state, of the passport, of what is taken off the increments."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def vector_of_sensors(cfg: KoiConfig, s: Sensors) -> Floats:
 
 
 def instrument_class(cfg: KoiConfig) -> InstrumentClass:
-    """What a unit's sensors may err by, as the filter's configuration has it. Scales and axes do not change from run to run."""
+    """What sensors may err by, as the filter's configuration has it. Scales and axes are the same in each run."""
     names = sensor_names(cfg)
     persistent, run = np.zeros(len(names)), np.zeros(len(names))
     persistent[:6] = [cfg.nu_sd_radps] * 3 + [cfg.df_sd_mps2] * 3

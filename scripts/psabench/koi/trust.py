@@ -96,8 +96,7 @@ def _estimate_doubts(e: Evidence, limits: TrustLimits, where: str) -> Iterator[s
 
 
 def trust_weight(gates: Mapping[str, Gate], limits: TrustLimits) -> float:
-    """Of a flight without doubts: what its measurements are worth, above 0 to 1 (E0). Less for a share outside the gates,
-    less for innovations larger than the filter expects."""
+    """Of a flight without doubts, above 0 to 1 (E0): less for a share outside the gates and for large innovations."""
     weight = 1.0
     for kind in limits.kinds:
         gate = gates[kind]
