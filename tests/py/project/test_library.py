@@ -6,6 +6,7 @@ import ctypes
 import os
 import re
 import subprocess
+import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -267,6 +268,23 @@ def test_north_is_found_by_a_c_program_against_the_installation(
     out = run([program], LD_LIBRARY_PATH=str(installed / "opt/psa/lib64"))
     assert ("libpsabench-nav" in run(["readelf", "-d", program])) is not static
     assert out in (ROOT / "docs/nav.md").read_text()
+
+
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+def test_a_flight_is_navigated_by_a_c_program_against_the_installation(
+    installed: Path, tmp_path: Path, cc: str
+) -> None:
+    program, flight = tmp_path / "navigate", tmp_path / "flight.txt"
+    source = ROOT / "examples/koi/navigate.c"
+    assert len(source.read_text().splitlines()) <= 100
+    options = pkg_config(installed, "--cflags", "--libs", package="psabench-nav")
+    run([cc, "-std=c11", *STRICT, source, *options, "-lm", "-o", program])
+    run([sys.executable, ROOT / "examples/koi/record.py", flight])
+    where = {"LD_LIBRARY_PATH": str(installed / "opt/psa/lib64")}
+    assert run([program, flight], **where) in (ROOT / "docs/nav.md").read_text()
+    flight.write_text("I 1 2\n")
+    broken = subprocess.run([program, flight], env=os.environ | where, capture_output=True, text=True, check=False)
+    assert (broken.returncode, broken.stderr) == (1, "navigate: line 1: expected I, F, H\n")
 
 
 @pytest.mark.parametrize("part", parts())
