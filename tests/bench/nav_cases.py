@@ -139,7 +139,7 @@ PART = 60  # of an hour: python-ins takes minutes for the whole
 def python_ins_filter_hours(count: int) -> str:
     """The same by python-ins' feedforward filter with its 33 states, integration included; a minute, times 60."""
     import pandas as pd
-    from pyins import filters, inertial_sensor, measurements  # type: ignore[import-untyped]
+    from pyins import filters, inertial_sensor, measurements
     from pyins import strapdown as other
 
     whole, began = _hour_of_python_ins()
