@@ -17,7 +17,9 @@
  * zero velocity (the same without Dt), z_h = dr3 - baro. Innovations are of the whole hybrid solution, so that kilometres do no harm.
  * Vertical channel (E0): each accepted barometric height moves the autonomous one, h by -k1 T (h - h_b) and vU by -k2 T (h - h_b), T
  * since the one before; dr3 and dV3 move by as much, which is known. Without barometer it diverges, e-fold in 9.5 min.
- * Not modelled: lever arms of the antenna, coloured noise of the receiver, more than one receiver. Units: rad, s, m, m/s, m/s^2.
+ * Position and velocity are the antenna's: antenna_m from the unit, l. C l and C (w x l), w of the last increment, are taken off,
+ * and beta turns them in H; left out is the Earth's part of w, 0.3 mm/s for 3 m. Stops and heights are the unit's.
+ * Not modelled: coloured noise of the receiver, more than one receiver. Units: rad, s, m, m/s, m/s^2.
  * No allocation: the caller owns the memory, one filter for one thread. Rejections as in nav.h. */
 #ifndef PSABENCH_NAV_KOI_H
 #define PSABENCH_NAV_KOI_H
@@ -83,6 +85,7 @@ struct nav_koi_cfg {
     double position_sd_m[3], velocity_sd_mps[3];                    /* of measurements that do not give their own */
     double stop_sd_mps, height_sd_m, damping_per_s, damping_per_s2; /* k1, k2 of the vertical channel */
     double gate_nis[2], outlier_nis, max_age_s;                     /* gates: of one scalar (height), of three */
+    double antenna_m[3];                                            /* from the unit, in its axes */
 };
 NAV_API int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg); /* NAV_RANGE: no such class */
 NAV_API int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why);

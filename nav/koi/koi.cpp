@@ -124,13 +124,24 @@ static int find_transition(struct nav_koi *k)
     return NAV_OK;
 }
 
-static int finish_step(struct nav_koi *k)
+/* The antenna's velocity about the unit, in b, and what it adds to the acceleration over the step. */
+static void move_antenna(struct nav_koi *k, const vec3 &rate_radps)
+{
+    const vec3 arm_mps = rate_radps.cross(vec3(k->cfg.antenna_m));
+    const vec3 gained = Eigen::Map<const mat3_rows>(k->unit.at.C_nb) * arm_mps -
+                        Eigen::Map<const mat3_rows>(k->before.C_nb) * k->arm_mps;
+    k->antenna_mps2 = vec3(k->acceleration_mps2) + gained / k->cfg.step_s;
+    k->arm_mps = arm_mps;
+}
+
+static int finish_step(struct nav_koi *k, const vec3 &rate_radps)
 {
     int status = find_transition(k);
     if (status == NAV_OK) status = nav_kf_predict(&k->kf, k->phi, k->q);
     if (status != NAV_OK) return status;
     for (int i = 0; i < 3; i++)
         k->acceleration_mps2[i] = (k->unit.at.v_n_mps[i] - k->before.v_n_mps[i]) / k->cfg.step_s;
+    move_antenna(k, rate_radps);
     k->before = k->unit.at;
     k->dtheta_sum.setZero();
     k->dv_sum.setZero();
@@ -167,7 +178,7 @@ static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *
     k->dtheta_sum = dtheta_sum;
     k->dv_sum = dv_sum;
     k->in_step += count;
-    if (k->in_step == k->per_step) status = finish_step(k);
+    if (k->in_step == k->per_step) status = finish_step(k, Eigen::Map<const vec3>(angle + 3 * (count - 1)) / dt);
     if (status == NAV_OK) return status;
     k->unit = before.unit; /* as if these increments had not come */
     k->dtheta_sum = before.dtheta_sum;

@@ -67,6 +67,7 @@ int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg)
 static const char SD[] = "a standard deviation, 0: known";
 static const char NOISE[] = "a density, 0: none";
 static const char ABOVE[] = "above 0";
+static const char ARM[] = "within 200 m";
 static const struct check_rule rules[] = {
     REAL(sample_s, 1e-4, 1.0, "from 0.1 ms to 1 s"),
     REAL(step_s, 1e-4, 10.0, "from 0.1 ms to 10 s"),
@@ -111,6 +112,9 @@ static const struct check_rule rules[] = {
     REAL(gate_nis[1], CHECK_ABOVE, CHECK_ANY, ABOVE),
     REAL(outlier_nis, CHECK_ABOVE, CHECK_ANY, ABOVE),
     REAL(max_age_s, 0.0, 10.0, "from 0 to 10 s"),
+    REAL(antenna_m[0], -200.0, 200.0, ARM),
+    REAL(antenna_m[1], -200.0, 200.0, ARM),
+    REAL(antenna_m[2], -200.0, 200.0, ARM),
 };
 
 int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why)

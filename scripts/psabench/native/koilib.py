@@ -37,6 +37,7 @@ class KoiConfigStruct(c.Structure):
         *_named_doubles("stop_sd_mps", "height_sd_m", "damping_per_s", "damping_per_s2"),
         ("gate_nis", _D * 2),
         *_named_doubles("outlier_nis", "max_age_s"),
+        ("antenna_m", _D * 3),
     ]
 
 
