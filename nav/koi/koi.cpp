@@ -48,16 +48,27 @@ static void forget_measurements(struct nav_koi *k)
     }
 }
 
-/* Rows and noise of the states that only walk: the same in each step. */
+static void set_alone(struct nav_koi *k, int block, double keep, const vec3 &variance)
+{
+    for (int i = 0; i < k->at[block].size; i++) {
+        const int at = k->at[block].offset + i;
+        if (at >= k->dynamic) return;
+        k->phi[at * (k->n + 1)] = keep;
+        k->q[at * (k->dynamic + 1)] = variance[i];
+    }
+}
+
+/* Rows and noise of the states that no other moves, walks and Gauss-Markov ones: the same in each step. */
 static void set_walks(struct nav_koi *k)
 {
-    const int nd = k->dynamic, first[] = {KOI_MOVING, k->at[NAV_KOI_NU].offset, k->at[NAV_KOI_DF].offset, nd};
-    const double walks[] = {k->cfg.baro_walk_m_rts, k->cfg.nu_walk_radps_rts, k->cfg.df_walk_mps2_rts};
-    for (int w = 0; w < 3; w++)
-        for (int i = first[w]; i < first[w + 1] && i < nd; i++) {
-            k->phi[i * (k->n + 1)] = 1.0;
-            k->q[i * (nd + 1)] = walks[w] * walks[w] * k->cfg.step_s;
-        }
+    const struct nav_koi_cfg *c = &k->cfg;
+    const auto walk = [c](double density) { return vec3::Constant(density * density * c->step_s); };
+    const double keep = nav_decay(c->step_s / c->slow_s), gain = nav_rise(2.0 * c->step_s / c->slow_s);
+    set_alone(k, NAV_KOI_BARO, 1.0, walk(c->baro_walk_m_rts));
+    set_alone(k, NAV_KOI_SLOW_R, keep, gain * vec3(c->slow_r_sd_m).cwiseAbs2());
+    set_alone(k, NAV_KOI_SLOW_V, keep, gain * vec3(c->slow_v_sd_mps).cwiseAbs2());
+    set_alone(k, NAV_KOI_NU, 1.0, walk(c->nu_walk_radps_rts));
+    set_alone(k, NAV_KOI_DF, 1.0, walk(c->df_walk_mps2_rts));
 }
 
 static int check_start(const struct nav_koi_sensors *sensors, double t_s, const struct nav_state *at)

@@ -65,6 +65,15 @@ void add_velocity(const nav_koi *k, const Seen &s, double factor, double *h)
     h[2 * n + KOI_V3] += factor;
 }
 
+/* What the receiver errs by for long, of the hybrid solution's innovation too. */
+void add_slow(const nav_koi *k, int block, Rows *rows)
+{
+    for (int i = 0; i < k->at[block].size; i++) {
+        rows->y[i] += k->kf.x[k->at[block].offset + i];
+        rows->h[i * k->n + k->at[block].offset + i] = -1.0;
+    }
+}
+
 void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
     const Seen s = see_hybrid(k, m);
@@ -80,6 +89,7 @@ void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
     }
     add_velocity(k, s, -s.age_s, rows->h);
     add_turn(k, s, s.arm_m - s.age_s * s.arm_mps, rows->h);
+    add_slow(k, NAV_KOI_SLOW_R, rows);
 }
 
 void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
@@ -92,6 +102,7 @@ void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
         rows->y[i] = s.v[i] - (s.age_s + s.dt1_s + s.dt2_s) * s.a[i] - m->value[i];
         rows->h[i * k->n + dt] = rows->h[i * k->n + dt + 1] = s.a[i];
     }
+    add_slow(k, NAV_KOI_SLOW_V, rows);
 }
 
 void stop_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
