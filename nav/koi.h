@@ -124,12 +124,12 @@ NAV_API int nav_koi_correct(nav_koi *k, const unsigned char *take);
 /* take[i] = 1 where state i has a standard deviation below `limit` times the prior's. Returns how many. */
 NAV_API int nav_koi_converged(const nav_koi *k, double limit, unsigned char *take);
 
-struct nav_koi_last {                       /* of a kind */
-    int reason;                             /* -1: none was given */
-    double t_s, accepted_s;                 /* time of the last, of the last accepted; -1e300: none */
-    double nis;                             /* of the last that came as far as the gate */
-    struct nav_kf_innovation innovation[3]; /* of it, each for itself, before any was taken */
-    int64_t counts[NAV_KOI_REASONS];
+struct nav_koi_last {                         /* of a kind */
+    int reason;                               /* -1: none was given */
+    double t_s, accepted_s;                   /* time of the last, of the last accepted; -1e300: none */
+    double nis, nis_sum;                      /* of the last that came as far as the gate; of all accepted ones */
+    struct nav_kf_innovation innovation[3];   /* of it, each for itself, before any was taken */
+    int64_t nis_dof, counts[NAV_KOI_REASONS]; /* scalars in nis_sum */
 };
 struct nav_koi_state {
     double t_s;                            /* of the last step */

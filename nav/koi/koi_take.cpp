@@ -182,6 +182,8 @@ int nav_koi_take(nav_koi *k, const struct nav_koi_measurement *m)
         last->t_s = m->t_s;
     }
     if (reason == NAV_KOI_ACCEPTED) {
+        last->nis_sum += last->nis;
+        last->nis_dof += kinds[m->kind].count;
         if (m->kind == NAV_KOI_HEIGHT) damp_vertical(k, m, last->accepted_s);
         last->accepted_s = m->t_s;
     }

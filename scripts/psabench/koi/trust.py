@@ -93,3 +93,14 @@ def _estimate_doubts(e: Evidence, limits: TrustLimits, where: str) -> Iterator[s
     if sigmas[worst] > limits.sigmas:
         what = f"estimates within {limits.sigmas:g} standard deviations of their priors"
         yield expected(what, f"{sigmas[worst]:.1f} for {e.names[worst]}", where)
+
+
+def trust_weight(gates: Mapping[str, Gate], limits: TrustLimits) -> float:
+    """Of a flight without doubts, above 0 to 1 (E0): less for a share outside the gates and for large innovations."""
+    weight = 1.0
+    for kind in limits.kinds:
+        gate = gates[kind]
+        share = gate.gated / max(gate.taken + gate.gated, 1)
+        mean = gate.nis_sum / gate.nis_dof if gate.nis_dof else 1.0
+        weight = min(weight, (1.0 - share / (2.0 * limits.gated_share)) / max(1.0, mean))
+    return weight

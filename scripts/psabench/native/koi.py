@@ -93,6 +93,8 @@ class Taken:
     reason: Reason | None  # of the last; None: there was none
     accepted_s: float
     nis: float
+    nis_sum: float  # of the accepted ones, with nis_dof scalars
+    nis_dof: int
     innovation: Floats  # (3, 2): values, variances
     counts: dict[Reason, int]
 
@@ -175,6 +177,7 @@ class Koi:
         struct = None if sensors is None else c.byref(sensors.as_struct())
         status = lib.koi_start(place, lib.koi_bytes(), cfg, t_s, row.ctypes.data, *given, struct, c.byref(self.handle))
         _check_status("start", status)
+        self._now = KoiStateStruct()
 
     def push(self, dtheta_rad: Floats, dv_mps: Floats) -> None:
         """Raw increments (n, 3) twice."""
@@ -225,6 +228,11 @@ class Koi:
             taken={k: _taken(s.last[k]) for k in Kind},
         )
 
+    def solutions(self) -> tuple[Floats, Floats]:
+        """Autonomous and hybrid, rows as of State, (15,) each."""
+        library().koi_get(self.handle, self._now)
+        return np.array(self._now.autonomous), np.array(self._now.hybrid)
+
     @property
     def x(self) -> Floats:
         return self._numbers((self.n,), 0)
@@ -257,6 +265,8 @@ def _taken(s: LastStruct) -> Taken:
         reason=None if s.reason < 0 else Reason(s.reason),
         accepted_s=s.accepted_s,
         nis=s.nis,
+        nis_sum=s.nis_sum,
+        nis_dof=s.nis_dof,
         innovation=np.array([[i.value, i.variance] for i in s.innovation]),
         counts={Reason(i): s.counts[i] for i in range(REASONS)},
     )

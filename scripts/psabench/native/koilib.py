@@ -57,8 +57,9 @@ class LastStruct(c.Structure):
 
     _fields_ = [
         ("reason", _I),
-        *_named_doubles("t_s", "accepted_s", "nis"),
+        *_named_doubles("t_s", "accepted_s", "nis", "nis_sum"),
         ("innovation", InnovationStruct * 3),
+        ("nis_dof", _L),
         ("counts", _L * REASONS),
     ]
 

@@ -216,8 +216,12 @@ def test_the_gate_is_the_normalised_innovation_of_all_three_together(taxied: tup
     unit = np.array([1.0, 0.5, 0.2])
     nis = scale * d.cfg.gate_nis[1]
     y = math.sqrt(nis / (unit @ np.linalg.solve(s, unit))) * unit
+    before = koi.state.taken[Kind.VELOCITY]
     reason = koi.take(Kind.VELOCITY, 101.0, at.hybrid.v_n_mps - koi.x[dt].sum() * a - y, (0.03, 0.04, 0.05))
     last = koi.state.taken[Kind.VELOCITY]
+    counted = reason is Reason.ACCEPTED
+    assert last.nis_sum - before.nis_sum == pytest.approx(nis if counted else 0.0, rel=1e-6)
+    assert last.nis_dof - before.nis_dof == (3 if counted else 0)
     assert last.nis == pytest.approx(nis, rel=1e-6)
     assert last.innovation == pytest.approx(np.stack([y, np.diag(s)], -1), rel=1e-6)
     assert reason is (Reason.ACCEPTED if scale < 1.0 else Reason.GATED)
