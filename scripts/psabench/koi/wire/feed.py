@@ -20,6 +20,7 @@ from psabench.koi.wire.increments import SAMPLE_S, GridRows, IncrementGrid
 from psabench.koi.wire.nav_pvt import PvtStream, Solution
 from psabench.koi.wire.recording import Frame, Look
 from psabench.link.can_host import Message
+from psabench.link.protocol_files import dbc_node, message
 from psabench.link.signals import Floats
 
 INCREMENTS = ReadingLayout(board="bins", messages=MESSAGES, counter="SEQ", stamp="TSTAMP", overrun="INCOMPLETE")
@@ -79,6 +80,7 @@ class FlightFeed:
         self.last: Solution | None = None
         self._weights = weights
         self._readings, self._baro = (ReadingReader(layout, node_id) for layout in (INCREMENTS, BARO))
+        self._baro_id = int(message(BARO.messages[0]).frame_id) + node_id - dbc_node(BARO.board)
         self._silent = _Silent()
         self._height_row = 0  # the next height is of this row or a later one
         self._doubted = 0
@@ -89,13 +91,16 @@ class FlightFeed:
 
     def on_message(self, m: Message | Frame) -> None:
         """A CAN frame: a listener of the bus."""
-        self._readings.on_message(m)  # type: ignore[arg-type]
-        self._baro.on_message(m)  # type: ignore[arg-type]
+        if m.arbitration_id == self._baro_id:
+            self._baro.on_message(m)  # type: ignore[arg-type]
+        else:
+            self._readings.on_message(m)  # type: ignore[arg-type]
 
     def look(self, look: Look) -> None:
         """What the port had, after the frames before it."""
-        self._drain()
         solutions = self.stream.take(look.data) if look.data else []
+        if solutions or not look.data:
+            self._drain()
         self._silent.take(self.grid.now_s, look.data, len(solutions))
         for s in solutions:
             self._take_solution(s, look)

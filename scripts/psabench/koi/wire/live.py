@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +12,14 @@ from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, Weights
 from psabench.errors import DeviceError, expected
 from psabench.koi.wire.feed import FlightFeed
-from psabench.koi.wire.port import LEAST_S, WALL_S, LookPlan, SerialPort
+from psabench.koi.wire.increments import END_S, SAMPLE_S
+from psabench.koi.wire.nav_pvt import PvtStream
+from psabench.koi.wire.port import WALL_S, LookPlan, SerialPort
 from psabench.koi.wire.recording import FlightRecorder, Look
+from psabench.link.can_host import StepClock
 
-PERIOD_S = 0.01
-QUIET_LOOK_S = 0.25  # between two entries of a port without bytes
+QUIET_LOOK_S = 1.0  # between two entries of a port without bytes
+SHOWN_S = 60.0  # of the flight, between two reports of its progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,17 +56,16 @@ class LiveFlight:
 
     def __init__(self, bench: Bench, unit: Bins, port: SerialPort) -> None:
         self._bench, self._unit, self._port = bench, unit, port
-        self._plan = LookPlan()
         self._landing = Landing(LandedRule())
-        self._begin_s = 0.0  # of the last frame before the look before
-        self._looked_s = 0.0
+        self._watch = PvtStream()  # of the port's bytes as they come: when to look again, and whether it has landed
+        self._landed = False
 
     def prepare(self) -> Weights:
         """The unit is ready; its weights. Raises BenchError, DeviceError for another period than 10 ms."""
         self._unit.wait_ready()
         got = self._unit.stream(3)
         period = float(got.t_sample_s[-1] - got.t_sample_s[-2])
-        if abs(period - PERIOD_S) > 0.1 * PERIOD_S:
+        if abs(period - SAMPLE_S) > 0.1 * SAMPLE_S:
             raise DeviceError("increments", 0, expected("readings every 10 ms", f"{period * 1e3:.3f} ms"))
         self._unit.also("BINS_BARO")
         return self._unit.weights()
@@ -79,50 +82,62 @@ class LiveFlight:
                 stack.callback(host.listeners.remove, listener)
             self._port.take()  # what came before belongs to no time
             self._unit.start()
-            try:
-                self._follow(feed, recorder, for_s, advance)
-            finally:
-                self._unit.stop()
+            stack.callback(self._unit.stop)
+            begin_s, shown_s = self._bench.time_s, 0.0
+            for look in self._looks(recorder):
+                feed.look(look)
+                if feed.grid.now_s >= shown_s + SHOWN_S:
+                    shown_s = feed.grid.now_s
+                    advance(shown_s)
+                if self._landed or feed.grid.now_s >= for_s or feed.grid.ended:
+                    break
+                if self._bench.time_s - begin_s > for_s + END_S:
+                    raise DeviceError("increments", 0, expected("readings", f"none since {feed.grid.now_s:.1f} s"))
 
-    def _follow(self, feed: FlightFeed, recorder: FlightRecorder, for_s: float, advance: Callable[[float], None]) -> None:
-        begin_s = self._looked_s = self._bench.time_s
-        landed, shown_s = False, 0.0
-        while not landed and feed.grid.now_s < for_s and not feed.grid.ended:
-            if self._bench.time_s - begin_s > for_s + 10.0:
-                raise DeviceError("increments", 0, expected("readings", f"none since {feed.grid.now_s:.1f} s"))
-            landed = self._look(feed, recorder)
-            if feed.grid.now_s >= shown_s + 60.0:
-                shown_s = feed.grid.now_s
-                advance(shown_s)
+    def _looks(self, recorder: FlightRecorder) -> Iterator[Look]:
+        """At the port: those with bytes, and others now and then."""
+        clock = self._bench.step_clock
+        begin_s = recorder.last_s
+        looked_s = self._bench.time_s
+        for data, now_s in self._steps(clock) if clock else self._moments():
+            if data or now_s - looked_s >= QUIET_LOOK_S:
+                look = Look(recorder.last_s, begin_s or recorder.last_s, recorder.frames, data)
+                recorder.look(look)
+                looked_s = now_s
+                yield look
+            begin_s = recorder.last_s
 
-    def _look(self, feed: FlightFeed, recorder: FlightRecorder) -> bool:
-        """One step of time and a look; whether the flight is over."""
-        now_s = self._bench.time_s
-        step_s = self._plan.next_look_s(now_s) - now_s if self._bench.pace == "step" else WALL_S
-        self._bench.run_for(max(step_s, LEAST_S / 4))
-        data = self._port.take()
-        if not data and self._bench.time_s - self._looked_s < QUIET_LOOK_S:
-            self._begin_s = recorder.last_s
-            self._plan.missed(self._bench.time_s)
-            return False
-        self._looked_s = self._bench.time_s
-        look = Look(recorder.last_s, self._begin_s or recorder.last_s, recorder.frames, data)
-        recorder.look(look)
-        before = feed.stream.counts.solutions
-        feed.look(look)
-        self._begin_s = recorder.last_s
-        if feed.stream.counts.solutions == before:
-            self._plan.missed(self._bench.time_s)
-            return False
-        self._plan.arrived(now_s, self._bench.time_s)
-        return self._has_landed(feed)
+    def _steps(self, clock: StepClock) -> Iterator[tuple[bytes, float]]:
+        """In lockstep: while the emulator makes a step, what came in the step before is taken."""
+        plan, host = LookPlan(), self._bench.host
+        before_s = clock.now_s()
+        clock.start_run(plan.next_look_s(before_s) - before_s)
+        while True:
+            counts = clock.finish_run()
+            now_s, data = clock.now_s(), self._port.take()
+            if self._follow(data, now_s):
+                plan.arrived(before_s, now_s)
+            else:
+                plan.missed(now_s)
+            clock.start_run(plan.next_look_s(now_s) - now_s)
+            host.receive_up_to(counts[0])
+            yield data, now_s
+            before_s = now_s
 
-    def _has_landed(self, feed: FlightFeed) -> bool:
-        s = feed.last
-        if s is None:
-            return False
-        speed = (s.v_enu_mps[0] ** 2 + s.v_enu_mps[1] ** 2) ** 0.5
-        return self._landing.take(feed.grid.now_s, speed, valid=s.valid)
+    def _moments(self) -> Iterator[tuple[bytes, float]]:
+        """In real time, or over a link that does not count."""
+        while True:
+            self._bench.wait(WALL_S)
+            data, now_s = self._port.take(), self._bench.time_s
+            self._follow(data, now_s)
+            yield data, now_s
+
+    def _follow(self, data: bytes, now_s: float) -> bool:
+        """Whether these bytes complete a solution."""
+        found = self._watch.take(data) if data else []
+        for s in found:
+            self._landed = self._landing.take(now_s, math.hypot(*s.v_enu_mps[:2]), valid=s.valid) or self._landed
+        return bool(found)
 
 
 def serial_of(bench: Bench, given: str | None, endpoints: list[dict[str, Any]]) -> str:

@@ -60,26 +60,29 @@ class FlightRecorder:
         """A listener of the bus."""
         if m.is_error_frame:
             return
-        wide = 8 if m.is_extended_id else 3
-        self._lines.append(f"({m.timestamp:.6f}) can0 {m.arbitration_id:0{wide}X}#{m.data.hex().upper()}\n")
+        self._lines.append("(%.6f) %03X#%s\n" % (m.timestamp, m.arbitration_id, m.data.hex()))  # noqa: UP031 - quicker
         self.frames += 1
         self.last_s = m.timestamp
 
     def look(self, look: Look) -> None:
         """After the frames before it."""
-        self._can.write("".join(self._lines))
-        self._lines.clear()
+        self._store_frames()
         head = f"({look.t_s:.6f}) gps#{look.begin_s:.6f}#{look.frames}"
         self._port.write(f"{head}#{look.data.hex().upper()}\n")
         if look.data:
             self._can.flush()
             self._port.flush()
 
+    def _store_frames(self) -> None:
+        """Capitals and the name of the bus all at once: 1.8 million frames an hour."""
+        self._can.write("".join(self._lines).upper().replace(") ", ") can0 "))
+        self._lines.clear()
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exc: Any) -> None:
-        self._can.write("".join(self._lines))
+        self._store_frames()
         self._stack.__exit__(*exc)
 
 
