@@ -74,10 +74,9 @@ class _Silent:
 class FlightFeed:
     """Frames go to `on_message`, looks at the port to `look`, in the order in which they came."""
 
-    def __init__(self, host: Host, weights: Weights, node_id: int) -> None:
-        self.host, self.grid, self.stream, self.clock = host, IncrementGrid(), PvtStream(), ReceiverClock()
-        self.lost_frames = self.torn = 0
-        self.last: Solution | None = None
+    def __init__(self, host: Host, weights: Weights, node_id: int, clock: ReceiverClock | None = None) -> None:
+        self.host, self.grid, self.stream = host, IncrementGrid(), PvtStream()
+        self.clock = clock or ReceiverClock()
         self._weights = weights
         self._readings, self._baro = (ReadingReader(layout, node_id) for layout in (INCREMENTS, BARO))
         self._baro_id = int(message(BARO.messages[0]).frame_id) + node_id - dbc_node(BARO.board)
@@ -150,7 +149,6 @@ class FlightFeed:
         return found
 
     def _take_solution(self, s: Solution, look: Look) -> None:
-        self.last = s
         width_s = max(look.t_s - look.begin_s, 0.0)
         t_s = self.clock.take(s.tow_s, self.grid.now_s - width_s / 2.0, width_s)
         if t_s is None:

@@ -58,6 +58,7 @@ class IncrementGrid:
 
     counts: GridCounts = field(default_factory=GridCounts)
     ended: bool = False  # after END_S without readings
+    begin_us: int | None = None  # by the unit's clock, where the first interval begins
     _next: int = 0  # number of the next row
     _last_us: int | None = None  # time stamp of the last row
     _last: tuple[Floats, Floats] = field(default_factory=lambda: (np.zeros(3), np.zeros(3)))
@@ -83,6 +84,8 @@ class IncrementGrid:
         kept = np.flatnonzero(steps)
         if not len(kept):
             return _no_rows(self._next)
+        if self.begin_us is None:
+            self.begin_us = int(stamps_us[kept[0]]) - SAMPLE_US
         self._last_us, self._rx_s = int(stamps_us[kept[-1]]), float(t_rx_s[kept[-1]])
         return self._make_rows(kept, steps[kept], got)
 
