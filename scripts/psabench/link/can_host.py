@@ -128,8 +128,10 @@ class StepClock:
         self._send(self._hosts, "run", {"for_s": dwell_s})
 
     def finish_run(self) -> list[int]:
-        """Time is where `start_run` brings it. Returns how many frames each of the hosts gets until then, to be taken by
-        `CanHost.receive_up_to`: those of a next run may already be behind them."""
+        """Time is where `start_run` brings it. Returns how many frames each of the hosts has got by then.
+
+        They are taken by `CanHost.receive_up_to`: those of a next run may already be behind them.
+        """
         reply = self._control.wait_reply("run")
         self._t_ns = reply.t_ns
         self._check_deadline()

@@ -49,7 +49,7 @@ class Silence:
 
     from_s: float
     to_s: float
-    bytes: int  # that came meanwhile, no solution among them
+    size: int  # bytes that came meanwhile, no solution among them
 
 
 @dataclass
@@ -57,18 +57,18 @@ class _Silent:
     """Since the last solution."""
 
     since_s: float = 0.0
-    bytes: int = 0
+    size: int = 0
     found: list[Silence] = field(default_factory=list)
 
     def take(self, now_s: float, data: bytes, solutions: int) -> None:
-        self.bytes += len(data)
+        self.size += len(data)
         if solutions:
             self.end(now_s)
 
     def end(self, now_s: float) -> None:
         if now_s - self.since_s > SILENT_S:
-            self.found.append(Silence(self.since_s, now_s, self.bytes))
-        self.since_s, self.bytes = now_s, 0
+            self.found.append(Silence(self.since_s, now_s, self.size))
+        self.since_s, self.size = now_s, 0
 
 
 class FlightFeed:
@@ -179,6 +179,6 @@ class FlightFeed:
         if c.jumps:
             said.append(expected("a time of week without jumps", f"{c.jumps}", "receiver"))
         for s in self.silences:
-            got = f"none from {s.from_s:.0f} to {s.to_s:.0f} s, {s.bytes} bytes"
+            got = f"none from {s.from_s:.0f} to {s.to_s:.0f} s, {s.size} bytes"
             said.append(expected(f"a solution within {SILENT_S:g} s", got, "receiver"))
         return said

@@ -1,4 +1,4 @@
-"""A flight on a bench: the unit's readings over CAN, the receiver's port, in lockstep with simulated time or in real time."""
+"""A flight on a bench: readings over CAN, the receiver's port, in lockstep with simulated time or in real time."""
 
 from __future__ import annotations
 

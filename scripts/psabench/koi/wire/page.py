@@ -30,7 +30,7 @@ def verdict_words(run: KoiRun) -> str:
     if run.graded is not None:
         g = run.graded
         error_m = g.hour_error_m(f.take_off_s)
-        if math.isfinite(error_m):
+        if f.take_off_s is not None and math.isfinite(error_m):
             said.append(f"autonomous within {error_m:.0f} m in the hour, {error_m / MILE_M:.2f} miles")
         said.append(f"hybrid {g.hybrid_rms_m:.2f} m rms")
     weight = f"weight {f.estimate.weight:.2f} for the passport" if not f.verdict else "no weight for the passport"

@@ -42,7 +42,10 @@ def _draw_way(run: KoiRun) -> str:
     first = f.hybrid[0, :3]
     scale_m = np.array([6.378e6 * math.cos(first[0]), 6.378e6])
     with style.drawing(4.2) as (fig, ax):
-        for rows, label, color in ((f.autonomous, "autonomous", style.SERIES[1]), (f.hybrid, "hybrid", style.SERIES[0])):
+        for rows, label, color in (
+            (f.autonomous, "autonomous", style.SERIES[1]),
+            (f.hybrid, "hybrid", style.SERIES[0]),
+        ):
             way = (rows[:, [1, 0]] - first[[1, 0]]) * scale_m / KM
             ax.plot(*way.T, color=color, lw=1.3, label=label)
         if run.graded is not None:
@@ -79,7 +82,9 @@ def _draw_sigmas(run: KoiRun) -> str:
     with style.drawing(3.6) as (fig, ax):
         for k, (name, unit, label) in enumerate(SIGMAS):
             sd = f.sd[:, f.names.index(name)] / unit
-            ax.plot(f.sd_t_s / MINUTE_S, sd / sd[0], color=style.SERIES[k], lw=1.3, label=f"{label}: {sd[0]:.3g} at first")
+            ax.plot(
+                f.sd_t_s / MINUTE_S, sd / sd[0], color=style.SERIES[k], lw=1.3, label=f"{label}: {sd[0]:.3g} at first"
+            )
         _mark_phases(ax, run)
         ax.set_ylim(0.0, 1.1)
         ax.set_xlabel("time, min; grey: turns; dashed: take-off; dotted: stops")
@@ -115,5 +120,6 @@ def _draw_nis(f: FlightFound) -> str:
                 ax.plot(t_min[there], sums[there] / dof[there], color=style.SERIES[k], lw=1.2, label=kind)
         ax.set_xlabel("time, min")
         ax.set_ylabel("NIS by degree of freedom")
-        ax.legend(loc="upper right")
+        if ax.lines:  # a flight of a minute has none
+            ax.legend(loc="upper right")
         return style.svg(fig, "koi-nis")

@@ -56,13 +56,13 @@ class FlightRecorder:
             replace_file(folder / SETUP, json.dumps(setup, indent=2) + "\n")
             self._stack = stack.pop_all()
 
-    def on_message(self, m: Message) -> None:
+    def on_message(self, m: Message | Frame) -> None:
         """A listener of the bus."""
         if m.is_error_frame:
             return
         self._lines.append("(%.6f) %03X#%s\n" % (m.timestamp, m.arbitration_id, m.data.hex()))  # noqa: UP031 - quicker
         self.frames += 1
-        self.last_s = m.timestamp
+        self.last_s = round(m.timestamp, 6)  # as it is read again
 
     def look(self, look: Look) -> None:
         """After the frames before it."""

@@ -1,4 +1,4 @@
-"""`psabench run koi-flight`: one flight over the wire, or from its recording; then the truth beside it, where there is one."""
+"""`psabench run koi-flight`: one flight over the wire, or from its recording; beside the truth where there is one."""
 
 from __future__ import annotations
 

@@ -115,7 +115,10 @@ def _place_at(truth: FlightTruth, at_s: Floats) -> tuple[Floats, Floats]:
     rate = _rates(truth)
     begin, end, r0, r1 = value[k], value[k + 1], rate[k] * step[:, None], rate[k + 1] * step[:, None]
     place = (
-        begin * (2 * s**3 - 3 * s**2 + 1) + r0 * (s**3 - 2 * s**2 + s) + end * (3 * s**2 - 2 * s**3) + r1 * (s**3 - s**2)
+        begin * (2 * s**3 - 3 * s**2 + 1)
+        + r0 * (s**3 - 2 * s**2 + s)
+        + end * (3 * s**2 - 2 * s**3)
+        + r1 * (s**3 - s**2)
     )
     speed = np.stack([np.interp(at_s, truth.t_s, truth.v_enu_mps[:, i]) for i in range(3)], axis=1)
     return place, speed
