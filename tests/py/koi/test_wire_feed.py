@@ -18,8 +18,8 @@ from psabench.link.protocol_files import message
 from psabench.link.signals import Floats
 from pvt_packets import pvt
 
-NODE = 11
-WEIGHTS = Weights(gyro_rad=1.0, accel_mps=1.0, age_s=0.0)
+NODE, SMALL = 11, 1e-8
+WEIGHTS = Weights(gyro_rad=SMALL, accel_mps=SMALL, age_s=0.0)
 IDS = [int(message(name).frame_id) for name in (*MESSAGES, "BINS_BARO")]
 
 
@@ -29,7 +29,7 @@ IDS = [int(message(name).frame_id) for name in (*MESSAGES, "BINS_BARO")]
 def readings(stamps: list[int], whole: list[bool] | None = None) -> UnitIncrements:
     """With time stamps in units of 10 ms; the increment is the stamp."""
     t = np.array(stamps, float)
-    rows = np.stack([t, 2.0 * t, -t], axis=1)
+    rows = SMALL * np.stack([t, 2.0 * t, -t], axis=1)
     good = np.ones(len(t), bool) if whole is None else np.array(whole)
     return UnitIncrements(
         end_s=0.01 * t % (2**32 * 1e-6), dtheta_rad=rows, dv_mps=3.0 * rows, seq=t.astype(int), whole=good
@@ -39,7 +39,7 @@ def readings(stamps: list[int], whole: list[bool] | None = None) -> UnitIncremen
 def take(grid: IncrementGrid, stamps: list[int], whole: list[bool] | None = None) -> list[float]:
     got = grid.take(readings(stamps, whole), came(len(stamps), grid.now_s))
     assert got.dv_mps == pytest.approx(3.0 * got.dtheta_rad)
-    return [float(x) for x in got.dtheta_rad[:, 0]]
+    return [float(x) for x in np.round(got.dtheta_rad[:, 0] / SMALL, 6)]
 
 
 def came(count: int, from_s: float) -> Floats:
@@ -76,6 +76,17 @@ def test_repeated_and_older_readings_are_not_used() -> None:
     grid = IncrementGrid()
     assert take(grid, [5, 6, 6, 3, 7]) == [5.0, 6.0, 7.0]
     assert (grid.counts.repeated, grid.counts.backwards, grid.counts.doubts) == (1, 1, [])
+
+
+def test_readings_of_no_motion_are_bridged() -> None:
+    """A bit of the angle or of the velocity that a gateway has inverted."""
+    grid, got = IncrementGrid(), readings(list(range(1, 21)))
+    got.dtheta_rad[5, 1] += 2.0**30 * 1e-9
+    got.dv_mps[9, 2] -= 5.0
+    made = grid.take(got, came(20, 0.0))
+    assert np.round(made.dtheta_rad[:, 0] / SMALL, 6).tolist() == [float(k) for k in range(1, 21)]
+    assert np.abs(made.dv_mps).max() < 1e-4
+    assert (grid.counts.impossible, grid.counts.filled, grid.counts.doubts) == (2, 2, [])
 
 
 def test_a_clock_that_was_set_is_followed_with_a_doubt() -> None:
@@ -176,7 +187,7 @@ def fed(events: Iterator[Frame | Look]) -> tuple[FlightFeed, Ears]:
 
 def test_a_quiet_flight_comes_through_whole() -> None:
     feed, ears = fed(flight(20))
-    assert (ears.rows[:, 0] == np.arange(1, 2001)).all()
+    assert ears.rows[:, 0] == pytest.approx(SMALL * np.arange(1, 2001))
     assert [n for _, _, n in ears.heights] == [1 + 100 * k for k in range(20)]
     assert [t for t, _, _ in ears.heights] == pytest.approx([0.01 + k for k in range(20)])
     assert [h for _, h, _ in ears.heights] == pytest.approx([0.001 * (1 + 100 * k) for k in range(20)])
@@ -191,7 +202,7 @@ def test_a_quiet_flight_comes_through_whole() -> None:
 def test_a_lost_frame_is_a_reading_that_is_bridged_and_noted() -> None:
     """One of each kind; a lost height is no lost reading."""
     feed, ears = fed(flight(20, lost=frozenset({501, 1002, 1503, 2004, 2505})))
-    assert ears.rows[:, 0] == pytest.approx(np.arange(1, 2001))
+    assert ears.rows[:, 0] == pytest.approx(SMALL * np.arange(1, 2001))
     assert ears.doubts == []
     assert (feed.grid.counts.gaps, feed.grid.counts.filled) == (4, 4)
     notes = "\n".join(feed.notes())

@@ -155,18 +155,19 @@ def test_time_that_stands_is_never_believed() -> None:
 # ---- looks
 
 
-def test_looks_close_in_on_the_arrival() -> None:
-    """Bursts 37 ms after each second: soon known to 8 ms, with a handful of looks a second."""
+@pytest.mark.parametrize("period_s", [1.0, 0.2, 0.1])
+def test_looks_close_in_on_the_arrival(period_s: float) -> None:
+    """Bursts 37 ms after each solution: soon known to 8 ms, with a handful of looks for each."""
     plan, now_s, looks, widths = LookPlan(), 0.0, 0, list[float]()
     while now_s < 60.0:
         before_s, now_s = now_s, plan.next_look_s(now_s)
         looks += 1
         assert 0.0 < now_s - before_s <= LOOK_S + 1e-9
-        due_s = math.floor(before_s - 0.037 + 1.0) + 0.037
-        if before_s < due_s <= now_s:
-            plan.arrived(before_s, now_s)
+        number = math.floor((now_s - 0.037) / period_s)  # of the last one that is there
+        if number * period_s + 0.037 > before_s:
+            plan.arrived(before_s, now_s, number * period_s)
             widths.append(now_s - before_s)
         else:
             plan.missed(now_s)
-    assert max(widths[10:]) <= 2.0 * LEAST_S
-    assert looks < 60 * 9
+    assert max(widths[20:]) <= 2.0 * LEAST_S + 1e-9
+    assert looks < 60 * (4 + 4 / period_s)

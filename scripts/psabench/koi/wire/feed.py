@@ -164,6 +164,7 @@ class FlightFeed:
             said.append(expected("no gaps in the increments", f"{g.gaps}, {g.filled} rows filled", "increments"))
         for what, count in (
             ("whole readings", g.not_whole),
+            ("readings of an aircraft's motion", g.impossible),
             ("readings once", g.repeated),
             ("readings in the order of their time", g.backwards),
             ("readings whose frames come together", r.torn),

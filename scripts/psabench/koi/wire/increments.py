@@ -20,6 +20,7 @@ BRIDGE_S = 0.2  # E0: at 20 deg/s^2 the line is off by 0.1 deg at its middle
 END_S = 60.0  # E0
 END_ROWS = round(END_S / SAMPLE_S)
 RESTART = 10  # readings in a row at another time: the unit's clock has been set (E0)
+MOST_RAD, MOST_MPS = 0.07, 2.0  # in a row: 400 deg/s, 200 m/s2; more is no motion of an aircraft (E0)
 WHERE = "increments"
 
 
@@ -42,13 +43,14 @@ class GridCounts:
     gaps: int = 0
     longest_s: float = 0.0
     not_whole: int = 0  # clipped, incomplete, stretched, unsettled
+    impossible: int = 0  # beyond MOST_RAD, MOST_MPS
     repeated: int = 0
     backwards: int = 0
     doubts: list[str] = field(default_factory=list)  # why the flight has no weight
 
     def as_dict(self) -> dict[str, object]:
         """For result.json."""
-        names = ("readings", "filled", "gaps", "longest_s", "not_whole", "repeated", "backwards")
+        names = ("readings", "filled", "gaps", "longest_s", "not_whole", "impossible", "repeated", "backwards")
         return {name: getattr(self, name) for name in names}
 
 
@@ -76,10 +78,14 @@ class IncrementGrid:
             return _no_rows(self._next)
         self.counts.readings += len(got.seq)
         stamps_us = np.round(got.end_s * 1e6).astype(np.int64) % STAMP_US
-        if self._is_even(stamps_us, got.whole):
+        possible = (np.abs(got.dtheta_rad) <= MOST_RAD).all(axis=1) & (np.abs(got.dv_mps) <= MOST_MPS).all(axis=1)
+        usable = got.whole & possible
+        if self._is_even(stamps_us, usable):
             steps = np.ones(len(stamps_us), np.int64)
         else:
-            found = [self._place(*x) for x in zip(stamps_us.tolist(), got.whole.tolist(), t_rx_s.tolist(), strict=True)]
+            self.counts.not_whole += int((~got.whole).sum())
+            self.counts.impossible += int((got.whole & ~possible).sum())
+            found = [self._place(*x) for x in zip(stamps_us.tolist(), usable.tolist(), t_rx_s.tolist(), strict=True)]
             steps = np.array(found, np.int64)
         kept = np.flatnonzero(steps)
         if not len(kept):
@@ -89,16 +95,15 @@ class IncrementGrid:
         self._last_us, self._rx_s = int(stamps_us[kept[-1]]), float(t_rx_s[kept[-1]])
         return self._make_rows(kept, steps[kept], got)
 
-    def _is_even(self, stamps_us: Ints, whole: np.ndarray) -> bool:
+    def _is_even(self, stamps_us: Ints, usable: np.ndarray) -> bool:
         """Nothing is missing: the usual case."""
         before = stamps_us[0] - SAMPLE_US if self._last_us is None else self._last_us
         steps = np.diff(stamps_us, prepend=before) % STAMP_US
-        return bool(whole.all() and (np.abs(steps - SAMPLE_US) <= SAMPLE_US // 10).all())
+        return bool(usable.all() and (np.abs(steps - SAMPLE_US) <= SAMPLE_US // 10).all())
 
-    def _place(self, stamp_us: int, whole: bool, t_rx_s: float) -> int:
+    def _place(self, stamp_us: int, usable: bool, t_rx_s: float) -> int:
         """Rows from the last one to this reading; 0: it is not used."""
-        if self.ended or not whole:
-            self.counts.not_whole += not whole
+        if self.ended or not usable:
             return 0
         steps = 1 if self._last_us is None else self._steps_to(stamp_us, self._last_us, t_rx_s)
         if steps:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from typing import Any
 
 from psabench.bench import Bench
 from psabench.boards.bins.device import Bins, Weights
-from psabench.errors import DeviceError, expected
+from psabench.errors import BenchError, DeviceError, expected
 from psabench.koi.wire.feed import FlightFeed
 from psabench.koi.wire.increments import END_S, SAMPLE_S
-from psabench.koi.wire.nav_pvt import PvtStream
-from psabench.koi.wire.port import WALL_S, LookPlan, SerialPort
+from psabench.koi.wire.nav_pvt import PvtStream, Solution
+from psabench.koi.wire.port import LOOK_S, WALL_S, LookPlan, SerialPort
 from psabench.koi.wire.recording import FlightRecorder, Look
 from psabench.link.can_host import StepClock
 
@@ -84,7 +84,7 @@ class LiveFlight:
             self._unit.start()
             stack.callback(self._unit.stop)
             begin_s, shown_s = self._bench.time_s, 0.0
-            for look in self._looks(recorder):
+            for look in stack.enter_context(closing(self._looks(recorder))):
                 feed.look(look)
                 if feed.grid.now_s >= shown_s + SHOWN_S:
                     shown_s = feed.grid.now_s
@@ -94,37 +94,44 @@ class LiveFlight:
                 if self._bench.time_s - begin_s > for_s + END_S:
                     raise DeviceError("increments", 0, expected("readings", f"none since {feed.grid.now_s:.1f} s"))
 
-    def _looks(self, recorder: FlightRecorder) -> Iterator[Look]:
+    def _looks(self, recorder: FlightRecorder) -> Generator[Look, None, None]:
         """At the port: those with bytes, and others now and then."""
         clock = self._bench.step_clock
         begin_s = recorder.last_s
         looked_s = self._bench.time_s
-        for data, now_s in self._steps(clock) if clock else self._moments():
-            if data or now_s - looked_s >= QUIET_LOOK_S:
-                look = Look(recorder.last_s, begin_s or recorder.last_s, recorder.frames, data)
-                recorder.look(look)
-                looked_s = now_s
-                yield look
-            begin_s = recorder.last_s
+        with closing(self._steps(clock) if clock else self._moments()) as steps:
+            for data, now_s in steps:
+                if data or now_s - looked_s >= QUIET_LOOK_S:
+                    look = Look(recorder.last_s, begin_s or recorder.last_s - LOOK_S, recorder.frames, data)
+                    recorder.look(look)
+                    looked_s = now_s
+                    yield look
+                begin_s = recorder.last_s
 
-    def _steps(self, clock: StepClock) -> Iterator[tuple[bytes, float]]:
+    def _steps(self, clock: StepClock) -> Generator[tuple[bytes, float], None, None]:
         """In lockstep: while the emulator makes a step, what came in the step before is taken."""
-        plan, host = LookPlan(), self._bench.host
-        before_s = clock.now_s()
+        plan, host, before_s = LookPlan(), self._bench.host, clock.now_s()
         clock.start_run(plan.next_look_s(before_s) - before_s)
-        while True:
-            counts = clock.finish_run()
-            now_s, data = clock.now_s(), self._port.take()
-            if self._follow(data, now_s):
-                plan.arrived(before_s, now_s)
-            else:
-                plan.missed(now_s)
-            clock.start_run(plan.next_look_s(now_s) - now_s)
-            host.receive_up_to(counts[0])
-            yield data, now_s
-            before_s = now_s
+        under_way = True
+        try:
+            while True:
+                counts, under_way = clock.finish_run(), False
+                now_s, data = clock.now_s(), self._port.take()
+                if solutions := self._follow(data, now_s):
+                    plan.arrived(before_s, now_s, solutions[-1].tow_s)
+                else:
+                    plan.missed(now_s)
+                clock.start_run(plan.next_look_s(now_s) - now_s)
+                under_way = True
+                host.receive_up_to(counts[0])
+                yield data, now_s
+                before_s = now_s
+        finally:
+            with suppress(BenchError):  # one that has gone
+                if under_way:
+                    host.receive_up_to(clock.finish_run()[0])
 
-    def _moments(self) -> Iterator[tuple[bytes, float]]:
+    def _moments(self) -> Generator[tuple[bytes, float], None, None]:
         """In real time, or over a link that does not count."""
         while True:
             self._bench.wait(WALL_S)
@@ -132,12 +139,12 @@ class LiveFlight:
             self._follow(data, now_s)
             yield data, now_s
 
-    def _follow(self, data: bytes, now_s: float) -> bool:
-        """Whether these bytes complete a solution."""
+    def _follow(self, data: bytes, now_s: float) -> list[Solution]:
+        """The solutions that these bytes complete; whether it has landed."""
         found = self._watch.take(data) if data else []
         for s in found:
             self._landed = self._landing.take(now_s, math.hypot(*s.v_enu_mps[:2]), valid=s.valid) or self._landed
-        return bool(found)
+        return found
 
 
 def serial_of(bench: Bench, given: str | None, endpoints: list[dict[str, Any]]) -> str:

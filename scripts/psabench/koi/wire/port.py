@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -12,7 +13,8 @@ from psabench.errors import BadInput, LinkError, expected
 BAUD = 115_200
 LOOK_S = 0.23  # between two looks, at most: the kernel's buffer of 4 kB lasts 0.35 s at 115200 bit/s
 LEAST_S = 0.004  # half a window: the least that is gained
-WALL_S = 0.01
+WALL_S, PIECE = 0.01, 4096
+LONGEST_PERIOD_S = 2.0
 
 
 class SerialPort:
@@ -28,9 +30,16 @@ class SerialPort:
             raise BadInput(expected("a serial port", got, f"--serial {path}")) from e
 
     def take(self) -> bytes:
-        """What has come. Raises LinkError where the device has gone."""
+        """All that has come. Raises LinkError where the device has gone.
+
+        Until there is nothing: the kernel moves the bytes of a pseudo-terminal behind the writer's back, and waits for
+        that where a reader would find none.
+        """
+        found = b""
         try:
-            return bytes(self._port.read(self._port.in_waiting or 1))
+            while piece := self._port.read(PIECE):
+                found += piece
+            return found
         except (OSError, serial.SerialException) as e:
             raise LinkError(expected("the receiver's port", "one that has gone", self.path)) from e
 
@@ -46,7 +55,8 @@ class LookPlan:
     Each look halves the interval in which the next arrival is known to be. Times are of the bench.
     """
 
-    period_s: float = 1.0  # of the receiver's solutions, as far as it is known
+    _period_s: float = 1.0  # of the receiver's solutions
+    _tow_s: float = -math.inf  # of the last one
     _middle_s: float | None = None  # of the next arrival
     _half_s: float = LOOK_S
 
@@ -58,14 +68,17 @@ class LookPlan:
             due = min([due, *(e for e in edges if e > now_s + LEAST_S / 4)])
         return due
 
-    def arrived(self, begin_s: float, end_s: float) -> None:
-        """Solutions came between two looks."""
+    def arrived(self, begin_s: float, end_s: float, tow_s: float) -> None:
+        """A solution of this time of week came between two looks."""
+        if 0.0 < tow_s - self._tow_s <= LONGEST_PERIOD_S:
+            self._period_s = tow_s - self._tow_s
+        self._tow_s = tow_s
         middle = (begin_s + end_s) / 2.0
         self._half_s = max(LEAST_S, (end_s - begin_s) / 2.0)
-        self._middle_s = middle + self.period_s
+        self._middle_s = middle + self._period_s
 
     def missed(self, now_s: float) -> None:
         """Nothing came: the next window is wider."""
         if self._middle_s is not None and now_s > self._middle_s + self._half_s + LOOK_S:
             self._half_s = min(2.0 * self._half_s, LOOK_S)
-            self._middle_s += self.period_s
+            self._middle_s += self._period_s
