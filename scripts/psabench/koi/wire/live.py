@@ -154,5 +154,5 @@ def serial_of(bench: Bench, given: str | None, endpoints: list[dict[str, Any]]) 
     ports = [e["pty"] for e in endpoints if "serial" in e]
     if len(ports) != 1:
         got = f"{len(ports)} of the emulator" if bench.pace != "real" else "none"
-        raise DeviceError("receiver", 0, expected("--serial, or an emulator with one serial port", got))
+        raise DeviceError("receiver", 0, expected("--receiver, or an emulator with one serial port", got))
     return str(ports[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -26,8 +27,8 @@ class SerialPort:
         try:
             self._port = serial.Serial(path, baud, timeout=0)
         except (OSError, ValueError) as e:
-            got = getattr(e, "strerror", None) or e
-            raise BadInput(expected("a serial port", got, f"--serial {path}")) from e
+            got = os.strerror(e.errno) if getattr(e, "errno", None) else e
+            raise BadInput(expected("a serial port", got, f"--receiver {path}")) from e
 
     def take(self) -> bytes:
         """All that has come. Raises LinkError where the device has gone.
