@@ -215,32 +215,6 @@ PSABENCH_API int psabench_board_read(psabench_part *p, unsigned group, unsigned 
 PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned address, uint8_t value,
                                       int64_t timeout_ns);
 
-/* ---- Quartz accelerometers of a production batch, without a board: run-in (docs/procedures/run_in.md) ---- */
-
-enum { PSABENCH_QUARTZ_POSITIONS = 4, PSABENCH_QUARTZ_CYCLES_MAX = 100 };
-
-/* Each unit in a chamber of -60 to +85 degC: as warm as read_degc, switched on, read; then cycles times: to cold_degc,
- * to hot_degc, soak_min at each, to read_degc, rest_min, switched on, read. Unit k is the accelerometer x of the serial
- * number k in scenario quartz_chamber. */
-struct psabench_quartz_job {
-    uint32_t size; /* of this struct, set by the caller */
-    uint32_t cycles;
-    uint64_t seed;
-    uint32_t first_serial, units;
-    double g_mps2, noise_a_rthz;
-    double cold_degc, hot_degc, read_degc, ramp_k_per_min, soak_min, rest_min;
-    double reading_s; /* of a position: mean of 64 looks */
-    double play_k;    /* half the width of the hysteresis in temperature */
-};
-
-/* Readings, A: mean_a and sd_a, the standard deviation of the mean, have for each unit and start (cycles + 1 of them) the
- * positions with g along +x, -x, +y, -y. truth, for each unit and start: bias in millionths of g, scale in A for one g, tilt of
- * the input axis to y in mrad; NULL: none. batch: the numbers of proto/batches/serial.yaml in its order; NULL: those. The
- * same job gives the same numbers, however it is cut into ranges of serials. PSABENCH_BAD_ARGUMENT: a field out of range, a
- * temperature that the chamber has not, a batch that has no unit within its ratios. */
-PSABENCH_API int psabench_quartz_run_in(const struct psabench_quartz_job *job, const double *batch, size_t numbers,
-                                        double *mean_a, double *sd_a, double *truth);
-
 #ifdef __cplusplus
 }
 #endif

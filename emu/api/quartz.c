@@ -1,5 +1,5 @@
 /* Quartz accelerometers of a production batch in a chamber, without a board: run-in by thermal cycles. */
-#include "api/psabench.h"
+#include "api/psabench_models.h"
 #include "base/looks.h"
 #include "base/sched.h"
 #include "phys/chamber.h"

@@ -2,6 +2,7 @@
 #include "scenario/keys.h"
 
 #include "base/why.h"
+#include "phys/flight/ranges.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,50 +15,25 @@ static void dump_legs(const struct field *d, const void *section, cJSON *to);
 
 // clang-format off
 static const struct field leg_rows[FLIGHT_KINDS + FLIGHT_PARAMS] = {
-#define KIND(kind, name, lo, hi, words) [kind] = {.key = #name, .type = FIELD_REAL, .offset = LEG(value), .min = (lo), .max = (hi), .what = (words)}
-    KIND(FLIGHT_PARK, park_s, 0.1, 86400, "parked"),
-    KIND(FLIGHT_TAXI, taxi_m, 0.1, 20000, "straight on the ground, the change of speed included"),
-    KIND(FLIGHT_STOP, stop_s, 0.1, 86400, "brakes, then is at rest for so long"),
-    KIND(FLIGHT_TURN, turn_deg, -3600, 3600, "to the right; negative: to the left; coordinated in flight"),
-    KIND(FLIGHT_TAKEOFF, takeoff_mps, 20, 200, "take-off run to this speed, then nose up"),
-    KIND(FLIGHT_CLIMB, climb_m, 1, 20000, "up by so much"),
-    KIND(FLIGHT_DESCEND, descend_m, 1, 20000, "down by so much"),
-    KIND(FLIGHT_FLY, fly_s, 0.1, 86400, "straight and level, the change of speed included"),
-    KIND(FLIGHT_SNAKE, snake_s, 1, 86400, "level, the track swings about its mean: змейка"),
-    KIND(FLIGHT_LAND, land_mps, 20, 200, "down to the field's height, to this speed, nose down, brakes"),
+#define KIND(kind, name, lo, hi, words) [kind] = {.key = #name, .type = FIELD_REAL, .offset = LEG(value), .min = (lo), .max = (hi), .what = (words)},
+    FLIGHT_KIND_RANGES(KIND)
 #undef KIND
-#define PARAM(param_, name, lo, hi, words) [FLIGHT_KINDS + (param_)] = {.key = #name, .type = FIELD_REAL, .offset = LEG(param[param_]), .min = (lo), .max = (hi), .what = (words)}
-    PARAM(FLIGHT_SPEED_MPS, speed_mps, 0, 400, "ground speed at the end; 8 of taxi_m and land_mps; of climb_m, descend_m, fly_s 0: as it is"),
-    PARAM(FLIGHT_ACCEL_MPS2, accel_mps2, 0.05, 20, "largest acceleration along the track: taxi_m 0.8, stop_s 1, takeoff_mps 4, land_mps (brakes) 2.5; climb_m, descend_m, fly_s 1"),
-    PARAM(FLIGHT_RATE_MPS, rate_mps, 0.1, 100, "largest rate of climb or descent: climb_m 10, descend_m 8, land_mps 4"),
-    PARAM(FLIGHT_BANK_DEG, bank_deg, 0.1, FLIGHT_BANK_MAX_DEG, "bank of turn_deg in flight: 25"),
-    PARAM(FLIGHT_RADIUS_M, radius_m, 5, 5000, "radius of turn_deg on the ground: 40"),
-    PARAM(FLIGHT_AMPLITUDE_DEG, amplitude_deg, 0.1, 170, "of snake_s: 30"),
-    PARAM(FLIGHT_PERIOD_S, period_s, 5, 3600, "of snake_s: 600; the swing rises and dies away over half of it"),
-    PARAM(FLIGHT_ROLL_DEG, roll_deg, 0, 10, "sway of park_s in wind, amplitude of the roll: 0"),
-    PARAM(FLIGHT_ROLL_S, roll_s, 0.5, 60, "its period: 3; it rises and dies away over one"),
-    PARAM(FLIGHT_PITCH_DEG, pitch_deg, 0, 10, "amplitude of the pitch: 0"),
-    PARAM(FLIGHT_PITCH_S, pitch_s, 0.5, 60, "its period: 4"),
+#define PARAM(param_, name, lo, hi, words) [FLIGHT_KINDS + (param_)] = {.key = #name, .type = FIELD_REAL, .offset = LEG(param[param_]), .min = (lo), .max = (hi), .what = (words)},
+    FLIGHT_PARAM_RANGES(PARAM)
 #undef PARAM
 };
 const struct fields scenario_leg_fields = FIELDS_OF(struct flight_leg, leg_rows);
 
 static const struct field baro_rows[] = {
-#define ROW(name, lo, hi, words) REAL_ROW(struct baro_cfg, name, lo, hi, words)
-    ROW(lag_s,         0, 60,        "lag of first order; 0: none (E0)"),
-    ROW(scale_ppm,     -1e5, 1e5,    "scale error"),
-    ROW(offset_m,      -1000, 1000,  "offset at power-on"),
-    ROW(drift_m_per_h, -1000, 1000,  "drift of the offset"),
+#define ROW(name, lo, hi, words) REAL_ROW(struct baro_cfg, name, lo, hi, words),
+    FLIGHT_BARO_RANGES(ROW)
 #undef ROW
 };
 const struct fields scenario_baro_fields = FIELDS(baro_rows);
 
 static const struct field flight_rows[] = {
-#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = FLIGHT(plan.name), .min = (lo), .max = (hi), .what = (words)}
-    ROW(heading_deg,         -360, 360, "heading at power-on, from north, clockwise"),
-    ROW(jerk_mps3,           0.1, 100,  "largest time derivative of the acceleration (E0)"),
-    ROW(roll_rate_dps,       0.5, 90,   "largest rate of bank into and out of turns (E0)"),
-    ROW(angle_of_attack_deg, 0, 15,     "pitch above the path in flight, constant (E0)"),
+#define ROW(name, lo, hi, words) {.key = #name, .type = FIELD_REAL, .offset = FLIGHT(plan.name), .min = (lo), .max = (hi), .what = (words)},
+    FLIGHT_PLAN_RANGES(ROW)
 #undef ROW
     {.key = "baro", .type = FIELD_SECTION, .offset = FLIGHT(baro), .sub = &scenario_baro_fields, .what = "the barometric altimeter"},
     {.key = "legs", .type = FIELD_STRUCTS, .offset = FLIGHT(plan.leg), .present = FLIGHT(plan.legs), .sub = &scenario_leg_fields, .load = load_legs, .dump = dump_legs, .what = "a sequence of up to 64 legs; the first begins parked, the last ends at rest"},

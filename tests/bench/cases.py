@@ -34,6 +34,7 @@ NAV = {  # unit, first count
     "kf-filterpy": ("steps", 1000),
     "sins-plan": ("plans", 2),
     "koi": ("hours", 1),
+    "koi-python-ins": ("hours", 1),
     "strapdown": ("hours", 2),
     "strapdown-python-ins": ("hours", 1),
 }

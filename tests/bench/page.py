@@ -73,6 +73,11 @@ NAV = {  # label, unit of work, ms or us of one
         "ms",
         "koi",
     ),
+    "koi-python-ins": (
+        "the same, python-ins: feedforward filter of 33 states (a minute, times 60)",
+        "ms",
+        "koi",
+    ),
     "strapdown": ("strapdown, an hour at 100 Hz, path given back", "ms", "strapdown"),
     "strapdown-python-ins": ("the same, python-ins", "ms", "strapdown"),
 }

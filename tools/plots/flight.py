@@ -9,29 +9,28 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests/py/support"), str(ROOT / "scripts")]
+sys.path.insert(0, str(ROOT / "scripts"))
 
-import flight  # noqa: E402 the compiled physics: its way is known only now
+from psabench.native.flight_model import Flight  # noqa: E402
 from psabench.report import plots  # noqa: E402
 
 RADIUS_KM = 6371.0
 
 
-def flown(folder: Path) -> flight.Flight:
+def flown() -> Flight:
     """The scenario `flight`, resolved."""
     dump = subprocess.run([ROOT / "build/psa-emu", "flight", "--dump"], capture_output=True, check=True, text=True)
     resolved = json.loads(dump.stdout)["flight"]
-    return flight.Flight(flight.build(folder), resolved["legs"], heading_deg=resolved["heading_deg"])
+    return Flight(resolved["legs"], heading_deg=resolved["heading_deg"])
 
 
-def draw(path: flight.Flight) -> Figure:
+def draw(path: Flight) -> Figure:
     """The way over the ground, the airfield larger, and what changes with time."""
     t_ns = np.arange(0, path.end_ns, 250_000_000)
     s = path.states(t_ns)
@@ -67,8 +66,7 @@ def draw(path: flight.Flight) -> Figure:
 
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/img"
-    with tempfile.TemporaryDirectory() as build:
-        text = plots.standalone(plots.svg(draw(flown(Path(build))), "flight"))
+    text = plots.standalone(plots.svg(draw(flown()), "flight"))
     (folder / "flight.svg").write_text(text, encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""libpsabench as ctypes sees it: declared here, used by `chips` and `quartz_model` only. The header is its manual."""
+"""libpsabench as ctypes sees it: for the modules beside it only. The header is its manual."""
 
 from __future__ import annotations
 
@@ -56,6 +56,19 @@ class QuartzJobStruct(c.Structure):
     ]
 
 
+class FlightJobStruct(c.Structure):
+    """struct psabench_flight_job."""
+
+    _fields_ = [
+        ("size", c.c_uint32),
+        ("legs", c.c_uint32),
+        ("place", c.c_double * 3),
+        ("plan", c.c_double * 4),
+        ("baro", c.c_double * 4),
+        ("leg", c.c_void_p),
+    ]
+
+
 FRAME = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.POINTER(FrameStruct))
 
 _DOUBLES = c.POINTER(c.c_double)
@@ -105,11 +118,17 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {
     "board_read": (_INT, _PTR, c.c_uint, c.c_uint, _TIME),
     "board_write": (_INT, _PTR, c.c_uint, c.c_uint, c.c_uint8, _TIME),
     "quartz_run_in": (_INT, c.POINTER(QuartzJobStruct), _DOUBLES, c.c_size_t, _DOUBLES, _DOUBLES, _DOUBLES),
+    "flight_new": (_PTR, c.POINTER(FlightJobStruct), _TEXT, c.c_size_t),
+    "flight_free": (None, _PTR),
+    "flight_key": (_TEXT, c.c_uint),
+    "flight_leg_ns": (_TIME, _PTR, c.c_uint),
+    "flight_states": (_INT, _PTR, c.POINTER(_TIME), c.c_size_t, _DOUBLES),
+    "flight_increments": (_INT, _PTR, _TIME, _TIME, c.c_size_t, _DOUBLES),
 }
 
 
 class Library(SharedLibrary):
-    """The functions of psabench.h."""
+    """The functions of psabench.h and psabench_models.h."""
 
     abi, prefix, variable, prototypes = ABI, "psabench_", "PSABENCH_LIB", PROTOTYPES
 

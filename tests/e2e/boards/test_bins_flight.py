@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-import flight
 import numpy as np
 import pytest
 from psabench.bench import Bench
@@ -14,6 +13,7 @@ from psabench.boards.objects import BinsObjects as OD
 from psabench.boards.objects import Common
 from psabench.boards.unit import TPDO_OFF
 from psabench.errors import DeviceError
+from psabench.native.flight_model import Flight, Leg
 
 pytestmark = pytest.mark.host
 
@@ -23,7 +23,7 @@ NO_ERRORS = (
     "gyro_bias_sd_degph: 0, gyro_scale_sd: 0, gyro_misalignment_sd_arcmin: 0, accel_bias_sd_mps2: 0, "
     "accel_scale_sd: 0, accel_misalignment_sd_arcmin: 0, gyro_noise_degph: 0, accel_noise_mps2: 0"
 )
-LEGS: list[flight.Leg] = [
+LEGS: list[Leg] = [
     {"park_s": 8, "roll_deg": 0.5, "roll_s": 3},
     {"taxi_m": 60, "speed_mps": 6},
     {"turn_deg": 90, "radius_m": 20},
@@ -36,8 +36,8 @@ LEGS: list[flight.Leg] = [
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> flight.Flight:
-    return flight.Flight(flight.build(tmp_path_factory.mktemp("flight")), LEGS, heading_deg=50.0)
+def path(tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    return Flight(LEGS, heading_deg=50.0)
 
 
 def lagged(h_m: np.ndarray, step_s: float, lag_s: float) -> np.ndarray:
@@ -61,7 +61,7 @@ units:
     return file
 
 
-def test_each_reading_is_the_increment_of_its_interval(path: flight.Flight, tmp_path: Path) -> None:
+def test_each_reading_is_the_increment_of_its_interval(path: Flight, tmp_path: Path) -> None:
     """Angle to a count of 0.01 arcsec. Velocity to half a code of a word that is truncated, and what the converter's
     filter makes of a force that changes within its word."""
     with Bench.start(scenario(tmp_path)) as bench:
@@ -83,7 +83,7 @@ def test_each_reading_is_the_increment_of_its_interval(path: flight.Flight, tmp_
     assert np.degrees(np.abs(angle[:, 0]).max()) > 0.05  # the bank: 8 deg/s
 
 
-def test_the_unit_sends_what_the_altimeter_shows(path: flight.Flight, tmp_path: Path) -> None:
+def test_the_unit_sends_what_the_altimeter_shows(path: Flight, tmp_path: Path) -> None:
     """With each reading, of its instant."""
     keys = ", baro: {lag_s: 0.8, scale_ppm: 3000, offset_m: 12, drift_m_per_h: 90}"
     with Bench.start(scenario(tmp_path, keys)) as bench:
@@ -123,7 +123,7 @@ def test_beyond_node_95_the_height_needs_an_identifier_of_the_host(tmp_path: Pat
         assert int(unit.node.read(Common.TPDO + 4, 1)) == NO_RTR | 0x190
 
 
-def test_the_truth_port_has_the_aircraft(path: flight.Flight, tmp_path: Path) -> None:
+def test_the_truth_port_has_the_aircraft(path: Flight, tmp_path: Path) -> None:
     with Bench.start(scenario(tmp_path)) as bench:
         bench.run_for(60.0)
         t_ns = round(bench.time_s * 1e9)

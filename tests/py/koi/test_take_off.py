@@ -27,9 +27,12 @@ TAXI = Taxi(turns=3, stops=2)
 
 
 def detect_runs(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
+    """Where an aircraft that climbs all the time is seen to take off, one sample after its run is."""
     d = TakeOffDetector()
     ok = np.ones(len(t_s)) if valid is None else valid
-    return [float(t) for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, valid=bool(good))]
+    return [
+        float(t) - 1.0 for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, 5.0, valid=bool(good))
+    ]
 
 
 def test_a_run_is_seen_once_and_a_taxi_never() -> None:
@@ -54,6 +57,21 @@ def test_outliers_of_the_receiver_are_no_take_off() -> None:
     assert detect_runs(t, speed, valid) == []
     speed[100:104] = [40.0, 41.0, 42.0, 43.0]
     assert detect_runs(t, speed, valid) == [102.0]
+
+
+def take_offs(climb_mps: Floats, speed_mps: Floats) -> list[float]:
+    d = TakeOffDetector()
+    return [float(t) for t, (v, c) in enumerate(zip(speed_mps, climb_mps, strict=True)) if d.take(float(t), v, c)]
+
+
+def test_a_take_off_is_when_it_has_left_the_ground() -> None:
+    t = np.arange(0.0, 200.0)
+    speed = np.clip(4.0 * (t - 100.0), 2.0, 85.0)  # 40 m/s at 110 s
+    assert take_offs(np.where(t < 125.0, 0.0, 3.0), speed) == [126.0]
+    assert take_offs(np.where((t == 118.0) | (t > 130.0), 3.0, 0.0), speed) == [132.0]  # one sample is noise
+    assert take_offs(np.zeros(200), speed) == [112.0 + 40.0]  # a climb that is never seen
+    stopped = np.where(t < 120.0, speed, np.maximum(80.0 - 4.0 * (t - 120.0), 0.0))
+    assert take_offs(np.zeros(200), stopped) == []  # a run that was broken off
 
 
 def test_turns_and_stops_of_a_taxi() -> None:

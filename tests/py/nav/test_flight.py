@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import subprocess
 from pathlib import Path
 
-import flight
 import numpy as np
 import pandas as pd
 import pytest
+from psabench.native.flight_model import Flight
 from pyins import earth, strapdown  # type: ignore[import-untyped]
 from pyins.util import ACCEL_COLS, GYRO_COLS, TRAJECTORY_COLS  # type: ignore[import-untyped]
 
@@ -22,19 +21,14 @@ A_M = 6378137.0
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    return flight.build(tmp_path_factory.mktemp("flight"))
-
-
-@pytest.fixture(scope="module")
-def scenario(library: ctypes.CDLL) -> flight.Flight:
+def scenario() -> Flight:
     """The legs of proto/scenarios/flight.yaml."""
     dump = subprocess.run([ROOT / "build/psa-emu", "flight", "--dump"], capture_output=True, check=True, text=True)
     resolved = json.loads(dump.stdout)["flight"]
-    return flight.Flight(library, resolved["legs"], heading_deg=resolved["heading_deg"])
+    return Flight(resolved["legs"], heading_deg=resolved["heading_deg"])
 
 
-def pva(path: flight.Flight, t_ns: int) -> pd.Series:
+def pva(path: Flight, t_ns: int) -> pd.Series:
     """The true state in python-ins' units: degrees, north-east-down."""
     s = path.states(np.array([t_ns]))
     east, north, up = s.v_enu_mps[0]
@@ -43,7 +37,7 @@ def pva(path: flight.Flight, t_ns: int) -> pd.Series:
     return pd.Series([*place, north, east, -up, *angles], index=TRAJECTORY_COLS)
 
 
-def increments(path: flight.Flight, from_ns: int) -> tuple[np.ndarray, np.ndarray]:
+def increments(path: Flight, from_ns: int) -> tuple[np.ndarray, np.ndarray]:
     """Of the hour and ten milliseconds before it, STEP_NS each.
 
     python-ins has gravity linear in height: what it lacks is added."""
@@ -73,7 +67,7 @@ def miss(found: pd.Series, true: pd.Series) -> np.ndarray:
     return np.asarray(off)
 
 
-def test_an_hour_from_take_off_closes(scenario: flight.Flight) -> None:
+def test_an_hour_from_take_off_closes(scenario: Flight) -> None:
     """python-ins takes velocity and place of the beginning of an interval: its error is of first order in it and grows
     exponentially along the vertical. Two intervals give the limit."""
     from_ns = scenario.leg_ns[TAKEOFF]
@@ -89,7 +83,7 @@ def test_an_hour_from_take_off_closes(scenario: flight.Flight) -> None:
     assert np.abs(limit[6:]).max() * 3600.0 < 0.01, limit
 
 
-def test_the_flight_is_as_described(scenario: flight.Flight) -> None:
+def test_the_flight_is_as_described(scenario: Flight) -> None:
     """Ten minutes parked, an hour in the air, at rest again."""
     assert scenario.leg_ns[1] == 600 * 10**9
     path = scenario.states(np.arange(0, scenario.end_ns, 10**9))

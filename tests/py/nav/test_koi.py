@@ -7,7 +7,6 @@ import math
 from functools import partial
 from typing import Any
 
-import flight
 import numpy as np
 import pytest
 from koi_flight import (
@@ -23,6 +22,7 @@ from koi_flight import (
     sensors_of,
 )
 from psabench.errors import BadInput
+from psabench.native.flight_model import Flight, Leg
 from psabench.native.koi import (
     Kind,
     Koi,
@@ -40,29 +40,29 @@ from scipy import stats
 
 RUNS, ALIGNED = 60, 60
 ARCMIN = math.radians(1.0) / 60.0
-PARK: list[flight.Leg] = [{"park_s": 600, "roll_deg": 0.05, "roll_s": 2.5, "pitch_deg": 0.02, "pitch_s": 3.5}]
+PARK: list[Leg] = [{"park_s": 600, "roll_deg": 0.05, "roll_s": 2.5, "pitch_deg": 0.02, "pitch_s": 3.5}]
 
 
 @pytest.fixture(scope="module")
-def fly(tmp_path_factory: pytest.TempPathFactory) -> partial[flight.Flight]:
-    return partial(flight.Flight, flight.build(tmp_path_factory.mktemp("flight")), heading_deg=30.0)
+def fly(tmp_path_factory: pytest.TempPathFactory) -> partial[Flight]:
+    return partial(Flight, heading_deg=30.0)
 
 
 @pytest.fixture(scope="module")
-def whole(fly: partial[flight.Flight]) -> Truth:
+def whole(fly: partial[Flight]) -> Truth:
     path = fly(LEGS)
     return Truth.of(path, 0, path.end_ns // 10**9 * 10**9)
 
 
 @pytest.fixture(scope="module")
-def ground(fly: partial[flight.Flight]) -> Truth:
+def ground(fly: partial[Flight]) -> Truth:
     """Taxi to the runway."""
     path = fly(LEGS)
     return Truth.of(path, 0, path.leg_ns[ON_GROUND_LEGS] // 10**9 * 10**9)
 
 
 @pytest.fixture(scope="module")
-def parked(fly: partial[flight.Flight]) -> Truth:
+def parked(fly: partial[Flight]) -> Truth:
     path = fly(PARK)
     return Truth.of(path, 0, path.end_ns)
 

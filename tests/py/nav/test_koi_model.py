@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import flight
 import numpy as np
 import pytest
 from koi_flight import (
@@ -21,6 +20,7 @@ from koi_flight import (
     t_per_m,
     with_errors,
 )
+from psabench.native.flight_model import Flight
 from psabench.native.koi import Koi, KoiConfig, UnitClass, koi_default, koi_layout, koi_prior
 from psabench.native.nav import Refused
 from psabench.native.nav_errors import ErrorsConfig
@@ -36,12 +36,12 @@ COMPARED_S = 500
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> flight.Flight:
-    return flight.Flight(flight.build(tmp_path_factory.mktemp("flight")), LEGS, heading_deg=30.0)
+def path(tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    return Flight(LEGS, heading_deg=30.0)
 
 
 @pytest.fixture(scope="module")
-def truth(path: flight.Flight) -> Truth:
+def truth(path: Flight) -> Truth:
     """From the take-off run over a climb, a turn and the next climb."""
     begin_ns = path.leg_ns[9]
     return Truth.of(path, begin_ns, begin_ns + COMPARED_S * 10**9)
@@ -131,7 +131,7 @@ def article(truth: Truth, k: int) -> Floats:
     return a
 
 
-def test_the_equations_are_the_articles(path: flight.Flight) -> None:
+def test_the_equations_are_the_articles(path: Flight) -> None:
     """In the steep turn, at constant height: (Phi - 1)/dt of a short step. u1 is 0 in n."""
     turn = LEGS.index({"turn_deg": -100, "bank_deg": 30})
     begin_ns = path.leg_ns[turn] + 10 * 10**9

@@ -6,6 +6,7 @@ import ctypes
 import os
 import re
 import subprocess
+import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +24,7 @@ from psabench.report.waveform import rdata_picture
 
 ROOT = Path(__file__).parents[3]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-HEADER = (ROOT / "emu/api/psabench.h").read_text()
+HEADER = "".join((ROOT / "emu/api" / name).read_text() for name in ("psabench.h", "psabench_models.h"))
 NAV_HEADERS = "".join(path.read_text() for path in sorted((ROOT / "nav").glob("*.h")))
 PAGE = ROOT / "docs/library.md"
 EXAMPLES = ("ads1256_read", "ads1282_read", "ad7712_read", "psa2_frames")
@@ -124,6 +125,9 @@ C_TYPES: dict[str, object] = {
     "psabench_input_fn *": clib.INPUT,
     "psabench_frame_fn *": clib.FRAME,
     "psabench_quartz_job *": ctypes.POINTER(clib.QuartzJobStruct),
+    "psabench_flight_job *": ctypes.POINTER(clib.FlightJobStruct),
+    "psabench_flight *": ctypes.c_void_p,
+    "int64_t *": ctypes.POINTER(ctypes.c_int64),
 }
 TX = {
     "spi": (1, ctypes.c_char_p),
@@ -167,17 +171,18 @@ def test_the_frame_has_the_layout_of_the_header(tmp_path: Path) -> None:
     assert int(abi) == clib.ABI
 
 
-def test_the_job_of_a_run_in_has_the_layout_of_the_header(tmp_path: Path) -> None:
-    names = [name for name, *_ in clib.QuartzJobStruct._fields_]
-    rows = "".join(f'printf("%zu\\n", offsetof(struct psabench_quartz_job, {n}));' for n in names)
+@pytest.mark.parametrize("job", [clib.QuartzJobStruct, clib.FlightJobStruct])
+def test_jobs_have_the_layout_of_the_header(job: type[ctypes.Structure], tmp_path: Path) -> None:
+    names, struct = [str(row[0]) for row in job._fields_], str(job.__doc__).removesuffix(".")
+    rows = "".join(f'printf("%zu\\n", offsetof({struct}, {n}));' for n in names)
     program = tmp_path / "layout"
-    size = 'printf("%zu\\n", sizeof(struct psabench_quartz_job));'
-    source = f"#include <psabench.h>\n#include <stdio.h>\nint main(void){{{rows}{size}}}"
+    size = f'printf("%zu\\n", sizeof({struct}));'
+    source = f"#include <psabench_models.h>\n#include <stdio.h>\nint main(void){{{rows}{size}}}"
     command = ["cc", "-x", "c", "-", "-I", str(ROOT / "emu/api"), "-o", str(program)]
     subprocess.run(command, input=source, text=True, check=True, timeout=60)
     layout = subprocess.run([program], capture_output=True, text=True, check=True, timeout=10).stdout.split()
-    fields = [getattr(clib.QuartzJobStruct, n).offset for n in names]
-    assert [int(x) for x in layout] == [*fields, ctypes.sizeof(clib.QuartzJobStruct)]
+    fields = [getattr(job, n).offset for n in names]
+    assert [int(x) for x in layout] == [*fields, ctypes.sizeof(job)]
 
 
 # ---- which library Python loads ----
@@ -265,6 +270,23 @@ def test_north_is_found_by_a_c_program_against_the_installation(
     assert out in (ROOT / "docs/nav.md").read_text()
 
 
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+def test_a_flight_is_navigated_by_a_c_program_against_the_installation(
+    installed: Path, tmp_path: Path, cc: str
+) -> None:
+    program, flight = tmp_path / "navigate", tmp_path / "flight.txt"
+    source = ROOT / "examples/koi/navigate.c"
+    assert len(source.read_text().splitlines()) <= 100
+    options = pkg_config(installed, "--cflags", "--libs", package="psabench-nav")
+    run([cc, "-std=c11", *STRICT, source, *options, "-lm", "-o", program])
+    run([sys.executable, ROOT / "examples/koi/record.py", flight])
+    where = {"LD_LIBRARY_PATH": str(installed / "opt/psa/lib64")}
+    assert run([program, flight], **where) in (ROOT / "docs/nav.md").read_text()
+    flight.write_text("I 1 2\n")
+    broken = subprocess.run([program, flight], env=os.environ | where, capture_output=True, text=True, check=False)
+    assert (broken.returncode, broken.stderr) == (1, "navigate: line 1: expected I, F, H\n")
+
+
 @pytest.mark.parametrize("part", parts())
 def test_the_page_explains_every_counter(part: str) -> None:
     told = set(re.findall(r"`(\w+)`", PAGE.read_text().split("\n## Counters\n")[1].split("\n## ")[0]))
@@ -300,7 +322,8 @@ def test_uninstall_leaves_nothing_of_it(tmp_path: Path) -> None:
     ours = [p for folder in ("include", "lib") for p in (tmp_path / "usr" / folder).rglob("*") if not p.is_dir()]
     names = {str(p.relative_to(tmp_path)) for p in ours}
     lib = "usr/lib/here/"
-    headers = {"usr/include/psabench.h", *(f"usr/include/psabench/nav/{p.name}" for p in (ROOT / "nav").glob("*.h"))}
+    own = {"usr/include/psabench.h", "usr/include/psabench_models.h"}
+    headers = own | {*(f"usr/include/psabench/nav/{p.name}" for p in (ROOT / "nav").glob("*.h"))}
     assert names == headers | {f"{lib}pkgconfig/{x}.pc" for x in ("psabench", "psabench-nav")} | {
         f"{lib}lib{x}"
         for name, abi in (("psabench", 0), ("psabench-nav", 1))

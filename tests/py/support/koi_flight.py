@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import flight
 import numpy as np
+from psabench.native.flight_model import Flight, Leg, States
 from psabench.native.koi import Kind, Koi, KoiConfig, Sensors, koi_layout
 from psabench.native.strapdown import State, radii_m
 from scipy.spatial.transform import Rotation
@@ -23,7 +23,7 @@ GAMMA = [(0, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 2)]  # of the article's gau
 ORDER = [0, 1, 7, 2, 3, 8, 4, 5, 6]  # of errors.h's states among koi.h's
 
 # Taxi with stops and right angles, take-off, climbs and turns: 22 min.
-LEGS: list[flight.Leg] = [
+LEGS: list[Leg] = [
     {"park_s": 60, "roll_deg": 0.05, "roll_s": 2.5},
     {"taxi_m": 300},
     {"turn_deg": 90},
@@ -51,7 +51,7 @@ LEGS: list[flight.Leg] = [
 ON_GROUND_LEGS = 9
 
 
-def state_of(s: flight.States, i: int) -> State:
+def state_of(s: States, i: int) -> State:
     return State(
         lat_rad=s.lat_rad[i], lon_rad=s.lon_rad[i], h_m=s.h_m[i], v_n_mps=s.v_enu_mps[i].copy(), C_nb=TO_ENU @ s.C_nb[i]
     )
@@ -61,13 +61,13 @@ def state_of(s: flight.States, i: int) -> State:
 class Truth:
     """A stretch of a flight at 100 Hz."""
 
-    path: flight.Flight
+    path: Flight
     begin_ns: int
     dtheta_rad: Floats
     dv_mps: Floats
 
     @staticmethod
-    def of(path: flight.Flight, begin_ns: int, end_ns: int) -> Truth:
+    def of(path: Flight, begin_ns: int, end_ns: int) -> Truth:
         n = (end_ns - begin_ns) // DT_NS
         angle, speed = path.increments(begin_ns, DT_NS, n)
         return Truth(path, begin_ns, np.ascontiguousarray(angle), np.ascontiguousarray(speed))
@@ -79,7 +79,7 @@ class Truth:
         """At the beginning of interval k."""
         return state_of(self.path.states(np.array([self.begin_ns + k * DT_NS])), 0)
 
-    def times(self, t_s: Floats) -> flight.States:
+    def times(self, t_s: Floats) -> States:
         """At these times since the beginning, on the ground before it."""
         return self.path.states(np.maximum(0, self.begin_ns + np.round(t_s * 1e9).astype(np.int64)))
 
