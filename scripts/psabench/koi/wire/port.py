@@ -27,7 +27,7 @@ class SerialPort:
         try:
             self._port = serial.Serial(path, baud, timeout=0)
         except (OSError, ValueError) as e:
-            got = os.strerror(e.errno) if getattr(e, "errno", None) else e
+            got = os.strerror(e.errno) if isinstance(e, OSError) and e.errno else e
             raise BadInput(expected("a serial port", got, f"--receiver {path}")) from e
 
     def take(self) -> bytes:

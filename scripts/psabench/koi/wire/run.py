@@ -58,15 +58,19 @@ def run_flight(
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / TRUTH_LOG).unlink(missing_ok=True)
     try:
-        feed = _read_flight(options.data, p, setup) if options.data else _fly(options, p, setup, progress)
+        feed = read_flight(options.data, p, setup) if options.data else _fly(options, p, setup, progress)
         found = feed.finish()
     except Refused as e:
         raise BadInput(f"{NAME}: {e}") from e
-    truth = read_truth((options.data or options.out) / TRUTH_LOG)
-    begin_us = feed.grid.begin_us
-    graded = None if truth is None or begin_us is None else grade_flight(found, begin_us * 1e-6, truth)
+    graded = grade_feed(feed, found, options.data or options.out)
     facts = _facts(options, feed)
     return KoiRun(params=p, found=found, feed=feed, facts=facts, graded=graded)
+
+
+def grade_feed(feed: FlightFeed, found: FlightFound, folder: Path) -> Graded | None:
+    """Beside the truth in that folder; None: there is none. Raises BadInput."""
+    truth, begin_us = read_truth(folder / TRUTH_LOG), feed.grid.begin_us
+    return None if truth is None or begin_us is None else grade_flight(found, begin_us * 1e-6, truth)
 
 
 def new_feed(setup: FlightSetup, p: KoiParams, weights: Weights, node: int) -> FlightFeed:
@@ -87,6 +91,7 @@ def _fly(options: KoiOptions, p: KoiParams, setup: FlightSetup, progress: Progre
             weights = live.prepare()
             feed = new_feed(setup, p, weights, unit.node.node_id)
             told = {"format": 1, "node": unit.node.node_id, "weights": asdict(weights), "params": asdict(p)}
+            told |= {"serial": setup.serial, "time_s": setup.time_s}
             minutes = min(EXPECTED_MIN, round(p.flight_s / 60.0) or 1)
             with FlightRecorder(options.out, told) as recorder, progress.step("flight", minutes) as advance:
                 live.fly(feed, recorder, p.flight_s, lambda t_s: advance(f"{t_s:.0f} s"))
@@ -95,7 +100,8 @@ def _fly(options: KoiOptions, p: KoiParams, setup: FlightSetup, progress: Progre
     return feed
 
 
-def _read_flight(folder: Path, p: KoiParams, setup: FlightSetup) -> FlightFeed:
+def read_flight(folder: Path, p: KoiParams, setup: FlightSetup) -> FlightFeed:
+    """What a recording holds, through a host with this set-up. Raises BadInput, Refused."""
     weights, node = recorded_unit(folder)
     feed = new_feed(setup, p, weights, node)
     for event in read_events(folder):

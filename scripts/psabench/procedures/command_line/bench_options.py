@@ -9,6 +9,7 @@ from typing import Any
 from psabench.boards.registry import DBC_NODE
 from psabench.instruments import EXAMPLES
 from psabench.options import natural, node_id, positive
+from psabench.passport.command import STORE
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2
 
 # Options of more than one procedure.
@@ -105,8 +106,9 @@ IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
-# Of a flight alone.
+# Of flights alone.
 IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
+    "--store": {"type": Path, "default": STORE, "metavar": "FILE", "help": "store of passports (%(default)s)"},
     "--receiver": {"metavar": "PORT", "help": "serial port of the satellite receiver (the emulator's only one)"},
 }
 

@@ -17,6 +17,7 @@ from psabench.procedures.command_line.offered import (
     CONDITIONS,
     COVARIANCE,
     KOI_FLIGHT,
+    KOI_SEASON,
     ON_THE_HEAD,
     ON_THE_PLATFORM,
     SECONDARY,
@@ -148,6 +149,10 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run koi-flight --data build/koi --corrects no     the same flight from its recording, without a correction
   psabench run koi-flight --can slcan:/dev/ttyACM0 --receiver /dev/ttyUSB0   on these ports, in real time
 """,
+    KOI_SEASON[0]: """\
+  psabench run koi-season --out build/season --store build/season/passports.sqlite
+  psabench run koi-season --out build/season --store build/season/passports.sqlite --flights 12   four more
+""",
     COVARIANCE[0]: """\
   psabench run sins-covariance                                the article's two tables in every reading of its noise
   psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
@@ -198,6 +203,12 @@ def _of_a_flight() -> Parameters:
     from psabench.koi.wire.params import KoiParams
 
     return Parameters(fields=KoiParams.__dataclass_fields__)
+
+
+def _of_a_season() -> Parameters:
+    from psabench.koi.wire.season import SeasonParams
+
+    return Parameters(fields=SeasonParams.__dataclass_fields__)
 
 
 def _of_the_covariance() -> Parameters:
@@ -266,13 +277,22 @@ _SINS = (
     ),
 )
 
-_KOI = _command(
-    KOI_FLIGHT,
-    handlers.fly_koi,
-    common=_FLIGHT,
-    load=_of_a_flight,
-    notes=NOTES_FLIGHT,
-    kept="what came is in OUT; --data goes through it",
+_KOI = (
+    _command(
+        KOI_FLIGHT,
+        handlers.fly_koi,
+        common=_FLIGHT,
+        load=_of_a_flight,
+        notes=NOTES_FLIGHT,
+        kept="what came is in OUT; --data goes through it",
+    ),
+    _command(
+        KOI_SEASON,
+        handlers.fly_season,
+        common=("--store", "--seed", "--out"),
+        load=_of_a_season,
+        kept="the flight is incomplete; the same command goes on with the next one",
+    ),
 )
 
 COMMANDS: Mapping[str, Command] = {
@@ -281,7 +301,7 @@ COMMANDS: Mapping[str, Command] = {
         *_on_the_head(),
         _command(COMPARE, handlers.compare_units, common=_STARTED),
         *_SINS,
-        _KOI,
+        *_KOI,
         _THERMAL,
         *_on_the_platform(),
     )

@@ -199,3 +199,15 @@ def fly_koi(args: argparse.Namespace) -> int:
     print("\n".join(flight_page.console_lines(done, verbose=args.verbose)))
     print(f"report: {page}")
     return 1 if done.found.verdict else 0
+
+
+def fly_season(args: argparse.Namespace) -> int:
+    """Flights until so many are complete; the passport is in --store."""
+    from psabench.koi.wire import season_page
+    from psabench.koi.wire.season import SeasonOptions, run_season
+
+    season = run_season(of_fields(SeasonOptions, args, params=_params(args)), Bar())
+    page = season_page.write_page(args.out, season)
+    print("\n".join(season_page.console_lines(season)))
+    print(f"report: {page}")
+    return 0
