@@ -15,7 +15,7 @@ from psabench.report import plots as style
 from psabench.report.page import figure
 
 MINUTE_S, KM = 60.0, 1000.0
-TURN_BANK_RAD = math.radians(5.0)  # more is a turn
+TURN_RADPS = math.radians(0.5)  # more is a turn, on the ground as well
 DEGPH, ARCMIN = math.pi / 648_000, math.pi / 10_800
 SIGMAS = (
     ("beta3", ARCMIN, "heading, ′"),
@@ -100,9 +100,9 @@ def _mark_phases(ax: Any, run: KoiRun) -> None:
     for e in f.events:
         if e.what == "stop":
             ax.axvline(e.t_s / MINUTE_S, color=style.MUTED, lw=0.8, ls=":")
-    up, ahead = f.hybrid[:, 12], f.hybrid[:, 13]
-    bank = np.abs(np.arctan2(ahead, f.hybrid[:, 14])) if len(up) else np.zeros(0)
-    turning = np.concatenate([[False], bank > TURN_BANK_RAD, [False]])
+    heading = np.unwrap(np.arctan2(f.hybrid[:, 6], f.hybrid[:, 9]))
+    rate = np.abs(np.gradient(heading, f.t_s)) if len(heading) > 1 else np.zeros(len(heading))
+    turning = np.concatenate([[False], rate > TURN_RADPS, [False]])
     begins, ends = np.flatnonzero(turning[1:] & ~turning[:-1]), np.flatnonzero(~turning[1:] & turning[:-1]) - 1
     for begin, end in zip(begins, ends, strict=True):
         ax.axvspan(f.t_s[begin] / MINUTE_S, f.t_s[end] / MINUTE_S, color=style.MUTED, alpha=0.15, lw=0)
