@@ -82,7 +82,8 @@ def test_a_receiver_without_packets_is_named() -> None:
 
 
 def test_other_packets_are_passed_over() -> None:
-    body = struct.pack("<BBH", 0x01, 0x21, 4) + b"abcd"
+    """One that is as long as NAV-PVT is."""
+    body = struct.pack("<BBH", 0x01, 0x21, 92) + b"abcd" * 23
     a = b = 0
     for x in body:
         a = (a + x) & 255
