@@ -3,8 +3,10 @@
  * An autonomous solution, which only increments and the barometer move, goes on beside a Kalman filter of its errors; the hybrid
  * solution is the autonomous one less the estimates. Frames as in strapdown.h: 1 east, 2 north, 3 up; b the unit's axes. Error = measured
  * less true. State, in this order; the first blocks move:
- *   dr1 dr2 | dV1 dV2 | alpha1 alpha2 | beta3 | dr3 dV3 | baro | nu0 x3 | Df0 x3 | Gamma | Theta x9 row-major | Dt1 Dt2
- * 32 without baro and with six Gamma, 35 with nine; baro, the error of the barometric height (random walk), is ours, E0.
+ *   dr1 dr2 | dV1 dV2 | alpha1 alpha2 | beta3 | dr3 dV3 | baro | slow_r x3 | slow_v x3 | nu0 x3 | Df0 x3 | Gamma | Theta x9 row-major
+ *   | Dt1 Dt2
+ * 32 without baro and slow ones and with six Gamma, 35 with nine. Ours, E0: baro, the error of the barometric height (random walk);
+ * slow_r, slow_v, coloured errors of the receiver (Gauss-Markov of first order, slow_s), in the state where a standard deviation is set.
  * By dr, dv, beta of errors.h, t = tan(lat)/(N + h), V the autonomous velocity:
  *   dV1 = dvE + betaU V2    dV2 = dvN - betaU V1    alpha1 = betaE    alpha2 = betaN    beta3 = betaU + t drE    dV3 = dvU
  * dV is the dynamic part of the velocity's error: that of a turned heading is left out. Equations: Phi = T(end) Phi_errors T(begin)^-1,
@@ -13,11 +15,13 @@
  *   dV1' = g alpha2 + w3 dV2 + V2 beta3' + Df1 + (f3 - g) beta2          alpha1' = o3 alpha2 - u2 beta3 + u3 dr1/R + dV2/R + nu1
  *   dV2' = -g alpha1 - w3 dV1 - V1 beta3' + Df2 - (f3 - g) beta1         alpha2' = -o3 alpha1 + u1 beta3 + u3 dr2/R - dV1/R + nu2
  *   beta3' = o2 (alpha1 - dr2/R) - o1 (alpha2 + dr1/R) + nu3,  O transport rate, u Earth's, o = O + u, w = 2 u + O
- * Measurements: z_r = dr + V Dt1, z_V1 = dV1 - beta3 V2 + t dr1 V2 + a1 (Dt1 + Dt2), z_V2 = dV2 + beta3 V1 - t dr1 V1 + a2 (Dt1 + Dt2),
+ * Measurements, less slow_r or slow_v of the kind: z_r = dr + V Dt1, z_V1 = dV1 - beta3 V2 + t dr1 V2 + a1 (Dt1 + Dt2), z_V2 = dV2 + beta3 V1 - t dr1 V1 + a2 (Dt1 + Dt2),
  * zero velocity (the same without Dt), z_h = dr3 - baro. Innovations are of the whole hybrid solution, so that kilometres do no harm.
  * Vertical channel (E0): each accepted barometric height moves the autonomous one, h by -k1 T (h - h_b) and vU by -k2 T (h - h_b), T
  * since the one before; dr3 and dV3 move by as much, which is known. Without barometer it diverges, e-fold in 9.5 min.
- * Not modelled: lever arms of the antenna, coloured noise of the receiver, more than one receiver. Units: rad, s, m, m/s, m/s^2.
+ * Position and velocity are the antenna's: antenna_m from the unit, l. C l and C (w x l), w of the last increment, are taken off,
+ * and beta turns them in H; left out is the Earth's part of w, 0.3 mm/s for 3 m. Stops and heights are the unit's.
+ * Not modelled: more than one receiver. Units: rad, s, m, m/s, m/s^2.
  * No allocation: the caller owns the memory, one filter for one thread. Rejections as in nav.h. */
 #ifndef PSABENCH_NAV_KOI_H
 #define PSABENCH_NAV_KOI_H
@@ -36,6 +40,8 @@ enum nav_koi_block { /* in the order of the state */
                      NAV_KOI_BETA3,
                      NAV_KOI_VERTICAL,
                      NAV_KOI_BARO,
+                     NAV_KOI_SLOW_R,
+                     NAV_KOI_SLOW_V,
                      NAV_KOI_NU,
                      NAV_KOI_DF,
                      NAV_KOI_GAMMA,
@@ -83,6 +89,9 @@ struct nav_koi_cfg {
     double position_sd_m[3], velocity_sd_mps[3];                    /* of measurements that do not give their own */
     double stop_sd_mps, height_sd_m, damping_per_s, damping_per_s2; /* k1, k2 of the vertical channel */
     double gate_nis[2], outlier_nis, max_age_s;                     /* gates: of one scalar (height), of three */
+    double antenna_m[3];                                            /* from the unit, in its axes */
+    double slow_r_sd_m[3], slow_v_sd_mps[3],
+        slow_s; /* coloured errors of the receiver; all three 0: not in the state */
 };
 NAV_API int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg); /* NAV_RANGE: no such class */
 NAV_API int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why);

@@ -48,16 +48,27 @@ static void forget_measurements(struct nav_koi *k)
     }
 }
 
-/* Rows and noise of the states that only walk: the same in each step. */
+static void set_alone(struct nav_koi *k, int block, double keep, const vec3 &variance)
+{
+    for (int i = 0; i < k->at[block].size; i++) {
+        const int at = k->at[block].offset + i;
+        if (at >= k->dynamic) return;
+        k->phi[at * (k->n + 1)] = keep;
+        k->q[at * (k->dynamic + 1)] = variance[i];
+    }
+}
+
+/* Rows and noise of the states that no other moves, walks and Gauss-Markov ones: the same in each step. */
 static void set_walks(struct nav_koi *k)
 {
-    const int nd = k->dynamic, first[] = {KOI_MOVING, k->at[NAV_KOI_NU].offset, k->at[NAV_KOI_DF].offset, nd};
-    const double walks[] = {k->cfg.baro_walk_m_rts, k->cfg.nu_walk_radps_rts, k->cfg.df_walk_mps2_rts};
-    for (int w = 0; w < 3; w++)
-        for (int i = first[w]; i < first[w + 1] && i < nd; i++) {
-            k->phi[i * (k->n + 1)] = 1.0;
-            k->q[i * (nd + 1)] = walks[w] * walks[w] * k->cfg.step_s;
-        }
+    const struct nav_koi_cfg *c = &k->cfg;
+    const auto walk = [c](double density) { return vec3::Constant(density * density * c->step_s); };
+    const double keep = nav_decay(c->step_s / c->slow_s), gain = nav_rise(2.0 * c->step_s / c->slow_s);
+    set_alone(k, NAV_KOI_BARO, 1.0, walk(c->baro_walk_m_rts));
+    set_alone(k, NAV_KOI_SLOW_R, keep, gain * vec3(c->slow_r_sd_m).cwiseAbs2());
+    set_alone(k, NAV_KOI_SLOW_V, keep, gain * vec3(c->slow_v_sd_mps).cwiseAbs2());
+    set_alone(k, NAV_KOI_NU, 1.0, walk(c->nu_walk_radps_rts));
+    set_alone(k, NAV_KOI_DF, 1.0, walk(c->df_walk_mps2_rts));
 }
 
 static int check_start(const struct nav_koi_sensors *sensors, double t_s, const struct nav_state *at)
@@ -124,13 +135,24 @@ static int find_transition(struct nav_koi *k)
     return NAV_OK;
 }
 
-static int finish_step(struct nav_koi *k)
+/* The antenna's velocity about the unit, in b, and what it adds to the acceleration over the step. */
+static void move_antenna(struct nav_koi *k, const vec3 &rate_radps)
+{
+    const vec3 arm_mps = rate_radps.cross(vec3(k->cfg.antenna_m));
+    const vec3 gained = Eigen::Map<const mat3_rows>(k->unit.at.C_nb) * arm_mps -
+                        Eigen::Map<const mat3_rows>(k->before.C_nb) * k->arm_mps;
+    k->antenna_mps2 = vec3(k->acceleration_mps2) + gained / k->cfg.step_s;
+    k->arm_mps = arm_mps;
+}
+
+static int finish_step(struct nav_koi *k, const vec3 &rate_radps)
 {
     int status = find_transition(k);
     if (status == NAV_OK) status = nav_kf_predict(&k->kf, k->phi, k->q);
     if (status != NAV_OK) return status;
     for (int i = 0; i < 3; i++)
         k->acceleration_mps2[i] = (k->unit.at.v_n_mps[i] - k->before.v_n_mps[i]) / k->cfg.step_s;
+    move_antenna(k, rate_radps);
     k->before = k->unit.at;
     k->dtheta_sum.setZero();
     k->dv_sum.setZero();
@@ -167,7 +189,7 @@ static int push_part(struct nav_koi *k, const double *dtheta_rad, const double *
     k->dtheta_sum = dtheta_sum;
     k->dv_sum = dv_sum;
     k->in_step += count;
-    if (k->in_step == k->per_step) status = finish_step(k);
+    if (k->in_step == k->per_step) status = finish_step(k, Eigen::Map<const vec3>(angle + 3 * (count - 1)) / dt);
     if (status == NAV_OK) return status;
     k->unit = before.unit; /* as if these increments had not come */
     k->dtheta_sum = before.dtheta_sum;

@@ -33,6 +33,7 @@ static void set_measured(struct nav_koi_cfg *cfg, double velocity_sd_mps)
     cfg->gate_nis[1] = 16.27;
     cfg->outlier_nis = 1000.0;
     cfg->max_age_s = 0.5;
+    cfg->slow_s = 60.0;
 }
 
 int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg)
@@ -67,6 +68,7 @@ int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg)
 static const char SD[] = "a standard deviation, 0: known";
 static const char NOISE[] = "a density, 0: none";
 static const char ABOVE[] = "above 0";
+static const char ARM[] = "within 200 m";
 static const struct check_rule rules[] = {
     REAL(sample_s, 1e-4, 1.0, "from 0.1 ms to 1 s"),
     REAL(step_s, 1e-4, 10.0, "from 0.1 ms to 10 s"),
@@ -111,6 +113,16 @@ static const struct check_rule rules[] = {
     REAL(gate_nis[1], CHECK_ABOVE, CHECK_ANY, ABOVE),
     REAL(outlier_nis, CHECK_ABOVE, CHECK_ANY, ABOVE),
     REAL(max_age_s, 0.0, 10.0, "from 0 to 10 s"),
+    REAL(antenna_m[0], -200.0, 200.0, ARM),
+    REAL(antenna_m[1], -200.0, 200.0, ARM),
+    REAL(antenna_m[2], -200.0, 200.0, ARM),
+    REAL(slow_r_sd_m[0], 0.0, 1e5, SD),
+    REAL(slow_r_sd_m[1], 0.0, 1e5, SD),
+    REAL(slow_r_sd_m[2], 0.0, 1e5, SD),
+    REAL(slow_v_sd_mps[0], 0.0, 1e3, SD),
+    REAL(slow_v_sd_mps[1], 0.0, 1e3, SD),
+    REAL(slow_v_sd_mps[2], 0.0, 1e3, SD),
+    REAL(slow_s, CHECK_ABOVE, 1e6, ABOVE),
 };
 
 int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why)
@@ -125,8 +137,8 @@ int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why)
 
 const char *nav_koi_block_name(int block)
 {
-    static const char *const names[] = {"dr", "dV", "alpha", "beta3", "vertical", "baro",
-                                        "nu", "df", "gamma", "theta", "dt"};
+    static const char *const names[] = {"dr",     "dV", "alpha", "beta3", "vertical", "baro", "slow_r",
+                                        "slow_v", "nu", "df",    "gamma", "theta",    "dt"};
     return block < 0 || block >= NAV_KOI_BLOCKS ? "" : names[block];
 }
 
@@ -155,12 +167,19 @@ struct nav_errors_cfg koi_errors_cfg(const struct nav_koi_cfg *cfg)
     return e;
 }
 
+static int size_of_slow(const double sd[3])
+{
+    return sd[0] + sd[1] + sd[2] > 0.0 ? 3 : 0;
+}
+
 int nav_koi_layout(const struct nav_koi_cfg *cfg, struct nav_sins_rows rows[NAV_KOI_BLOCKS])
 {
     const int status = nav_koi_check(cfg, nullptr);
     if (status != NAV_OK) return status;
     const int gamma = cfg->gauge == NAV_SINS_FREE9 ? 9 : 6;
-    const int sizes[NAV_KOI_BLOCKS] = {2, 2, 2, 1, 2, cfg->baro_sd_m > 0.0 ? 1 : 0, 3, 3, gamma, 9, 2};
+    const int baro = cfg->baro_sd_m > 0.0 ? 1 : 0;
+    const int slow_r = size_of_slow(cfg->slow_r_sd_m), slow_v = size_of_slow(cfg->slow_v_sd_mps);
+    const int sizes[NAV_KOI_BLOCKS] = {2, 2, 2, 1, 2, baro, slow_r, slow_v, 3, 3, gamma, 9, 2};
     int offset = 0;
     for (int b = 0; b < NAV_KOI_BLOCKS; b++) {
         rows[b] = {offset, sizes[b]};

@@ -38,9 +38,8 @@ int nav_koi_correct(nav_koi *k, const unsigned char *take)
     if (k->in_step) return NAV_TIMES;
     double x[KF_MAX], errors[KOI_ERRORS];
     for (int i = 0; i < k->n; i++) x[i] = take[i] ? k->kf.x[i] : 0.0;
-    for (int i = 0; i < 2; i++)
-        x[k->at[NAV_KOI_DT].offset + i] = 0.0; /* the receiver's and the barometer's own: not of the unit */
-    if (k->at[NAV_KOI_BARO].size) x[k->at[NAV_KOI_BARO].offset] = 0.0;
+    for (const int block : {NAV_KOI_BARO, NAV_KOI_SLOW_R, NAV_KOI_SLOW_V, NAV_KOI_DT}) /* not of the unit */
+        for (int i = 0; i < k->at[block].size; i++) x[k->at[block].offset + i] = 0.0;
     const struct koi_map before = koi_map_at(&k->before);
     koi_errors_of(before, x, errors);
     k->before = koi_less(k->before, errors);

@@ -32,6 +32,8 @@ struct nav_koi {
     struct nav_strapdown unit; /* at the last increment */
     struct nav_state before;   /* at the last step */
     double acceleration_mps2[3];
+    vec3 arm_mps;            /* of the antenna about the unit at the last step, in b */
+    vec3 antenna_mps2;       /* its acceleration over the last step */
     vec3 dtheta_sum, dv_sum; /* since the last step, corrected */
 
     struct nav_koi_sensors sensors;

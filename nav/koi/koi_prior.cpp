@@ -24,6 +24,10 @@ static void set_constants(const struct nav_koi_cfg *cfg, const struct nav_sins_r
     variance[at[NAV_KOI_DT].offset] = square_of(cfg->dt1_sd_s);
     variance[at[NAV_KOI_DT].offset + 1] = square_of(cfg->dt2_sd_s);
     if (at[NAV_KOI_BARO].size) variance[at[NAV_KOI_BARO].offset] = square_of(cfg->baro_sd_m);
+    for (int i = 0; i < at[NAV_KOI_SLOW_R].size; i++)
+        variance[at[NAV_KOI_SLOW_R].offset + i] = square_of(cfg->slow_r_sd_m[i]);
+    for (int i = 0; i < at[NAV_KOI_SLOW_V].size; i++)
+        variance[at[NAV_KOI_SLOW_V].offset + i] = square_of(cfg->slow_v_sd_mps[i]);
 }
 
 /* Moving ones: of dr, dv and of white noise in the alignment, which levels by the force and finds north by the east rate. */

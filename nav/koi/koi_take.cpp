@@ -17,10 +17,11 @@ struct Kind {
     void (*find_rows)(const nav_koi *k, const nav_koi_measurement *m, Rows *rows);
 };
 
-/* The hybrid solution at the time of a value that is late by the latencies of the state. */
+/* The hybrid solution, and the antenna by it, for a value that is late by the latencies of the state. */
 struct Seen {
     nav_state at;
-    vec3 v, a;
+    vec3 arm_m, arm_mps; /* of the antenna about the unit, in n */
+    vec3 v, a;           /* of the antenna */
     koi_map map;
     double age_s, dt1_s, dt2_s;
 };
@@ -28,10 +29,27 @@ struct Seen {
 Seen see_hybrid(const nav_koi *k, const nav_koi_measurement *m)
 {
     const double *dt = k->kf.x + k->at[NAV_KOI_DT].offset;
-    Seen s = {koi_hybrid(k), {},   vec3(k->acceleration_mps2), koi_map_at(&k->before), koi_time_s(k) - m->t_s,
-              dt[0],         dt[1]};
-    s.v = vec3(s.at.v_n_mps);
+    Seen s = {koi_hybrid(k), {}, {}, {}, k->antenna_mps2, koi_map_at(&k->before), koi_time_s(k) - m->t_s, dt[0], dt[1]};
+    const mat3 c = Eigen::Map<const mat3_rows>(s.at.C_nb);
+    s.arm_m = c * vec3(k->cfg.antenna_m);
+    s.arm_mps = c * k->arm_mps;
+    s.v = vec3(s.at.v_n_mps) + s.arm_mps;
     return s;
+}
+
+/* beta x a of what turns with the unit. */
+void add_turn(const nav_koi *k, const Seen &s, const vec3 &a, double *h)
+{
+    const int n = k->n;
+    const double by_up[3] = {-a[1], a[0], 0.0};
+    h[KOI_A2] += a[2];
+    h[n + KOI_A1] -= a[2];
+    h[2 * n + KOI_A1] += a[1];
+    h[2 * n + KOI_A2] -= a[0];
+    for (int i = 0; i < 2; i++) {
+        h[i * n + KOI_B3] += by_up[i];
+        h[i * n + KOI_R1] -= s.map.t_per_m * by_up[i];
+    }
 }
 
 /* dv of errors.h by the state: T^-1. */
@@ -47,12 +65,21 @@ void add_velocity(const nav_koi *k, const Seen &s, double factor, double *h)
     h[2 * n + KOI_V3] += factor;
 }
 
+/* What the receiver errs by for long, of the hybrid solution's innovation too. */
+void add_slow(const nav_koi *k, int block, Rows *rows)
+{
+    for (int i = 0; i < k->at[block].size; i++) {
+        rows->y[i] += k->kf.x[k->at[block].offset + i];
+        rows->h[i * k->n + k->at[block].offset + i] = -1.0;
+    }
+}
+
 void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     const earth_place place = earth_place_at(s.at.lat_rad, s.at.h_m);
     const double late = s.age_s + s.dt1_s;
-    const vec3 moved = late * s.v - 0.5 * late * late * s.a; /* since the value's time */
+    const vec3 moved = late * s.v - 0.5 * late * late * s.a - s.arm_m; /* since the value's time, from the antenna */
     rows->y[0] = nav_wrap(s.at.lon_rad - m->value[1]) * place.vertical_m * place.cos_lat - moved[0];
     rows->y[1] = (s.at.lat_rad - m->value[0]) * place.meridian_m - moved[1];
     rows->y[2] = s.at.h_m - m->value[2] - moved[2];
@@ -61,6 +88,8 @@ void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
         rows->h[i * k->n + k->at[NAV_KOI_DT].offset] = s.v[i] - late * s.a[i];
     }
     add_velocity(k, s, -s.age_s, rows->h);
+    add_turn(k, s, s.arm_m - s.age_s * s.arm_mps, rows->h);
+    add_slow(k, NAV_KOI_SLOW_R, rows);
 }
 
 void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
@@ -68,23 +97,25 @@ void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
     const Seen s = see_hybrid(k, m);
     const int dt = k->at[NAV_KOI_DT].offset;
     add_velocity(k, s, 1.0, rows->h);
+    add_turn(k, s, s.arm_mps, rows->h);
     for (int i = 0; i < 3; i++) {
         rows->y[i] = s.v[i] - (s.age_s + s.dt1_s + s.dt2_s) * s.a[i] - m->value[i];
         rows->h[i * k->n + dt] = rows->h[i * k->n + dt + 1] = s.a[i];
     }
+    add_slow(k, NAV_KOI_SLOW_V, rows);
 }
 
 void stop_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     add_velocity(k, s, 1.0, rows->h);
-    for (int i = 0; i < 3; i++) rows->y[i] = s.v[i];
+    for (int i = 0; i < 3; i++) rows->y[i] = s.at.v_n_mps[i];
 }
 
 void height_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
 {
     const Seen s = see_hybrid(k, m);
-    rows->y[0] = s.at.h_m - s.age_s * s.v[2] - m->value[0];
+    rows->y[0] = s.at.h_m - s.age_s * s.at.v_n_mps[2] - m->value[0];
     rows->h[KOI_R3] = 1.0;
     if (!k->at[NAV_KOI_BARO].size) return;
     rows->y[0] += k->kf.x[k->at[NAV_KOI_BARO].offset];

@@ -25,8 +25,11 @@ def state_names(cfg: KoiConfig) -> tuple[str, ...]:
     """Of the whole state, as the article writes them; drifts and biases end with their unit."""
     rows = koi_layout(cfg)
     moving = ["dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "dr3", "dV3"]
+    receiver = [
+        f"{block}{i}" for block in ("slow_r", "slow_v") for i in (1, 2, 3) if rows[block].stop > rows[block].start
+    ]
     baro = ["baro"] * (rows["baro"].stop - rows["baro"].start)
-    return (*moving, *baro, *sensor_names(cfg), "dt1", "dt2")
+    return (*moving, *baro, *receiver, *sensor_names(cfg), "dt1", "dt2")
 
 
 def sensor_names(cfg: KoiConfig) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 from psabench.native.flight_model import Flight, Leg, States
 from psabench.native.koi import Kind, Koi, KoiConfig, Sensors, koi_layout
 from psabench.native.strapdown import State, radii_m
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -143,6 +144,17 @@ def measured(truth: Truth, s: Sensors) -> tuple[Floats, Floats]:
     return angle, truth.dv_mps @ (np.eye(3) + s.gamma).T + s.df_mps2 * DT_S
 
 
+SLOW = {"slow_r": slice(0, 3), "slow_v": slice(3, 6)}
+
+
+def drawn_slow(cfg: KoiConfig, seconds: int, seed: int) -> Floats:
+    """Gauss-Markov errors of a receiver, stationary, after each second: (n, 6)."""
+    sd, keep = np.array([*cfg.slow_r_sd_m, *cfg.slow_v_sd_mps]), math.exp(-1.0 / cfg.slow_s)
+    drive = np.random.default_rng([seed, 60]).normal(size=(seconds, 6))
+    drive[1:] *= math.sqrt(1.0 - keep * keep)
+    return sd * np.array(lfilter([1.0], [1.0, -keep], drive, axis=0))
+
+
 @dataclass
 class Drawn:
     """A unit with errors drawn from a covariance, its noise and its receiver's."""
@@ -154,10 +166,12 @@ class Drawn:
     speed: Floats
     walk: Floats  # of nu, (n, 3)
     baro: Floats  # error after each second
+    receiver: KoiConfig  # noise as it is, not as the filter has it
+    slow: Floats  # errors of the receiver after each second, (n, 6)
     seed: int
 
     @staticmethod
-    def of(cfg: KoiConfig, truth: Truth, p: Floats, seed: int) -> Drawn:
+    def of(cfg: KoiConfig, truth: Truth, p: Floats, seed: int, receiver: KoiConfig | None = None) -> Drawn:
         rng = np.random.default_rng(seed)
         sd = np.sqrt(np.diag(p))  # of the correlations: of P itself the small ones would drown in rounding
         values, vectors = np.linalg.eigh(p / np.outer(sd, sd))
@@ -169,7 +183,12 @@ class Drawn:
         speed += rng.normal(0.0, cfg.accel_noise_mps2_rts * math.sqrt(DT_S), (n, 3))
         at, seconds = koi_layout(cfg)["baro"], n // 100 + 1
         baro = (x[at] if at.stop > at.start else np.zeros(1)) + np.cumsum(rng.normal(0.0, cfg.baro_walk_m_rts, seconds))
-        return Drawn(cfg, truth, x, angle, speed, walk, baro, seed)
+        receiver = receiver or cfg
+        slow = drawn_slow(receiver, seconds, seed)
+        for name, columns in SLOW.items():
+            rows = koi_layout(cfg)[name]
+            x[rows] = slow[0, columns][: rows.stop - rows.start]
+        return Drawn(cfg, truth, x, angle, speed, walk, baro, receiver, slow, seed)
 
     def start(self) -> Koi:
         true = self.truth.state(0)
@@ -181,6 +200,9 @@ class Drawn:
         x[:9] = moving_of(error_between(now, self.truth.state(k)), now)
         x[rows["nu"]] += self.walk[k - 1]
         x[rows["baro"]] = self.baro[k // 100]
+        for name, columns in SLOW.items():
+            if rows[name].stop > rows[name].start:
+                x[rows[name]] = self.slow[k // 100, columns]
         return x
 
     def fly(self, koi: Koi, first_s: int, last_s: int, *, height: bool = True) -> None:
@@ -194,10 +216,12 @@ class Drawn:
             part = slice(100 * (first_s + i), 100 * (first_s + i + 1))
             koi.push(self.angle[part], self.speed[part])
             here = state_of(place, i)
-            off = np.concatenate([noise[i, :3] * np.array(self.cfg.position_sd_m), np.zeros(6)])
+            slow = self.slow[first_s + i + 1]
+            off = np.concatenate([noise[i, :3] * np.array(self.receiver.position_sd_m) + slow[:3], np.zeros(6)])
             seen = with_errors(here, off)
             koi.take(Kind.POSITION, t, [seen.lat_rad, seen.lon_rad, seen.h_m])
-            koi.take(Kind.VELOCITY, t, speed.v_enu_mps[i] + noise[i, 3:6] * np.array(self.cfg.velocity_sd_mps))
+            white = noise[i, 3:6] * np.array(self.receiver.velocity_sd_mps)
+            koi.take(Kind.VELOCITY, t, speed.v_enu_mps[i] + white + slow[3:])
             if height:
                 h_m = now.h_m[i] + self.baro[first_s + i + 1] + noise[i, 6] * self.cfg.height_sd_m
                 koi.take(Kind.HEIGHT, t, [h_m])
