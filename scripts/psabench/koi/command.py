@@ -26,7 +26,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     commands = p.add_subparsers(required=True, metavar="COMMAND")
     text = "fly recorded flights again, without and with a passport's estimates"
     made = commands.add_parser("replay", help=text, description=f"{text.capitalize()}.", epilog=EPILOG)
-    made.set_defaults(handler=_replay)
+    made.set_defaults(handler=_replay_recordings)
     made.add_argument("folders", type=Path, nargs="+", metavar="FOLDER")
     made.add_argument("--with-estimates", required=True, metavar="PASSPORT[@N]", help="store of passports")
     made.add_argument("--unit", default="SP-1", metavar="SERIAL", help="serial number in it (%(default)s)")
@@ -38,7 +38,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     return p.parse_args(words)
 
 
-def _replay(args: argparse.Namespace) -> int:
+def _replay_recordings(args: argparse.Namespace) -> int:
     from psabench.koi.wire.params import KoiParams
     from psabench.koi.wire.replay import read_estimates, replay_flights, replay_lines
     from psabench.procedures.result import made_params

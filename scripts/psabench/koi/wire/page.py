@@ -74,7 +74,7 @@ def result_dict(run: KoiRun) -> dict[str, Any]:
             "weight": estimate.weight,
         },
         "verdict": f.verdict,
-        "measurements": {kind.name.lower(): _measured(t) for kind, t in f.taken.items()},
+        "measurements": {kind.name.lower(): _measured_dict(t) for kind, t in f.taken.items()},
         "lines": {
             "increments": feed.grid.counts.as_dict(),
             "receiver": feed.stream.counts.as_dict(),
@@ -92,7 +92,7 @@ def result_dict(run: KoiRun) -> dict[str, Any]:
     }
 
 
-def _measured(t: Taken) -> dict[str, Any]:
+def _measured_dict(t: Taken) -> dict[str, Any]:
     return {
         "counts": {reason.name.lower(): n for reason, n in t.counts.items() if n},
         "nis": t.nis_sum,
@@ -139,9 +139,9 @@ def write_page(out: Path, run: KoiRun) -> Path:
     decision = "no take-off was seen" if f.decision is None else "corrected" if f.corrected else "not corrected"
     reasons: Sequence[str] = () if f.decision is None else f.decision.reasons
     events = [["t, s", "", ""], *([f"{e.t_s:.0f}", e.what, e.text] for e in f.events)]
-    pictures = list(plots.pictures(run))
+    pictures = list(plots.draw_pictures(run))
     parts = (
-        section("Verdict", verdict_line(verdict_words(run), not f.verdict), bullets(_bad(run))),
+        section("Verdict", verdict_line(verdict_words(run), not f.verdict), bullets(_bad_lines(run))),
         section("Take-off", f"<p>{decision}</p>", bullets(list(reasons))),
         *(section(title, picture) for title, picture in pictures),
         section("Measurements", table(measurement_rows(f))),
@@ -151,5 +151,5 @@ def write_page(out: Path, run: KoiRun) -> Path:
     return write_report(out, result_dict(run), whole_page("A flight with a satellite receiver", run.facts, parts))
 
 
-def _bad(run: KoiRun) -> list[str]:
+def _bad_lines(run: KoiRun) -> list[str]:
     return [*([run.found.verdict] if run.found.verdict else []), *run.notes]

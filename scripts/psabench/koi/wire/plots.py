@@ -25,7 +25,7 @@ SIGMAS = (
 )
 
 
-def pictures(run: KoiRun) -> Iterator[tuple[str, str]]:
+def draw_pictures(run: KoiRun) -> Iterator[tuple[str, str]]:
     """Titles and SVG."""
     if not len(run.found.t_s):
         return

@@ -58,12 +58,12 @@ def run_flight(
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / TRUTH_LOG).unlink(missing_ok=True)
     try:
-        feed = read_flight(options.data, p, setup) if options.data else _fly(options, p, setup, progress)
+        feed = read_flight(options.data, p, setup) if options.data else _fly_live(options, p, setup, progress)
         found = feed.finish()
     except Refused as e:
         raise BadInput(f"{NAME}: {e}") from e
     graded = grade_feed(feed, found, options.data or options.out)
-    facts = _facts(options, feed)
+    facts = _run_facts(options, feed)
     return KoiRun(params=p, found=found, feed=feed, facts=facts, graded=graded)
 
 
@@ -78,7 +78,7 @@ def new_feed(setup: FlightSetup, p: KoiParams, weights: Weights, node: int) -> F
     return FlightFeed(FlightHost(setup), weights, node, ReceiverClock(p.limits))
 
 
-def _fly(options: KoiOptions, p: KoiParams, setup: FlightSetup, progress: Progress) -> FlightFeed:
+def _fly_live(options: KoiOptions, p: KoiParams, setup: FlightSetup, progress: Progress) -> FlightFeed:
     with options.open_bench() as bench:
         unit = next((u for u in bench.units.values() if isinstance(u, Bins)), None)
         if unit is None:
@@ -121,7 +121,7 @@ def recorded_unit(folder: Path) -> tuple[Weights, int]:
         raise BadInput(expected("node and weights of a unit", e, folder)) from e
 
 
-def _facts(options: KoiOptions, feed: FlightFeed) -> dict[str, str]:
+def _run_facts(options: KoiOptions, feed: FlightFeed) -> dict[str, str]:
     there = options.can or options.control or options.scenario or "koi_flight"
     where: dict[str, Any] = {"data": options.data} if options.data else {"bench": there}
     clock = feed.clock

@@ -79,14 +79,14 @@ def write_page(out: Path, season: Season) -> Path:
     verdicts = [f"flight {r.number}: {r.verdict}" for r in season.rows if r.verdict]
     parts = [
         verdict_line(verdict_words(season), None),
-        section("Flights", table(rows), figure(_draw(season)), bullets(verdicts)),
+        section("Flights", table(rows), figure(_draw_errors(season)), bullets(verdicts)),
         section("How to read it", bullets(NOTES)),
     ]
     facts = {"unit": season.params.unit, "class": season.params.unit_class, "routes": season.params.routes}
     return write_report(out, result_dict(season), whole_page("A season of flights", facts, parts))
 
 
-def _draw(season: Season) -> str:
+def _draw_errors(season: Season) -> str:
     """As the article's fig. 1: the error of each flight."""
     with style.drawing(3.0) as (fig, ax):
         numbers = [r.number for r in season.rows]

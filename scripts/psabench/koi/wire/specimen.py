@@ -35,7 +35,7 @@ def flight_scenario(base: str, kind: InstrumentClass, persistent: Floats, path: 
     units = [u for u in scenario.get("units") or [] if isinstance(u, dict) and u.get("board") == "bins"]
     if len(units) != 1:
         raise BadInput(expected("one inertial unit", len(units), base))
-    units[0].setdefault("profile_set", {}).update(_profile(kind, persistent))
+    units[0].setdefault("profile_set", {}).update(_unit_profile(kind, persistent))
     for unit in scenario["units"]:
         unit["on"] = unit.pop(True, unit.pop("on", None))  # `on` is true in YAML 1.1
     replace_file(path, yaml.safe_dump(scenario, sort_keys=False, width=100))
@@ -54,7 +54,7 @@ def _read_scenario(base: str) -> dict[str, Any]:
     return found
 
 
-def _profile(kind: InstrumentClass, persistent: Floats) -> dict[str, Any]:
+def _unit_profile(kind: InstrumentClass, persistent: Floats) -> dict[str, Any]:
     """Given errors, and the spread of what is drawn beside them."""
     values = dict(zip(kind.names, persistent.tolist(), strict=True))
     spread = dict(zip(kind.names, kind.run_sd.tolist(), strict=True))
