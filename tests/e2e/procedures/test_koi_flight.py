@@ -66,7 +66,7 @@ def test_the_same_seed_gives_the_same_recording(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_on_the_lines_is_named_and_survived(tmp_path: Path) -> None:
-    """Damaged packets, time that stands, an outage, frames that are lost now and then."""
+    """Damaged packets, frozen time, an outage, frames that are lost now and then."""
     scenario = with_faults(
         tmp_path,
         """

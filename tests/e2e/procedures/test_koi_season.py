@@ -103,7 +103,7 @@ def test_estimates_help_the_flights_after_them(tmp_path: Path, capsys: Lines) ->
     assert rms.startswith("rms of 2: ")
     assert float(rms.split()[-2]) > 1.1
     for wrong, said in (
-        ([*folders, "--with-estimates", "none@1"], "none: no such file"),
+        ([*folders, "--with-estimates", "none@1"], "none: expected a store of passports, got none"),
         ([*folders, "--with-estimates", f"{tmp_path / 'p.sqlite'}@7"], "expected a flight of 0 to 2, got 7"),
         ([*folders, *given, "--unit", "SP-9"], "expected one of SP-1, got SP-9"),
         ([str(tmp_path), *given], "expected a recorded flight with truth.jsonl, got none"),

@@ -87,7 +87,7 @@ class ReceiverClock:
         self._p = np.diag([self._variance(width_s), self.limits.rate_sd**2])
 
     def _reject(self, tow_s: float, arrived_s: float, width_s: float) -> float | None:
-        """After a row of them the receiver's time is believed as it is now: it has jumped. One that stands is not."""
+        """After a row of them the receiver's time is believed as it is now: it has jumped. A frozen one is not."""
         self._stray_row = self._stray_row + 1 if tow_s > self._stray_s else 0
         self._stray_s = tow_s
         if self._stray_row < self.limits.jump_solutions:

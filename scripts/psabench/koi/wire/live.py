@@ -24,7 +24,7 @@ SHOWN_S = 60.0  # of the flight, between two reports of its progress
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandedRule:
-    """When a flight is over, by the receiver: it has flown, and stands (E0)."""
+    """When a flight is over, by the receiver: it has flown, and is at rest (E0)."""
 
     flown_mps: float = 40.0
     rest_mps: float = 0.5

@@ -4,7 +4,7 @@ can.log       every CAN frame, as candump -L writes it
 receiver.log  the bytes of the receiver's port: (time) gps#BEGIN#FRAMES#HEX, a line for each look at the port. time and
               BEGIN are of the last CAN frame before this look and before the one before it, FRAMES how many frames of
               can.log had come. Without bytes: HEX is empty
-flight.json   what the host was told: node, weights, class, serial number, time of the beginning
+flight.json   what was known at the start: node, weights, class, serial number, time of the beginning
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def read_estimates(given: str, unit: str, p: KoiParams) -> Knowledge:
     name, at, number = given.rpartition("@")
     path = Path(name if at and number.isdecimal() else given)
     if not path.is_file():
-        raise BadInput(f"{path}: no such file")
+        raise BadInput(expected("a store of passports", "none", path))
     kind = instrument_class(p.setup().cfg)
     with PassportStore(path, read_only=True) as store:
         if unit not in store.unit_serials():
