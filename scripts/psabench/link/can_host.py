@@ -115,18 +115,41 @@ class StepClock:
 
         Raises TimeOut where it would move it past the deadline, or has brought it there.
         """
+        self._send(hosts := self._hosts or ([] if host is None else [host]), name, args)
+        reply = self._control.wait_reply(name)
+        self._t_ns = reply.t_ns
+        for h, count in zip(hosts, self._counts(reply), strict=False):
+            _receive_all(h, count)
+        self._check_deadline()
+        return reply
+
+    def start_run(self, dwell_s: float) -> None:
+        """Let time pass while this program does something else, which sends nothing; `finish_run` waits for its end."""
+        self._send(self._hosts, "run", {"for_s": dwell_s})
+
+    def finish_run(self) -> list[int]:
+        """Time is where `start_run` brings it. Returns how many frames each of the hosts has got by then.
+
+        They are taken by `CanHost.receive_up_to`: those of a next run may already be behind them.
+        """
+        reply = self._control.wait_reply("run")
+        self._t_ns = reply.t_ns
+        self._check_deadline()
+        return self._counts(reply)
+
+    def _send(self, hosts: Sequence[CanHost], name: str, args: dict[str, object]) -> None:
         if "for_s" in args:
             args["for_s"] = max(0.0, min(float(str(args["for_s"])), round(self.deadline_s - self.now_s(), 9)))
-        hosts = self._hosts or ([] if host is None else [host])
         # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
-        after_tx = self._base_tx + sum(h.sent for h in hosts)
-        reply = self._control.call(name, **args, after_tx=after_tx)
-        self._t_ns = reply.t_ns
-        for h, delivered, base in zip(hosts, self._delivered(reply), self._base_rx, strict=False):
-            _receive_all(h, delivered - base)
+        self._control.send(name, **args, after_tx=self._base_tx + sum(h.sent for h in hosts))
+
+    def _check_deadline(self) -> None:
         if self.now_s() >= self.deadline_s:
             raise TimeOut(f"simulated time ends at {self.deadline_s:.6g} s")
-        return reply
+
+    def _counts(self, reply: Reply) -> list[int]:
+        """Frames that our hosts have got by then, since they came."""
+        return [delivered - base for delivered, base in zip(self._delivered(reply), self._base_rx, strict=False)]
 
     def _delivered(self, reply: Reply) -> list[int]:
         """Frames handed to each of our hosts so far."""
@@ -177,11 +200,18 @@ class CanHost(AbstractContextManager["CanHost"]):
         self._hand_on(message)
         return True
 
-    def receive_taken(self) -> None:
+    def receive_taken(self, most: int | None = None) -> None:
         """What came together with the last frame, where the bus takes many at once."""
         if isinstance(self.bus, SocketcandBus) and self.bus.filters is None:
-            for message in self.bus.taken():
+            for message in self.bus.taken(most):
                 self._hand_on(message)
+
+    def receive_up_to(self, count: int) -> None:
+        """Until so many frames have come, and none beyond them. Raises LinkError when they do not."""
+        while (missing := count - self.received) > 0:
+            if not self.receive(BARRIER_S):
+                raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
+            self.receive_taken(count - self.received)
 
     def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus

@@ -26,8 +26,10 @@ class SocketcandBus(SocketCanDaemonBus):
         self._rest = ""  # of a line that is not all there yet
         super().__init__(**options)  # type: ignore[no-untyped-call]
 
-    def taken(self) -> list[can.Message]:
-        """The frames that the last look at the socket has brought and no one has received."""
+    def taken(self, most: int | None = None) -> list[can.Message]:
+        """The frames that the last look at the socket has brought and no one has received, so many at most."""
+        if most is not None and most < len(self._came):
+            return [self._came.popleft() for _ in range(most)]
         came = list(self._came)
         self._came.clear()
         return came
