@@ -106,5 +106,5 @@ def run_campaign(fleet: Fleet, args: argparse.Namespace, progress: Progress) -> 
         if wanted := work.list_missing(fleet, store):
             with workers(args.jobs) as at_work:
                 work.fill_store(wanted, store, at_work, progress)
-        predicted = linear.predict_fleet(fleet, progress) if args.linear else {}
+        predicted = linear.predict_fleet(fleet, store, progress) if args.linear else {}
         return page.gather_report(fleet, store, predicted)

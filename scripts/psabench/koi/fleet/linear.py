@@ -10,9 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import version
+from itertools import product
+from pathlib import Path
 
 import numpy as np
 
+from psabench.campaign import builds
+from psabench.campaign.store import CELL, Origin, Part, Store
 from psabench.koi.autocal import Knowledge, nothing_known, update_knowledge
 from psabench.koi.fleet.grade import MINUTES
 from psabench.koi.fleet.routes import DT_S, ROUTES, Journey, fly_route
@@ -24,9 +30,11 @@ from psabench.koi.host import FlightHost
 from psabench.koi.sensors import instrument_class
 from psabench.koi.take_off import NAVIGATION, DecisionLimits
 from psabench.link.signals import Floats
+from psabench.native import clib
 from psabench.native.koi import Koi, KoiConfig
 from psabench.procedures.head_bench import Progress
 
+MINUTES_OF = range(MINUTES + 1)
 Predicted = Mapping[tuple[str, str], Floats]  # by class and mode: (flights, minutes + 1, 2), north and east, rms, m
 
 
@@ -125,24 +133,64 @@ class Tracks:
             self.rows[corrects].append((track or self.untouched).place_m)
 
 
-def predict_fleet(fleet: Fleet, progress: Progress) -> Predicted:
-    """Of every class and mode; the units' number does not matter."""
-    found: dict[tuple[str, str], Floats] = {}
-    names = [ROUTES_OF[k % len(ROUTES_OF)] for k in range(fleet.flights)]
-    with progress.step("covariances, flights", 2 * len(names) * len(fleet.classes)) as done:
-        for unit_class in fleet.classes:
-            for learns in (False, True):
-                rows = []
-                for one in predict_season(unit_class, [fly_route(name) for name in names], learns=learns):
-                    rows.append(one)
-                    done()
-                for mode, m in MODES.items():
-                    if m.learns == learns:
-                        found[unit_class, mode] = np.array([row[m.corrects] for row in rows])
-    return found
+def predict_fleet(fleet: Fleet, store: Store, progress: Progress) -> Predicted:
+    """Of every class and mode; the units' number does not matter. What the store lacks is computed and put there."""
+    chains = [(name, learns) for name in fleet.classes for learns in (False, True)]
+    wanted = [one for one in chains if not all(_is_there(fleet, store, one[0], mode) for mode in modes_of(one[1]))]
+    if wanted:
+        with progress.step("covariances, seasons", len(wanted)) as done:
+            for name, learns in wanted:
+                store.put(_season_parts(fleet, name, learns=learns))
+                done()
+    shape = fleet.flights, len(MINUTES_OF), 2
+    return {
+        (name, mode): store.rows(make_origin(fleet, name, mode), 1).astype(np.float64).reshape(shape)
+        for name in fleet.classes
+        for mode in MODES
+    }
 
 
-ROUTES_OF = tuple(ROUTES)
+def modes_of(learns: bool) -> list[str]:
+    """That a passport goes along with, or none."""
+    return [mode for mode, m in MODES.items() if m.learns == learns]
+
+
+def make_origin(fleet: Fleet, unit_class: str, mode: str) -> Origin:
+    """Of the series of the store: one row."""
+    return Origin(
+        kind="koi fleet, covariance",
+        input={"unit_class": unit_class, "mode": mode, "flights": fleet.flights},
+        seed=0,
+        version=f"psabench {version('psabench')}",
+        build=own_digest(),
+        columns=tuple(
+            f"flight {k + 1} {i} min {a}" for k, i, a in product(range(fleet.flights), range(MINUTES + 1), "ne")
+        ),
+    )
+
+
+@cache
+def own_digest() -> str:
+    """SHA-256 of both libraries and of the code that takes part."""
+    return builds.digest([Path(clib.library().path), *builds.sources("psabench.koi.fleet.linear")]) + builds.algebra()
+
+
+def _is_there(fleet: Fleet, store: Store, unit_class: str, mode: str) -> bool:
+    return 0 in store.runs(make_origin(fleet, unit_class, mode))
+
+
+def _season_parts(fleet: Fleet, unit_class: str, *, learns: bool) -> list[Part]:
+    names = list(ROUTES)
+    journeys = [fly_route(names[k % len(names)]) for k in range(fleet.flights)]
+    rows = predict_season(unit_class, journeys, learns=learns)
+    return [
+        Part(
+            origin=make_origin(fleet, unit_class, mode),
+            first_run=0,
+            rows=np.array([row[MODES[mode].corrects] for row in rows]).reshape(1, -1).astype(CELL),
+        )
+        for mode in modes_of(learns)
+    ]
 
 
 def predict_season(unit_class: str, journeys: list[Journey], *, learns: bool) -> list[Mapping[bool, Floats]]:
@@ -150,9 +198,12 @@ def predict_season(unit_class: str, journeys: list[Journey], *, learns: bool) ->
     cfg = host_config(unit_class)
     kind = instrument_class(cfg)
     known, rows = nothing_known(kind, "ideal"), list[Mapping[bool, Floats]]()
+    flown: dict[int, Mapping[bool, Floats]] = {}  # what does not learn does on a route as it did before
     for k, journey in enumerate(journeys):
-        tracks, host = fly_ideal(journey, cfg, known, DAY_S * k)
-        rows.append({corrects: np.array(track) for corrects, track in tracks.rows.items()})
+        if learns or id(journey) not in flown:
+            tracks, host = fly_ideal(journey, cfg, known, DAY_S * k)
+            flown[id(journey)] = {corrects: np.array(track) for corrects, track in tracks.rows.items()}
+        rows.append(flown[id(journey)])
         if learns:
             known = update_knowledge(known, kind, replace(host.finish().estimate, weight=1.0))
     return rows
@@ -170,7 +221,7 @@ def fly_ideal(j: Journey, cfg: KoiConfig, known: Knowledge, time_s: float) -> tu
     assert host.koi is not None
     tracks = Tracks(Track(cfg=cfg, names=host.names, p=host.koi.p))
     up_s = int(np.ceil(j.take_off_s))
-    minutes = {up_s + 60 * k for k in range(MINUTES + 1)}
+    minutes = {up_s + 60 * k for k in MINUTES_OF}
     for t in range(align_s + 1, j.seconds + 1):
         tracks.fly_second(host, host.koi, feed, t)
         if t in minutes:
