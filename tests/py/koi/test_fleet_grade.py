@@ -141,7 +141,7 @@ def test_a_season_learns_and_none_does_not(monkeypatch: pytest.MonkeyPatch, name
     monkeypatch.setattr(season, "fly_route", lambda _: journey())
     seasons = {m: season.Season(unit_class=name, condition="clean", mode=m, flights=3, seed=1) for m in MODES}
     rows = {m: season.fly_season(s, 0) for m, s in seasons.items()}
-    left = {m: figures.column(r[None], "left_df12_mps2")[0] for m, r in rows.items()}
+    left = {m: figures.pick_column(r[None], "left_df12_mps2")[0] for m, r in rows.items()}
     assert np.array_equal(left["none"], [left["none"][0]] * 3)
     assert left["both"][2] < 0.7 * left["none"][2]
     first = {m: r[0, : len(SCALARS)] for m, r in rows.items()}
@@ -298,7 +298,7 @@ def test_a_track_is_the_filter_s_own_prediction() -> None:
     track = linear.Track(cfg=cfg, names=(), p=koi.p)
     for k in range(begin, begin + 6000, 10):
         koi.push(j.dtheta_rad[k : k + 10], j.dv_mps[k : k + 10])
-        track.step(*koi.jacobians())
+        track.predict_step(*koi.jacobians())
     scale = np.outer(koi.sd, koi.sd)
     assert np.abs((track.p - koi.p) / scale).max() < 1e-9
 

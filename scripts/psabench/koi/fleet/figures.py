@@ -76,14 +76,14 @@ class Harm:
         return self.rms_m / self.none_rms_m, self.p95_m / self.none_p95_m
 
 
-def column(rows: Floats, name: str) -> Floats:
+def pick_column(rows: Floats, name: str) -> Floats:
     """A quantity, (units, flights)."""
     return rows[..., COLUMNS.index(name)]
 
 
-def maxima(rows: Floats) -> Floats:
+def largest_errors(rows: Floats) -> Floats:
     """Largest errors in the hour, (units, flights, 2): latitude, longitude."""
-    return np.stack([column(rows, "max_n_m"), column(rows, "max_e_m")], axis=-1)
+    return np.stack([pick_column(rows, "max_n_m"), pick_column(rows, "max_e_m")], axis=-1)
 
 
 def late_part(rows: Floats) -> Floats:
@@ -91,7 +91,7 @@ def late_part(rows: Floats) -> Floats:
     return rows[:, min(FIRST_LATE, rows.shape[1] - 1) :]
 
 
-def curves(rows: Floats) -> Floats:
+def error_curves(rows: Floats) -> Floats:
     """Errors by minute, (units, flights, 2, minutes + 1)."""
     first = COLUMNS.index("n 0 min")
     return np.asarray(rows[..., first:].reshape(*rows.shape[:2], 2, MINUTES + 1))
@@ -99,10 +99,10 @@ def curves(rows: Floats) -> Floats:
 
 def rms_curves(rows: Floats) -> Floats:
     """Over units: (flights, minutes + 1, 2), as linear.predict_fleet()."""
-    return np.asarray(np.sqrt(np.mean(curves(rows) ** 2, axis=0)).swapaxes(1, 2))
+    return np.asarray(np.sqrt(np.mean(error_curves(rows) ** 2, axis=0)).swapaxes(1, 2))
 
 
-def bootstrap(units: int, figure: Callable[[np.ndarray], float], seed: int, name: str) -> Number:
+def bootstrap_units(units: int, figure: Callable[[np.ndarray], float], seed: int, name: str) -> Number:
     """figure: of units chosen by number, (units,)."""
     rng = draw_source(seed, f"koi bootstrap {name}")
     values = [figure(rng.integers(0, units, units)) for _ in range(RESAMPLES)]
@@ -113,24 +113,24 @@ def bootstrap(units: int, figure: Callable[[np.ndarray], float], seed: int, name
 def mode_figures(rows: Rows, mode: str, seed: int) -> ModeFigures:
     """rows: of the class; `none` among them."""
     mine, none = (late_part(rows[name]) for name in (mode, "none"))
-    errors, squares = maxima(mine), np.mean(maxima(mine) ** 2, axis=(1, 2))
-    before, within = np.mean(maxima(none) ** 2, axis=(1, 2)), np.mean(errors.max(axis=-1) <= MILE_M, axis=1)
+    errors, squares = largest_errors(mine), np.mean(largest_errors(mine) ** 2, axis=(1, 2))
+    before, within = np.mean(largest_errors(none) ** 2, axis=(1, 2)), np.mean(errors.max(axis=-1) <= MILE_M, axis=1)
     n = len(squares)
     return ModeFigures(
-        rms_m=bootstrap(n, lambda k: float(np.sqrt(squares[k].mean())), seed, mode),
+        rms_m=bootstrap_units(n, lambda k: float(np.sqrt(squares[k].mean())), seed, mode),
         p95_m=float(np.percentile(errors, 95.0)),
         worst_m=float(errors.max()),
-        factor=bootstrap(n, lambda k: float(np.sqrt(before[k].mean() / squares[k].mean())), seed, mode),
-        within_mile=bootstrap(n, lambda k: float(within[k].mean()), seed, mode),
-        corrected=float(column(mine, "corrected").mean()),
-        weight=float(column(mine, "weight").mean()),
+        factor=bootstrap_units(n, lambda k: float(np.sqrt(before[k].mean() / squares[k].mean())), seed, mode),
+        within_mile=bootstrap_units(n, lambda k: float(within[k].mean()), seed, mode),
+        corrected=float(pick_column(mine, "corrected").mean()),
+        weight=float(pick_column(mine, "weight").mean()),
     )
 
 
 def filter_figures(rows: Floats, seed: int) -> FilterFigures:
     """Of one mode."""
     means = {
-        name: float(column(rows, f"{name}_arcmin").mean())
+        name: float(pick_column(rows, f"{name}_arcmin").mean())
         for name in ("heading_sd_aligned", "level_sd_aligned", "heading_sd", "level_sd")
     }
     return FilterFigures(
@@ -138,40 +138,40 @@ def filter_figures(rows: Floats, seed: int) -> FilterFigures:
         level_aligned_arcmin=means["level_sd_aligned"],
         heading_arcmin=means["heading_sd"],
         level_arcmin=means["level_sd"],
-        heading_error_arcmin=float(np.sqrt(np.mean(column(rows, "heading_error_arcmin") ** 2))),
+        heading_error_arcmin=float(np.sqrt(np.mean(pick_column(rows, "heading_error_arcmin") ** 2))),
         nees=_mean_nees(rows, "nees", seed),
         nees_within=_mean_nees(rows, "nees_within", seed),
     )
 
 
 def _mean_nees(rows: Floats, name: str, seed: int) -> Number:
-    ratio = np.mean(column(rows, name) / column(rows, f"{name}_dof"), axis=1)
-    return bootstrap(len(ratio), lambda k: float(ratio[k].mean()), seed, name)
+    ratio = np.mean(pick_column(rows, name) / pick_column(rows, f"{name}_dof"), axis=1)
+    return bootstrap_units(len(ratio), lambda k: float(ratio[k].mean()), seed, name)
 
 
 def left_by_flight(rows: Floats) -> Mapping[str, Floats]:
     """What the passport does not know of the persistent errors after each flight, rms over units, (flights,)."""
     names = [name for name in COLUMNS if name.startswith("left_")]
-    return {name: np.sqrt(np.mean(column(rows, name) ** 2, axis=0)) for name in names}
+    return {name: np.sqrt(np.mean(pick_column(rows, name) ** 2, axis=0)) for name in names}
 
 
 def harm_figures(condition: str, both: Floats, none: Floats) -> Harm:
     """Over all flights."""
-    mine, other = maxima(both), maxima(none)
+    mine, other = largest_errors(both), largest_errors(none)
     return Harm(
         condition=condition,
         rms_m=float(np.sqrt(np.mean(mine**2))),
         p95_m=float(np.percentile(mine, 95.0)),
         none_rms_m=float(np.sqrt(np.mean(other**2))),
         none_p95_m=float(np.percentile(other, 95.0)),
-        corrected=float(column(both, "corrected").mean()),
-        weight=float(column(both, "weight").mean()),
+        corrected=float(pick_column(both, "corrected").mean()),
+        weight=float(pick_column(both, "weight").mean()),
     )
 
 
 def count_reasons(rows: Floats) -> Iterator[tuple[str, float]]:
     """Shares of flights with each reason not to correct."""
-    bits = column(rows, "reasons").astype(np.int64)
+    bits = pick_column(rows, "reasons").astype(np.int64)
     for k, name in enumerate(REASONS):
         if share := float(np.mean((bits >> k) & 1)):
             yield name, share

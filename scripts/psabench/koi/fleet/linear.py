@@ -44,10 +44,10 @@ class IdealFeed:
     def __init__(self, j: Journey) -> None:
         self.j, self.s = j, j.path.states(np.arange(j.seconds + 1, dtype=np.int64) * 10**9)
 
-    def place(self, t: int) -> tuple[float, float, float]:
+    def place_at(self, t: int) -> tuple[float, float, float]:
         return float(self.s.lat_rad[t]), float(self.s.lon_rad[t]), float(self.s.h_m[t])
 
-    def push(self, host: FlightHost, t: int) -> None:
+    def push_second(self, host: FlightHost, t: int) -> None:
         """The second that ends at t."""
         for _ in self.push_steps(host, t, SECOND):
             pass
@@ -58,8 +58,8 @@ class IdealFeed:
             host.push(self.j.dtheta_rad[begin : begin + each], self.j.dv_mps[begin : begin + each])
             yield
 
-    def measure(self, host: FlightHost, t: int) -> None:
-        lat, lon, h = self.place(t)
+    def give_measurements(self, host: FlightHost, t: int) -> None:
+        lat, lon, h = self.place_at(t)
         east, north, up = (float(x) for x in self.s.v_enu_mps[t])
         host.take_fix(Fix(t_s=float(t), lat_rad=lat, lon_rad=lon, h_m=h, v_enu_mps=(east, north, up)))
         host.take_height(float(t), h)
@@ -73,7 +73,7 @@ class Track:
     names: tuple[str, ...]
     p: Floats
 
-    def step(self, phi: Floats, q: Floats) -> None:
+    def predict_step(self, phi: Floats, q: Floats) -> None:
         """One step of the filter's: rows of what moves; the rest stays."""
         m = len(phi)
         moved = phi @ self.p
@@ -81,7 +81,7 @@ class Track:
         self.p[:, :m] = moved.T
         self.p[:m, :m] = moved @ phi.T + q
 
-    def damp(self, dt_s: float) -> None:
+    def damp_height(self, dt_s: float) -> None:
         """The altimeter's say in the autonomous height (koi.h)."""
         height, climb, baro = (self.names.index(name) for name in ("dr3", "dV3", "baro"))
         f = np.eye(len(self.p))
@@ -118,16 +118,16 @@ class Tracks:
         for _ in feed.push_steps(host, t, round(float(host.cfg.step_s) / DT_S)):
             phi, q = koi.jacobians()
             for track in self._both():
-                track.step(phi, q)
+                track.predict_step(phi, q)
         if self.corrected is None and host.events[-1].what == "not corrected":
             self.leave_ground(koi)
         for track in self._both():
-            track.damp(1.0)
+            track.damp_height(1.0)
 
     def _both(self) -> list[Track]:
         return [t for t in (self.untouched, self.corrected) if t is not None]
 
-    def note(self) -> None:
+    def note_minute(self) -> None:
         """At a minute of the flight."""
         for corrects, track in ((False, self.untouched), (True, self.corrected)):
             self.rows[corrects].append((track or self.untouched).place_m)
@@ -212,12 +212,12 @@ def predict_season(unit_class: str, journeys: list[Journey], *, learns: bool) ->
 def fly_ideal(j: Journey, cfg: KoiConfig, known: Knowledge, time_s: float) -> tuple[Tracks, FlightHost]:
     """Step by step of the filter's. Raises BadInput for a journey that ends before its alignment."""
     feed = IdealFeed(j)
-    setup = FlightSetup(cfg=cfg, serial="ideal", time_s=time_s, known=known, corrects=False, place=feed.place(0))
+    setup = FlightSetup(cfg=cfg, serial="ideal", time_s=time_s, known=known, corrects=False, place=feed.place_at(0))
     host = FlightHost(setup)
     align_s = round(setup.align_s)
     for t in range(1, align_s + 1):
-        feed.push(host, t)
-        feed.measure(host, t)
+        feed.push_second(host, t)
+        feed.give_measurements(host, t)
     assert host.koi is not None
     tracks = Tracks(Track(cfg=cfg, names=host.names, p=host.koi.p))
     up_s = int(np.ceil(j.take_off_s))
@@ -225,6 +225,6 @@ def fly_ideal(j: Journey, cfg: KoiConfig, known: Knowledge, time_s: float) -> tu
     for t in range(align_s + 1, j.seconds + 1):
         tracks.fly_second(host, host.koi, feed, t)
         if t in minutes:
-            tracks.note()
-        feed.measure(host, t)
+            tracks.note_minute()
+        feed.give_measurements(host, t)
     return tracks, host

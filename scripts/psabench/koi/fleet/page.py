@@ -22,8 +22,8 @@ from psabench.koi.fleet.figures import (
     count_reasons,
     filter_figures,
     harm_figures,
+    largest_errors,
     left_by_flight,
-    maxima,
     mode_figures,
     rms_curves,
 )
@@ -185,7 +185,7 @@ def linear_table(r: Report) -> list[list[str]]:
     rows = []
     for (name, mode), curve in r.predicted.items():
         drawn, alone = (float(plots.largest_rms(x)[-1]) for x in (rms_curves(r.rows[name][mode]), curve))
-        whole = float(np.sqrt(np.mean(maxima(r.rows[name][mode])[:, -1] ** 2)))
+        whole = float(np.sqrt(np.mean(largest_errors(r.rows[name][mode])[:, -1] ** 2)))
         rows.append([f"{name}, {mode}", f"{alone:.0f}", f"{drawn:.0f}", f"{whole:.0f}", f"{drawn / alone:.2f}"])
     return [["last flight", "covariance, m", "drawn, m", "rms of the largest, m", "drawn / covariance"], *rows]
 
@@ -260,6 +260,6 @@ def result_dict(r: Report) -> dict[str, Any]:
         "harm": [{"class": n, **asdict(h), "ratios": h.ratios} for n, h in r.harms],
         "reasons": {where: dict(found) for where, found in r.reasons.items()},
         "left": {n: {k: v.tolist() for k, v in left_by_flight(x["both"]).items()} for n, x in r.rows.items()},
-        "maxima_m": {f"{n}, {m}": maxima(x).tolist() for n, rows in r.rows.items() for m, x in rows.items()},
+        "maxima_m": {f"{n}, {m}": largest_errors(x).tolist() for n, rows in r.rows.items() for m, x in rows.items()},
         "linear_m": {f"{n}, {m}": x.tolist() for (n, m), x in r.predicted.items()},
     }

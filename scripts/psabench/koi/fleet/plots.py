@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from psabench.koi.fleet.figures import MILE_M, Rows, curves, maxima, rms_curves
+from psabench.koi.fleet.figures import MILE_M, Rows, error_curves, largest_errors, rms_curves
 from psabench.koi.fleet.grade import MINUTES
 from psabench.koi.fleet.linear import Predicted
 from psabench.koi.fleet.season import MODES
@@ -27,8 +27,8 @@ def draw_first(rows: Rows, name: str) -> str:
             if unit >= len(rows["none"]):
                 ax.set_axis_off()
                 continue
-            before = maxima(rows["none"])[unit, :SWITCHED_ON]
-            values = KM * np.vstack([before, maxima(rows["both"])[unit]])
+            before = largest_errors(rows["none"])[unit, :SWITCHED_ON]
+            values = KM * np.vstack([before, largest_errors(rows["both"])[unit]])
             at = np.arange(1, len(values) + 1)
             for axis, (label, mark) in enumerate(zip(AXES, ("o-", "s--"), strict=True)):
                 ax.plot(at, values[:, axis], mark, ms=4, lw=1.2, color=style.SERIES[axis], label=label)
@@ -47,7 +47,7 @@ def draw_curves(rows: Rows, name: str) -> str:
     minutes = np.arange(MINUTES + 1)
     with style.drawing(5.0, 2, 2, sharex=True, sharey=True) as (figure, axes):
         for row, (mode, when) in enumerate((("none", "before"), ("both", "after"))):
-            lines = KM * curves(rows[mode])[:SHOWN_UNITS]
+            lines = KM * error_curves(rows[mode])[:SHOWN_UNITS]
             for axis, label in enumerate(AXES):
                 ax = axes[row, axis]
                 for unit, colour in zip(lines, style.SERIES, strict=False):
@@ -67,7 +67,7 @@ def draw_distributions(found: Mapping[str, Rows]) -> str:
     with style.drawing(3.0, 1, len(found)) as (figure, axes):
         for ax, (name, rows) in zip(np.atleast_1d(axes), found.items(), strict=True):
             for (mode, m), colour in zip(MODES.items(), style.SERIES, strict=True):
-                worst = np.sort(maxima(rows[mode]).max(axis=-1).ravel()) * KM
+                worst = np.sort(largest_errors(rows[mode]).max(axis=-1).ravel()) * KM
                 share = np.arange(1, len(worst) + 1) / len(worst)
                 ax.step(worst, 100.0 * share, where="post", lw=1.3, color=colour, label=m.title)
             ax.axvline(KM * MILE_M, color=style.INK, lw=1.0, ls="--")
