@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw docs/img/koi.svg of docs/procedures/koi.md: what one drawn flight shows of a unit, and when. Same bytes each time.
+"""Draw docs/img/koi.svg of docs/procedures/koi.md: what a drawn flight shows of a unit, and when. Same bytes each time.
 
 tools/plots/koi.py [docs/img]
 """
