@@ -12,7 +12,7 @@ import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from itertools import islice
 from operator import length_hint
 from typing import Any, Protocol
@@ -212,6 +212,15 @@ class CanHost(AbstractContextManager["CanHost"]):
             if not self.receive(BARRIER_S):
                 raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
             self.receive_taken(count - self.received)
+
+    @contextmanager
+    def only_to(self, *listeners: Listener) -> Iterator[None]:
+        """Frames go to these alone while the block runs: a long stream costs each listener its time."""
+        others, self.listeners = self.listeners, list(listeners)
+        try:
+            yield
+        finally:
+            self.listeners = others
 
     def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus
