@@ -21,6 +21,10 @@
  * since the one before; dr3 and dV3 move by as much, which is known. Without barometer it diverges, e-fold in 9.5 min.
  * Position and velocity are the antenna's: antenna_m from the unit, l. C l and C (w x l), w of the last increment, are taken off,
  * and beta turns them in H; left out is the Earth's part of w, 0.3 mm/s for 3 m. Stops and heights are the unit's.
+ * Reopening (E0): measurements of a kind that are outliers or gated, 10 or more for reopen_s without one that is taken, whose innovations
+ * agree with the first of them (gate, both noises, and 0.5 m/s or 0.03 m/s^2 for what a wrong filter moves), are believed: standard
+ * deviations of what the kind sees (place; or velocity and attitude; or height) are multiplied by the least power of two by which the
+ * normalised innovation squared is no more than its degrees of freedom, up to 1 deg of level and 6 deg of azimuth.
  * Not modelled: more than one receiver. Units: rad, s, m, m/s, m/s^2.
  * No allocation: the caller owns the memory, one filter for one thread. Rejections as in nav.h. */
 #ifndef PSABENCH_NAV_KOI_H
@@ -72,6 +76,7 @@ enum nav_koi_reason { /* the first one that holds */
                       NAV_KOI_OUTLIER,    /* normalised innovation squared above outlier_nis */
                       NAV_KOI_GATED,      /* above gate_nis */
                       NAV_KOI_REJECTED,   /* by the filter: its covariance is not positive */
+                      NAV_KOI_REOPENED,   /* taken, after P was widened: those before it were refused for reopen_s */
                       NAV_KOI_REASONS,
 };
 
@@ -90,8 +95,8 @@ struct nav_koi_cfg {
     double stop_sd_mps, height_sd_m, damping_per_s, damping_per_s2; /* k1, k2 of the vertical channel */
     double gate_nis[2], outlier_nis, max_age_s;                     /* gates: of one scalar (height), of three */
     double antenna_m[3];                                            /* from the unit, in its axes */
-    double slow_r_sd_m[3], slow_v_sd_mps[3],
-        slow_s; /* coloured errors of the receiver; all three 0: not in the state */
+    double reopen_s;                                                /* 0: a gate that has shut stays so */
+    double slow_r_sd_m[3], slow_v_sd_mps[3], slow_s;                /* coloured errors of the receiver */
 };
 NAV_API int nav_koi_default(int unit_class, struct nav_koi_cfg *cfg); /* NAV_RANGE: no such class */
 NAV_API int nav_koi_check(const struct nav_koi_cfg *cfg, struct nav_refusal *why);
@@ -124,7 +129,7 @@ struct nav_koi_measurement {
     double t_s;             /* of the value, as far as it is known: Dt1, Dt2 are what is left */
     double value[3], sd[3]; /* 0: that of the configuration */
 };
-/* Returns a reason, 0: accepted; below zero: unknown kind. */
+/* Returns a reason, NAV_KOI_ACCEPTED and NAV_KOI_REOPENED: taken; below zero: unknown kind. */
 NAV_API int nav_koi_take(nav_koi *k, const struct nav_koi_measurement *m);
 
 /* One-off correction (довыставка), between two steps: the estimates of states i with take[i] != 0 move from the filter into the

@@ -33,6 +33,7 @@ static void set_measured(struct nav_koi_cfg *cfg, double velocity_sd_mps)
     cfg->gate_nis[1] = 16.27;
     cfg->outlier_nis = 1000.0;
     cfg->max_age_s = 0.5;
+    cfg->reopen_s = 120.0;
     cfg->slow_s = 60.0;
 }
 
@@ -116,6 +117,7 @@ static const struct check_rule rules[] = {
     REAL(antenna_m[0], -200.0, 200.0, ARM),
     REAL(antenna_m[1], -200.0, 200.0, ARM),
     REAL(antenna_m[2], -200.0, 200.0, ARM),
+    REAL(reopen_s, 0.0, 1e6, "a time, 0: never"),
     REAL(slow_r_sd_m[0], 0.0, 1e5, SD),
     REAL(slow_r_sd_m[1], 0.0, 1e5, SD),
     REAL(slow_r_sd_m[2], 0.0, 1e5, SD),
@@ -153,7 +155,8 @@ const char *nav_koi_reason_text(int reason)
                                         "later than the last increment",
                                         "an outlier",
                                         "gated",
-                                        "rejected by the filter"};
+                                        "rejected by the filter",
+                                        "taken by a widened filter"};
     return reason < 0 || reason >= NAV_KOI_REASONS ? "" : texts[reason];
 }
 

@@ -19,18 +19,23 @@ void koi_add_sensors(const struct nav_koi *k, const double *x, const unsigned ch
     for (int i = 0; i < gauge->count; i++) to->gamma[gauge->at[i]] += part(NAV_KOI_GAMMA, i);
 }
 
-/* x and P of the same errors after the autonomous velocity and place have moved: T(after) T(before)^-1. */
-static int move_map(struct nav_koi *k, const struct koi_map &before, const struct koi_map &after)
+int koi_move_errors(struct nav_koi *k, const double *a)
 {
-    double a[KOI_ERRORS * KOI_ERRORS] = {};
     double phi[KF_MAX * KF_MAX] = {}, q[KF_MAX * KF_MAX] = {};
-    for (int i = 0; i < KOI_ERRORS; i++) a[i * (KOI_ERRORS + 1)] = 1.0;
-    koi_unmap_columns(before, KOI_ERRORS, KOI_ERRORS, a);
-    koi_map_rows(after, KOI_ERRORS, a);
     for (int i = 0; i < k->dynamic; i++) phi[i * (k->n + 1)] = 1.0;
     for (int i = 0; i < KOI_ERRORS; i++)
         for (int j = 0; j < KOI_ERRORS; j++) phi[KOI_OF_ERROR[i] * k->n + KOI_OF_ERROR[j]] = a[i * KOI_ERRORS + j];
     return nav_kf_predict(&k->kf, phi, q);
+}
+
+/* x and P of the same errors after the autonomous velocity and place have moved: T(after) T(before)^-1. */
+static int move_map(struct nav_koi *k, const struct koi_map &before, const struct koi_map &after)
+{
+    double a[KOI_ERRORS * KOI_ERRORS] = {};
+    for (int i = 0; i < KOI_ERRORS; i++) a[i * (KOI_ERRORS + 1)] = 1.0;
+    koi_unmap_columns(before, KOI_ERRORS, KOI_ERRORS, a);
+    koi_map_rows(after, KOI_ERRORS, a);
+    return koi_move_errors(k, a);
 }
 
 int nav_koi_correct(nav_koi *k, const unsigned char *take)

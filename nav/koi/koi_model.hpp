@@ -20,6 +20,18 @@ struct koi_map {
     double t_per_m, east_mps, north_mps;
 };
 
+/* Rows of h, innovations by the hybrid solution and variances. */
+struct koi_rows {
+    int count;
+    double h[3 * KF_MAX], y[3], r[3];
+};
+
+/* Refused measurements of a kind, one after the other, that agree with the first of them. */
+struct koi_refused {
+    double first[3], since_s;
+    int64_t count;
+};
+
 struct nav_koi {
     struct nav_koi_cfg cfg;
     struct nav_errors_cfg errors;
@@ -43,6 +55,7 @@ struct nav_koi {
     double phi[KF_MAX * KF_MAX], q[KF_MAX * KF_MAX];
     double phi_errors[KOI_ERRORS * KF_MAX], q_errors[KOI_ERRORS * KOI_ERRORS];
     struct nav_koi_last last[NAV_KOI_KINDS];
+    struct koi_refused refused[NAV_KOI_KINDS];
     struct nav_kf kf;
 };
 
@@ -58,6 +71,11 @@ void koi_unmap_columns(const struct koi_map &m, int rows, int columns, double *a
 void koi_errors_of(const struct koi_map &m, const double *x, double errors[KOI_ERRORS]);
 struct nav_state koi_less(const struct nav_state &at, const double errors[KOI_ERRORS]);
 struct nav_state koi_hybrid(const struct nav_koi *k);
+
+/* Errors of errors.h and P by a, KOI_ERRORS square in their order. */
+int koi_move_errors(struct nav_koi *k, const double *a);
+/* Notes a measurement that is refused. True: so many have agreed for so long that P was widened until the gate is open for this one. */
+bool koi_reopen(struct nav_koi *k, int kind, double t_s, const struct koi_rows *rows);
 
 void koi_use_sensors(struct nav_koi *k); /* after a change of k->sensors */
 void koi_add_sensors(const struct nav_koi *k, const double *x, const unsigned char *take, struct nav_koi_sensors *to);

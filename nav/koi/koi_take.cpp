@@ -6,15 +6,9 @@
 namespace
 {
 
-/* Rows of h, innovations by the hybrid solution and variances. */
-struct Rows {
-    int count;
-    double h[3 * KF_MAX], y[3], r[3];
-};
-
 struct Kind {
     int values, count; /* that are read; scalars */
-    void (*find_rows)(const nav_koi *k, const nav_koi_measurement *m, Rows *rows);
+    void (*find_rows)(const nav_koi *k, const nav_koi_measurement *m, koi_rows *rows);
 };
 
 /* The hybrid solution, and the antenna by it, for a value that is late by the latencies of the state. */
@@ -66,7 +60,7 @@ void add_velocity(const nav_koi *k, const Seen &s, double factor, double *h)
 }
 
 /* What the receiver errs by for long, of the hybrid solution's innovation too. */
-void add_slow(const nav_koi *k, int block, Rows *rows)
+void add_slow(const nav_koi *k, int block, koi_rows *rows)
 {
     for (int i = 0; i < k->at[block].size; i++) {
         rows->y[i] += k->kf.x[k->at[block].offset + i];
@@ -74,7 +68,7 @@ void add_slow(const nav_koi *k, int block, Rows *rows)
     }
 }
 
-void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
+void position_rows(const nav_koi *k, const nav_koi_measurement *m, koi_rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     const earth_place place = earth_place_at(s.at.lat_rad, s.at.h_m);
@@ -92,7 +86,7 @@ void position_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
     add_slow(k, NAV_KOI_SLOW_R, rows);
 }
 
-void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
+void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, koi_rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     const int dt = k->at[NAV_KOI_DT].offset;
@@ -105,14 +99,14 @@ void velocity_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
     add_slow(k, NAV_KOI_SLOW_V, rows);
 }
 
-void stop_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
+void stop_rows(const nav_koi *k, const nav_koi_measurement *m, koi_rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     add_velocity(k, s, 1.0, rows->h);
     for (int i = 0; i < 3; i++) rows->y[i] = s.at.v_n_mps[i];
 }
 
-void height_rows(const nav_koi *k, const nav_koi_measurement *m, Rows *rows)
+void height_rows(const nav_koi *k, const nav_koi_measurement *m, koi_rows *rows)
 {
     const Seen s = see_hybrid(k, m);
     rows->y[0] = s.at.h_m - s.age_s * s.at.v_n_mps[2] - m->value[0];
@@ -154,7 +148,7 @@ int look_at(const nav_koi *k, const nav_koi_measurement *m)
 }
 
 /* Innovations one by one, and y' S^-1 y of all. */
-int find_nis(const nav_koi *k, const Rows *rows, nav_koi_last *last)
+int find_nis(const nav_koi *k, const koi_rows *rows, nav_koi_last *last)
 {
     const int count = rows->count;
     double s[9];
@@ -182,7 +176,7 @@ void damp_vertical(nav_koi *k, const nav_koi_measurement *m, double before_s)
 
 int take_rows(nav_koi *k, const nav_koi_measurement *m, nav_koi_last *last)
 {
-    Rows rows = {};
+    koi_rows rows = {};
     rows.count = kinds[m->kind].count;
     for (int i = 0; i < rows.count; i++) {
         const double sd = m->sd[i] > 0.0 ? m->sd[i] : own_sd(&k->cfg, m->kind, i);
@@ -190,15 +184,17 @@ int take_rows(nav_koi *k, const nav_koi_measurement *m, nav_koi_last *last)
     }
     kinds[m->kind].find_rows(k, m, &rows);
     if (find_nis(k, &rows, last) != NAV_OK) return NAV_KOI_REJECTED;
-    if (last->nis > k->cfg.outlier_nis) return NAV_KOI_OUTLIER;
-    if (last->nis > k->cfg.gate_nis[rows.count == 3]) return NAV_KOI_GATED;
+    const bool refused = last->nis > k->cfg.outlier_nis || last->nis > k->cfg.gate_nis[rows.count == 3];
+    if (refused && !koi_reopen(k, m->kind, m->t_s, &rows))
+        return last->nis > k->cfg.outlier_nis ? NAV_KOI_OUTLIER : NAV_KOI_GATED;
     double z[3];
     for (int i = 0; i < rows.count; i++) {
         z[i] = rows.y[i];
         for (int c = 0; c < k->n; c++) z[i] += rows.h[i * k->n + c] * k->kf.x[c];
     }
-    return nav_kf_update(&k->kf, rows.h, z, rows.r, rows.count, nullptr) == NAV_OK ? NAV_KOI_ACCEPTED
-                                                                                   : NAV_KOI_REJECTED;
+    if (nav_kf_update(&k->kf, rows.h, z, rows.r, rows.count, nullptr) != NAV_OK) return NAV_KOI_REJECTED;
+    k->refused[m->kind].count = 0;
+    return refused ? NAV_KOI_REOPENED : NAV_KOI_ACCEPTED;
 }
 
 } // namespace
@@ -215,6 +211,8 @@ int nav_koi_take(nav_koi *k, const struct nav_koi_measurement *m)
     if (reason == NAV_KOI_ACCEPTED) {
         last->nis_sum += last->nis;
         last->nis_dof += kinds[m->kind].count;
+    }
+    if (reason == NAV_KOI_ACCEPTED || reason == NAV_KOI_REOPENED) {
         if (m->kind == NAV_KOI_HEIGHT) damp_vertical(k, m, last->accepted_s);
         last->accepted_s = m->t_s;
     }

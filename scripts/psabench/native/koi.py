@@ -62,6 +62,7 @@ class Reason(IntEnum):
     OUTLIER = 7
     GATED = 8
     REJECTED = 9
+    REOPENED = 10  # taken, after P was widened
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ from psabench.native.sinslib import InnovationStruct, RowsStruct
 _D, _I, _L, _P, _V = c.c_double, c.c_int, c.c_int64, c.POINTER, c.c_void_p
 _DOUBLES = _P(_D)
 BLOCKS = ("dr", "dV", "alpha", "beta3", "vertical", "baro", "slow_r", "slow_v", "nu", "df", "gamma", "theta", "dt")
-KINDS, REASONS = 4, 10
+KINDS, REASONS = 4, 11
 ROW = 15
 
 
@@ -37,7 +37,9 @@ class KoiConfigStruct(c.Structure):
         *_named_doubles("stop_sd_mps", "height_sd_m", "damping_per_s", "damping_per_s2"),
         ("gate_nis", _D * 2),
         *_named_doubles("outlier_nis", "max_age_s"),
-        *[(name, _D * 3) for name in ("antenna_m", "slow_r_sd_m", "slow_v_sd_mps")],
+        ("antenna_m", _D * 3),
+        ("reopen_s", _D),
+        *[(name, _D * 3) for name in ("slow_r_sd_m", "slow_v_sd_mps")],
         ("slow_s", _D),
     ]
 

@@ -1,4 +1,4 @@
-"""`psabench run koi-season`, `koi replay`: short flights over the wire, a passport that grows, programs that are ended."""
+"""`psabench run koi-season`, `koi replay`: short flights over the wire, a passport that grows, programs that end."""
 
 from __future__ import annotations
 

@@ -193,10 +193,11 @@ def test_a_flight_without_alignment_or_place_is_an_error() -> None:
         host.push(d.angle[50_000:60_000], d.speed[50_000:60_000])
 
 
-@pytest.mark.parametrize("gauge", [0, 1])
-def test_sensors_by_name(gauge: int) -> None:
+@pytest.mark.parametrize(("gauge", "slow_mps"), [(0, 0.0), (1, 0.0), (0, 0.1)])
+def test_sensors_by_name(gauge: int, slow_mps: float) -> None:
     cfg = koi_default()
     cfg.gauge = gauge
+    cfg.slow_v_sd_mps[:] = [slow_mps] * 3
     names, rows = sensor_names(cfg), sensor_rows(cfg)
     assert len(state_names(cfg)) == koi_layout(cfg)["dt"].stop
     assert state_names(cfg)[rows] == names

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from psabench.koi.take_off import Decision, TakeOffDetector, Taxi, decide_correction, taxi_of
-from psabench.koi.trust import Evidence, Gate
+from psabench.koi.trust import Evidence, Gate, TrustLimits, trust_weight
 from psabench.link.signals import Floats
 
 NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
@@ -108,9 +108,9 @@ def decide_with(taxi: Taxi = TAXI, **changes: object) -> Decision:
             {"gates": GATES | {"position": replace(GOOD, gated=30)}},
             "expected at most 5% of position outside its gate, got 9.1%",
         ),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "of 0.1 to 1.3, got 2.00"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=45.0)}}, "of 0.1 to 1.3, got 0.05"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "of 0.1 to 1.3, got nan"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "of 0.02 to 1.3, got 2.00"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=9.0)}}, "of 0.02 to 1.3, got 0.01"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "of 0.02 to 1.3, got nan"),
         ({"x": np.append(np.full(9, 1.0), -9.0)}, "of their priors, got 4.5 for nu3"),
         ({"x": np.full(10, np.nan)}, "expected finite estimates, got one that is not for dr1"),
         ({"sd": PRIOR * 0.8}, "expected a heading known to 0.7 of its prior, got 0.80"),
@@ -143,3 +143,19 @@ def test_a_heading_that_is_no_state_is_rejected() -> None:
 def test_evidence_of_other_lengths_than_its_names_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"evidence of a filter: expected 10 numbers, got \(9,\)"):
         replace(EVIDENCE, sd=np.ones(9))
+
+
+@pytest.mark.parametrize(
+    ("changes", "weight"),
+    [
+        ({"gated": 0}, 1.0),
+        ({"gated": 0, "nis_sum": 450.0}, 1.0),  # smaller than expected: no more than whole
+        ({"gated": 0, "nis_sum": 1125.0}, 0.8),
+        ({"taken": 294, "gated": 6}, 1.0 - 0.02 / 0.1),
+        ({"taken": 294, "gated": 6, "nis_sum": 1125.0}, 0.8 * 0.8),
+    ],
+)
+def test_a_flight_is_worth_what_its_measurements_are(changes: dict[str, float], weight: float) -> None:
+    usual = replace(GOOD, gated=0, nis_sum=900.0)
+    gates = {"position": usual, "velocity": replace(usual, **changes)}  # type: ignore[arg-type]
+    assert trust_weight(gates, TrustLimits()) == pytest.approx(weight, rel=1e-12)
