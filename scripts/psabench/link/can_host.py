@@ -12,7 +12,7 @@ import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from itertools import islice
 from operator import length_hint
 from typing import Any, Protocol
@@ -115,8 +115,8 @@ class StepClock:
 
         Raises TimeOut where it would move it past the deadline, or has brought it there.
         """
-        self._send(hosts := self._hosts or ([] if host is None else [host]), name, args)
-        reply = self._control.wait_reply(name)
+        hosts = self._hosts or ([] if host is None else [host])
+        reply = self._control.call(name, **self._run_args(hosts, args))
         self._t_ns = reply.t_ns
         for h, count in zip(hosts, self._counts(reply), strict=False):
             _receive_all(h, count)
@@ -125,7 +125,7 @@ class StepClock:
 
     def start_run(self, dwell_s: float) -> None:
         """Let time pass while this program does something else, which sends nothing; `finish_run` waits for its end."""
-        self._send(self._hosts, "run", {"for_s": dwell_s})
+        self._control.send("run", **self._run_args(self._hosts, {"for_s": dwell_s}))
 
     def finish_run(self) -> list[int]:
         """Time is where `start_run` brings it. Returns how many frames each of the hosts has got by then.
@@ -137,11 +137,12 @@ class StepClock:
         self._check_deadline()
         return self._counts(reply)
 
-    def _send(self, hosts: Sequence[CanHost], name: str, args: dict[str, object]) -> None:
+    def _run_args(self, hosts: Sequence[CanHost], args: dict[str, object]) -> dict[str, object]:
+        """Not beyond the deadline, and not before the emulator has our frames."""
         if "for_s" in args:
             args["for_s"] = max(0.0, min(float(str(args["for_s"])), round(self.deadline_s - self.now_s(), 9)))
         # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
-        self._control.send(name, **args, after_tx=self._base_tx + sum(h.sent for h in hosts))
+        return args | {"after_tx": self._base_tx + sum(h.sent for h in hosts)}
 
     def _check_deadline(self) -> None:
         if self.now_s() >= self.deadline_s:
@@ -212,6 +213,15 @@ class CanHost(AbstractContextManager["CanHost"]):
             if not self.receive(BARRIER_S):
                 raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
             self.receive_taken(count - self.received)
+
+    @contextmanager
+    def only_to(self, *listeners: Listener) -> Iterator[None]:
+        """Frames go to these alone while the block runs: a long stream costs each listener its time."""
+        others, self.listeners = self.listeners, list(listeners)
+        try:
+            yield
+        finally:
+            self.listeners = others
 
     def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus

@@ -146,14 +146,14 @@ class IncrementGrid:
         self._next += n
         self.counts.filled += n - len(rows)
         dtheta, dv = (
-            values[kept] if n == len(rows) else _filled(before, values[kept], rows)
+            values[kept] if n == len(rows) else _fill_rows(before, values[kept], rows)
             for before, values in zip(self._last, (got.dtheta_rad, got.dv_mps), strict=True)
         )
         self._last = dtheta[-1], dv[-1]
         return GridRows(first, dtheta, dv, source)
 
 
-def _filled(before: Floats, values: Floats, rows: Ints) -> Floats:
+def _fill_rows(before: Floats, values: Floats, rows: Ints) -> Floats:
     """A line through the row before and the known ones."""
     known, at = np.concatenate([before[None], values]), np.concatenate([[-1], rows])
     return np.stack([np.interp(np.arange(rows[-1] + 1), at, known[:, i]) for i in range(3)], axis=1)

@@ -72,17 +72,11 @@ class LiveFlight:
 
     def fly(self, feed: FlightFeed, recorder: FlightRecorder, for_s: float, advance: Callable[[float], None]) -> None:
         """Until it has landed, or for_s. Ctrl-C ends it as well; what has come is in the recording."""
-        host = self._bench.host
         with ExitStack() as stack:
-            for unit in self._bench.units.values():  # their own readers would look at each frame, too
-                host.listeners.remove(unit.frames.on_message)
-                stack.callback(host.listeners.append, unit.frames.on_message)
-            for listener in (recorder.on_message, feed.on_message):
-                host.listeners.append(listener)
-                stack.callback(host.listeners.remove, listener)
+            stack.callback(self._unit.stop)
+            stack.enter_context(self._bench.host.only_to(recorder.on_message, feed.on_message))
             self._port.take()  # what came before belongs to no time
             self._unit.start()
-            stack.callback(self._unit.stop)
             begin_s, shown_s = self._bench.time_s, 0.0
             for look in stack.enter_context(closing(self._looks(recorder))):
                 feed.look(look)

@@ -112,7 +112,7 @@ def _place_at(truth: FlightTruth, at_s: Floats) -> tuple[Floats, Floats]:
     step = truth.t_s[k + 1] - truth.t_s[k]
     s = ((at_s - truth.t_s[k]) / step)[:, None]
     value = np.stack([truth.lat_rad, truth.lon_rad, truth.h_m], axis=1)
-    rate = _rates(truth)
+    rate = _place_rates(truth)
     begin, end, r0, r1 = value[k], value[k + 1], rate[k] * step[:, None], rate[k + 1] * step[:, None]
     place = (
         begin * (2 * s**3 - 3 * s**2 + 1)
@@ -124,7 +124,7 @@ def _place_at(truth: FlightTruth, at_s: Floats) -> tuple[Floats, Floats]:
     return place, speed
 
 
-def _rates(truth: FlightTruth) -> Floats:
+def _place_rates(truth: FlightTruth) -> Floats:
     """Of latitude, longitude, height; WGS 84."""
     sin2 = np.sin(truth.lat_rad) ** 2
     w = np.sqrt(1.0 - E2 * sin2)
