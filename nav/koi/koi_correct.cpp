@@ -41,7 +41,7 @@ static int move_map(struct nav_koi *k, const struct koi_map &before, const struc
 int nav_koi_correct(nav_koi *k, const unsigned char *take)
 {
     if (k->in_step) return NAV_TIMES;
-    double x[KF_MAX], errors[KOI_ERRORS];
+    double x[KF_MAX] = {}, errors[KOI_ERRORS];
     for (int i = 0; i < k->n; i++) x[i] = take[i] ? k->kf.x[i] : 0.0;
     for (const int block : {NAV_KOI_BARO, NAV_KOI_SLOW_R, NAV_KOI_SLOW_V, NAV_KOI_DT}) /* not of the unit */
         for (int i = 0; i < k->at[block].size; i++) x[k->at[block].offset + i] = 0.0;

@@ -9,7 +9,7 @@ namespace
 {
 
 constexpr int LEAST_COUNT = 10;
-constexpr double WIDEST = 1 << 20;
+constexpr int MOST_POWER = 20;
 
 /* Standard deviations that widening does not pass (E0): beyond them errors are not of first order. In the order of enum koi_moving. */
 const double limits[KOI_MOVING] = {1e5, 1e5, 100.0, 100.0, 0.02, 0.02, 0.1, 1e4, 100.0};
@@ -95,8 +95,8 @@ bool koi_reopen(nav_koi *k, int kind, double t_s, const koi_rows *rows)
     run.count++;
     if (k->cfg.reopen_s <= 0.0 || t_s - run.since_s < k->cfg.reopen_s || run.count < LEAST_COUNT) return false;
     double factors[KOI_MOVING];
-    for (double by = 2.0; by <= WIDEST; by *= 2.0) {
-        find_factors(k, kind, t_s, by, factors);
+    for (int power = 1; power <= MOST_POWER; power++) {
+        find_factors(k, kind, t_s, (double)(1 << power), factors);
         if (nis_with(k, rows, factors) <= rows->count) return widen(k, factors);
     }
     return false;
