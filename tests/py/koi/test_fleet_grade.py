@@ -122,6 +122,19 @@ def test_a_row_has_what_the_flight_had() -> None:
     assert value(row, "heading_sd_arcmin") == pytest.approx(math.degrees(found.sd[k // 10, 6]) * 60.0, rel=0.2)
 
 
+def test_estimates_of_what_is_corrected_become_smaller() -> None:
+    """The article's own evidence, over six units; of a flight that is not corrected there are none."""
+    found, row = fly(1, "dov")
+    k = found.names.index("beta3")
+    assert found.x_take_off is not None
+    assert value(row, "estimate_take_off") > abs(found.x_take_off[k]) / found.sd[0][k] / math.sqrt(len(found.names))
+    assert math.isnan(value(fly(1, "none")[1], "estimate_end"))
+    rows = np.array([fly(unit, "dov")[1] for unit in range(6)])
+    before, after = (np.sqrt(np.mean(rows[:, COLUMNS.index(f"estimate_{at}")] ** 2)) for at in ("take_off", "end"))
+    print(f"before {before:.2f}, after {after:.2f}")
+    assert after < 0.8 * before
+
+
 @pytest.mark.parametrize("condition", ["outage", "spoof", "late", "lever"])
 def test_what_is_not_touched_errs_the_same_whatever_the_receiver_does(condition: str) -> None:
     """Why the mode `none` has one series for all conditions."""

@@ -57,6 +57,8 @@ class FilterFigures:
     heading_error_arcmin: float  # of the autonomous solution at take-off, rms
     nees: Number  # mean over its degrees of freedom
     nees_within: Number
+    before: float  # estimates of what is corrected, at take-off and at the end, by the prior: rms, mode `dov`
+    after: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,8 +129,9 @@ def mode_figures(rows: Rows, mode: str, seed: int) -> ModeFigures:
     )
 
 
-def filter_figures(rows: Floats, seed: int) -> FilterFigures:
-    """Of one mode."""
+def filter_figures(by_mode: Rows, seed: int) -> FilterFigures:
+    """Of the mode `both`; of what довыставка corrects those of `dov`, where nothing is known before."""
+    rows = by_mode["both"]
     means = {
         name: float(pick_column(rows, f"{name}_arcmin").mean())
         for name in ("heading_sd_aligned", "level_sd_aligned", "heading_sd", "level_sd")
@@ -141,7 +144,15 @@ def filter_figures(rows: Floats, seed: int) -> FilterFigures:
         heading_error_arcmin=float(np.sqrt(np.mean(pick_column(rows, "heading_error_arcmin") ** 2))),
         nees=_mean_nees(rows, "nees", seed),
         nees_within=_mean_nees(rows, "nees_within", seed),
+        before=_rms_of(pick_column(by_mode["dov"], "estimate_take_off")),
+        after=_rms_of(pick_column(by_mode["dov"], "estimate_end")),
     )
+
+
+def _rms_of(values: Floats) -> float:
+    """Of those that are numbers."""
+    kept = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(kept**2))) if kept.size else float("nan")
 
 
 def _mean_nees(rows: Floats, name: str, seed: int) -> Number:

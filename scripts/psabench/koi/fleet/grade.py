@@ -48,6 +48,8 @@ SCALARS = (
     "nees_within_dof",
     "corrected",
     "weight",
+    "estimate_take_off",  # rms of what is corrected of attitude and sensors, by the prior's standard deviations
+    "estimate_end",  # the same at the end of the flight; both not a number without a correction
     "reasons",  # a bit for each of REASONS
     "left_nu12_degph",  # of the persistent errors, what the passport does not know after the flight
     "left_nu3_degph",
@@ -80,6 +82,7 @@ def grade_flight(found: FlightFound, truth: Against, known: Knowledge | None) ->
         **_nees_numbers(found, off),
         "corrected": float(found.corrected),
         "weight": found.estimate.weight,
+        **_estimate_numbers(found),
         "reasons": float(reason_bits(found)),
         **_left_numbers(known, truth.stays),
     }
@@ -173,6 +176,18 @@ def _attitude_numbers(found: FlightFound, truth: Against) -> dict[str, float]:
         "level_sd_arcmin": float(sd[level]),
         "heading_error_arcmin": float(moving_errors(found.autonomous[after], true)[6]) / ARCMIN,
     }
+
+
+COMPENSATED = ("alpha", "beta3", "nu", "df", "gamma", "theta")
+
+
+def _estimate_numbers(found: FlightFound) -> dict[str, float]:
+    """Before and after, of the same states: the article's own evidence for the correction."""
+    if not found.corrected or found.decision is None or found.x_take_off is None:
+        return {"estimate_take_off": math.nan, "estimate_end": math.nan}
+    taken = found.decision.take & np.array([name.startswith(COMPENSATED) for name in found.names])
+    sizes = {"estimate_take_off": found.x_take_off, "estimate_end": found.x}
+    return {name: float(np.sqrt(np.mean((x / found.sd[0])[taken] ** 2))) for name, x in sizes.items()}
 
 
 def _left_numbers(known: Knowledge | None, stays: Errors) -> dict[str, float]:

@@ -87,7 +87,7 @@ def gather_report(fleet: Fleet, store: Store, predicted: Predicted) -> Report:
         fleet=fleet,
         rows=rows,
         modes=modes,
-        filters={n: filter_figures(r["both"], fleet.seed) for n, r in rows.items()},
+        filters={n: filter_figures(r, fleet.seed) for n, r in rows.items()},
         harms=harms,
         reasons=reasons,
         predicted=predicted,
@@ -136,6 +136,8 @@ def filter_table(r: Report) -> list[list[str]]:
         ("levels at take-off, sd, '", [f"{f.level_arcmin:.2f}" for f in r.filters.values()]),
         ("squared error by covariance, a state", [f.nees.text() for f in r.filters.values()]),
         ("the same, no place and delays", [f.nees_within.text() for f in r.filters.values()]),
+        ("estimates of what is corrected, at take-off, rms by prior", [f"{f.before:.2f}" for f in r.filters.values()]),
+        ("the same at the end of the flight", [f"{f.after:.2f}" for f in r.filters.values()]),
     )
     return [["", *names], *([what, *values] for what, values in lines)]
 
