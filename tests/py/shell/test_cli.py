@@ -28,7 +28,7 @@ MISTAKES: list[tuple[str, str]] = [
     (
         "run",
         "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, sins-covariance, "
-        "sins-snake, sins-calibration-secondary, thermal, gyrocompass, heading-hold or script",
+        "sins-snake, sins-calibration-secondary, koi-flight, koi-season, thermal, gyrocompass, heading-hold or script",
     ),
     ("run --out turns", "run: expected turns"),
     ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, "),
