@@ -32,7 +32,8 @@ TABLE = re.compile(r"(?<=<!-- koi_fleet: )(\w+)( -->\n)```\n.*?```\n", re.DOTALL
 def load_report(folder: Path, *, covariance: bool) -> page.Report:
     """Of a finished campaign. Raises BadInput where it is not, or was computed by another build."""
     told = json.loads((folder / "result.json").read_text(encoding="utf-8"))["fleet"]
-    fleet = Fleet(**{name: tuple(x) if isinstance(x, list) else x for name, x in told.items()})
+    told |= {name: tuple(told[name]) for name in ("classes", "conditions")}
+    fleet = Fleet(**told)
     with Store(folder / "store.sqlite") as store:
         if missing := list_missing(fleet, store):
             raise BadInput(expected("all seasons of this build", f"{len(missing)} missing", folder))
