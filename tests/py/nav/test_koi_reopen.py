@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from koi_flight import LEGS, Drawn, Truth, error_between, errors_of, with_errors
+from koi_flight import LEGS, Drawn, Floats, Truth, error_between, errors_of, with_errors
 from psabench.native.flight_model import Flight
 from psabench.native.koi import Kind, Koi, Reason, koi_default, koi_layout, koi_prior
 from psabench.native.nav import Refused
