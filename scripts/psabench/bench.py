@@ -343,6 +343,11 @@ class Bench(AbstractContextManager["Bench"]):
             self._clock.command(None, "run", for_s=slice_s)
 
     @property
+    def step_clock(self) -> StepClock | None:
+        """Of a bench in step pace whose frames are counted: its time may be moved ahead (`StepClock.start_run`)."""
+        return self._clock if isinstance(self._clock, StepClock) and self._clock.in_bulk else None
+
+    @property
     def _serial(self) -> bool:
         """Whether frames come through a serial line, which holds few of them."""
         return any(isinstance(h.bus, slcanBus) for h in self.hosts.values())

@@ -31,6 +31,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "conform": ("conform.command", "check a board, a recording or a host program against the requirements"),
     "report": ("report.diff_command", "compare the results of two runs"),
     "passport": ("passport.command", "keep what was measured of each instrument: passports in one file"),
+    "koi": ("koi.command", "fly recorded flights of a unit with a satellite receiver again"),
     "nav": ("sins.command", "apply the calibration of an inertial unit to a recording, or export it"),
     "explore": ("explore.command", "play random schedules of faults and host behaviours, and check the requirements"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),

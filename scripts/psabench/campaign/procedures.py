@@ -15,6 +15,10 @@ CAMPAIGNS: Mapping[str, tuple[str, str]] = {
         "quartz.deformation_command",
         "deformation of a quartz accelerometer's sensing element over temperature, with tolerances",
     ),
+    "koi": (
+        "koi.fleet.command",
+        "strapdown units that fly with a satellite receiver: correction at take-off, learning from flights",
+    ),
     "sins-methods": (
         "campaign.sins_methods_command",
         "a strapdown unit calibrated on a rate table by six positions, by Fourier series and by the filter",

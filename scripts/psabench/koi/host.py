@@ -148,7 +148,7 @@ class FlightHost:
         if at_rest:
             koi.take(Kind.STOP, self.t_s)
         self._series.add(self.t_s, autonomous, hybrid, koi)
-        if self._take_off_s is None and self._take_off.take(self.t_s, speed_mps):
+        if self._take_off_s is None and self._take_off.take(self.t_s, speed_mps, float(hybrid[5])):
             self._leave_ground(koi)
 
     # ---- alignment

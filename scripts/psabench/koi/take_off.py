@@ -28,19 +28,39 @@ class TakeOffLimits:
     slow_mps: float = 20.0
     samples: int = 3  # valid ones in a row, slow as well as fast: an outlier of the receiver is no take-off
     longest_s: float = 120.0  # since it was slow
+    climb_mps: float = 2.0  # of an aircraft that has left the ground: the run shows the heading, so it is waited for
+    climb_samples: int = 2  # in a row
+    wait_s: float = 40.0  # longest, for that
 
 
 @dataclass
 class TakeOffDetector:
-    """Fed with the ground speed of the receiver, sample by sample."""
+    """Fed with ground speed and rate of climb, sample by sample."""
 
     limits: TakeOffLimits = field(default_factory=TakeOffLimits)
     _slow: tuple[float, float] | None = None  # last time and speed below slow_mps, of enough samples in a row
     _slow_count: int = 0
     _fast_count: int = 0
+    _run_s: float | None = None  # since when it is a run
+    _climb_count: int = 0
 
-    def take(self, t_s: float, speed_mps: float, *, valid: bool = True) -> bool:
-        """Whether the aircraft takes off at this sample: true once a run."""
+    def take(self, t_s: float, speed_mps: float, climb_mps: float, *, valid: bool = True) -> bool:
+        """Whether the aircraft has left the ground at this sample: true once a run."""
+        if self._runs(t_s, speed_mps, valid=valid):
+            self._run_s, self._climb_count = t_s, 0
+        if self._run_s is None:
+            return False
+        if valid and speed_mps < self.limits.slow_mps:
+            self._run_s = None  # it has stopped again
+            return False
+        self._climb_count = self._climb_count + 1 if valid and climb_mps >= self.limits.climb_mps else 0
+        if self._climb_count < self.limits.climb_samples and t_s - self._run_s < self.limits.wait_s:
+            return False
+        self._run_s = None
+        return True
+
+    def _runs(self, t_s: float, speed_mps: float, *, valid: bool) -> bool:
+        """Whether a run is seen at this sample: true once a run."""
         if not valid or not math.isfinite(speed_mps):
             self._slow_count = self._fast_count = 0
             return False

@@ -51,7 +51,7 @@ class TrustLimits:
     alone_s: float = 5.0
     taken: int = 60  # measurements of each kind
     gated_share: float = 0.05
-    nis_mean: tuple[float, float] = (0.1, 1.3)  # of the taken ones, by degree of freedom
+    nis_mean: tuple[float, float] = (0.02, 1.3)  # of the taken ones; a receiver may be better than it says
     sigmas: float = 4.0  # of an estimate by its prior
 
 

@@ -12,7 +12,7 @@ import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from itertools import islice
 from operator import length_hint
 from typing import Any, Protocol
@@ -115,18 +115,42 @@ class StepClock:
 
         Raises TimeOut where it would move it past the deadline, or has brought it there.
         """
+        hosts = self._hosts or ([] if host is None else [host])
+        reply = self._control.call(name, **self._run_args(hosts, args))
+        self._t_ns = reply.t_ns
+        for h, count in zip(hosts, self._counts(reply), strict=False):
+            _receive_all(h, count)
+        self._check_deadline()
+        return reply
+
+    def start_run(self, dwell_s: float) -> None:
+        """Let time pass while this program does something else, which sends nothing; `finish_run` waits for its end."""
+        self._control.send("run", **self._run_args(self._hosts, {"for_s": dwell_s}))
+
+    def finish_run(self) -> list[int]:
+        """Time is where `start_run` brings it. Returns how many frames each of the hosts has got by then.
+
+        They are taken by `CanHost.receive_up_to`: those of a next run may already be behind them.
+        """
+        reply = self._control.wait_reply("run")
+        self._t_ns = reply.t_ns
+        self._check_deadline()
+        return self._counts(reply)
+
+    def _run_args(self, hosts: Sequence[CanHost], args: dict[str, object]) -> dict[str, object]:
+        """Not beyond the deadline, and not before the emulator has our frames."""
         if "for_s" in args:
             args["for_s"] = max(0.0, min(float(str(args["for_s"])), round(self.deadline_s - self.now_s(), 9)))
-        hosts = self._hosts or ([] if host is None else [host])
         # after_tx: what we have sent takes another way than this command, and must not be overtaken by it
-        after_tx = self._base_tx + sum(h.sent for h in hosts)
-        reply = self._control.call(name, **args, after_tx=after_tx)
-        self._t_ns = reply.t_ns
-        for h, delivered, base in zip(hosts, self._delivered(reply), self._base_rx, strict=False):
-            _receive_all(h, delivered - base)
+        return args | {"after_tx": self._base_tx + sum(h.sent for h in hosts)}
+
+    def _check_deadline(self) -> None:
         if self.now_s() >= self.deadline_s:
             raise TimeOut(f"simulated time ends at {self.deadline_s:.6g} s")
-        return reply
+
+    def _counts(self, reply: Reply) -> list[int]:
+        """Frames that our hosts have got by then, since they came."""
+        return [delivered - base for delivered, base in zip(self._delivered(reply), self._base_rx, strict=False)]
 
     def _delivered(self, reply: Reply) -> list[int]:
         """Frames handed to each of our hosts so far."""
@@ -177,11 +201,27 @@ class CanHost(AbstractContextManager["CanHost"]):
         self._hand_on(message)
         return True
 
-    def receive_taken(self) -> None:
+    def receive_taken(self, most: int | None = None) -> None:
         """What came together with the last frame, where the bus takes many at once."""
         if isinstance(self.bus, SocketcandBus) and self.bus.filters is None:
-            for message in self.bus.taken():
+            for message in self.bus.taken(most):
                 self._hand_on(message)
+
+    def receive_up_to(self, count: int) -> None:
+        """Until so many frames have come, and none beyond them. Raises LinkError when they do not."""
+        while (missing := count - self.received) > 0:
+            if not self.receive(BARRIER_S):
+                raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
+            self.receive_taken(count - self.received)
+
+    @contextmanager
+    def only_to(self, *listeners: Listener) -> Iterator[None]:
+        """Frames go to these alone while the block runs: a long stream costs each listener its time."""
+        others, self.listeners = self.listeners, list(listeners)
+        try:
+            yield
+        finally:
+            self.listeners = others
 
     def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus

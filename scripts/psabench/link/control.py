@@ -54,12 +54,20 @@ class Control(AbstractContextManager["Control"]):
 
     def call(self, command: str, /, **args: object) -> Reply:
         """Send one command and wait for its reply."""
+        self.send(command, **args)
+        return self.wait_reply(command)
+
+    def send(self, command: str, /, **args: object) -> None:
+        """Send one command; `wait_reply` has what it answers."""
         self._id += 1
         request = {"id": self._id, "cmd": command, "args": args}
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
         except OSError as e:
             raise LinkError(f"control socket: {command}: connection lost ({e.strerror or e})") from e
+
+    def wait_reply(self, command: str) -> Reply:
+        """Of the command that was sent last."""
         while True:
             line = self._line(command, REPLY_S)
             try:

@@ -26,8 +26,10 @@ class SocketcandBus(SocketCanDaemonBus):
         self._rest = ""  # of a line that is not all there yet
         super().__init__(**options)  # type: ignore[no-untyped-call]
 
-    def taken(self) -> list[can.Message]:
-        """The frames that the last look at the socket has brought and no one has received."""
+    def taken(self, most: int | None = None) -> list[can.Message]:
+        """The frames that the last look at the socket has brought and no one has received, so many at most."""
+        if most is not None and most < len(self._came):
+            return [self._came.popleft() for _ in range(most)]
         came = list(self._came)
         self._came.clear()
         return came
@@ -51,17 +53,17 @@ class SocketcandBus(SocketCanDaemonBus):
     def _frame(self, line: str) -> can.Message | None:
         """A line without its end. None, with a warning, for what is no frame."""
         words = line.split()
-        if words[:2] != ["<", "frame"] or not 4 <= len(words) <= 5:
-            message = convert_ascii_message_to_can_message(line.strip() + " >")
-        else:
+        if 4 <= len(words) <= 5 and words[1] == "frame" and words[0] == "<":
             data = bytearray.fromhex(words[4]) if len(words) == 5 else bytearray()
-            message = can.Message(
+            return can.Message(
                 timestamp=float(words[3]),
                 arbitration_id=int(words[2], 16),
                 data=data,
                 dlc=len(data),
                 is_extended_id=len(words[2]) != 3,
+                channel=self.channel,
             )
+        message = convert_ascii_message_to_can_message(line.strip() + " >")
         if message is not None:
             message.channel = self.channel
         return message

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from psabench.koi.take_off import Decision, TakeOffDetector, Taxi, decide_correction, taxi_of
-from psabench.koi.trust import Evidence, Gate
+from psabench.koi.trust import Evidence, Gate, TrustLimits, trust_weight
 from psabench.link.signals import Floats
 
 NAMES = ("dr1", "dr2", "dV1", "dV2", "alpha1", "alpha2", "beta3", "nu1", "nu2", "nu3")
@@ -27,9 +27,12 @@ TAXI = Taxi(turns=3, stops=2)
 
 
 def detect_runs(t_s: Floats, speed_mps: Floats, valid: Floats | None = None) -> list[float]:
+    """Where an aircraft that climbs all the time is seen to take off, one sample after its run is."""
     d = TakeOffDetector()
     ok = np.ones(len(t_s)) if valid is None else valid
-    return [float(t) for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, valid=bool(good))]
+    return [
+        float(t) - 1.0 for t, v, good in zip(t_s, speed_mps, ok, strict=True) if d.take(t, v, 5.0, valid=bool(good))
+    ]
 
 
 def test_a_run_is_seen_once_and_a_taxi_never() -> None:
@@ -54,6 +57,21 @@ def test_outliers_of_the_receiver_are_no_take_off() -> None:
     assert detect_runs(t, speed, valid) == []
     speed[100:104] = [40.0, 41.0, 42.0, 43.0]
     assert detect_runs(t, speed, valid) == [102.0]
+
+
+def take_offs(climb_mps: Floats, speed_mps: Floats) -> list[float]:
+    d = TakeOffDetector()
+    return [float(t) for t, (v, c) in enumerate(zip(speed_mps, climb_mps, strict=True)) if d.take(float(t), v, c)]
+
+
+def test_a_take_off_is_when_it_has_left_the_ground() -> None:
+    t = np.arange(0.0, 200.0)
+    speed = np.clip(4.0 * (t - 100.0), 2.0, 85.0)  # 40 m/s at 110 s
+    assert take_offs(np.where(t < 125.0, 0.0, 3.0), speed) == [126.0]
+    assert take_offs(np.where((t == 118.0) | (t > 130.0), 3.0, 0.0), speed) == [132.0]  # one sample is noise
+    assert take_offs(np.zeros(200), speed) == [112.0 + 40.0]  # a climb that is never seen
+    stopped = np.where(t < 120.0, speed, np.maximum(80.0 - 4.0 * (t - 120.0), 0.0))
+    assert take_offs(np.zeros(200), stopped) == []  # a run that was broken off
 
 
 def test_turns_and_stops_of_a_taxi() -> None:
@@ -90,9 +108,9 @@ def decide_with(taxi: Taxi = TAXI, **changes: object) -> Decision:
             {"gates": GATES | {"position": replace(GOOD, gated=30)}},
             "expected at most 5% of position outside its gate, got 9.1%",
         ),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "of 0.1 to 1.3, got 2.00"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=45.0)}}, "of 0.1 to 1.3, got 0.05"),
-        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "of 0.1 to 1.3, got nan"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=1800.0)}}, "of 0.02 to 1.3, got 2.00"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=9.0)}}, "of 0.02 to 1.3, got 0.01"),
+        ({"gates": GATES | {"position": replace(GOOD, nis_sum=float("nan"))}}, "of 0.02 to 1.3, got nan"),
         ({"x": np.append(np.full(9, 1.0), -9.0)}, "of their priors, got 4.5 for nu3"),
         ({"x": np.full(10, np.nan)}, "expected finite estimates, got one that is not for dr1"),
         ({"sd": PRIOR * 0.8}, "expected a heading known to 0.7 of its prior, got 0.80"),
@@ -125,3 +143,19 @@ def test_a_heading_that_is_no_state_is_rejected() -> None:
 def test_evidence_of_other_lengths_than_its_names_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"evidence of a filter: expected 10 numbers, got \(9,\)"):
         replace(EVIDENCE, sd=np.ones(9))
+
+
+@pytest.mark.parametrize(
+    ("changes", "weight"),
+    [
+        ({"gated": 0}, 1.0),
+        ({"gated": 0, "nis_sum": 450.0}, 1.0),  # smaller than expected: no more than whole
+        ({"gated": 0, "nis_sum": 1125.0}, 0.8),
+        ({"taken": 294, "gated": 6}, 1.0 - 0.02 / 0.1),
+        ({"taken": 294, "gated": 6, "nis_sum": 1125.0}, 0.8 * 0.8),
+    ],
+)
+def test_a_flight_is_worth_what_its_measurements_are(changes: dict[str, float], weight: float) -> None:
+    usual = replace(GOOD, gated=0, nis_sum=900.0)
+    gates = {"position": usual, "velocity": replace(usual, **changes)}  # type: ignore[arg-type]
+    assert trust_weight(gates, TrustLimits()) == pytest.approx(weight, rel=1e-12)

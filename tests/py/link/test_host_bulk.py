@@ -100,3 +100,29 @@ def test_a_wait_in_bulk_ends_where_quantum_after_quantum_ends(monkeypatch: pytes
             seen.append((got, len(calls)))
     assert seen[0][0] == seen[1][0]
     assert seen[0][1] * 2 < seen[1][1]
+
+
+def test_a_step_ahead_gives_each_step_its_own_frames() -> None:
+    """Where the emulator has made two steps, the frames of the first are received, and none of the second."""
+    steps_s = (0.010, 0.0007, 0.2, 0.003, 0.05, 0.02)
+    seen = []
+    for ahead in (False, True):
+        with Bench.start("stream", seed=3) as bench:
+            clock, came, counts = bench.step_clock, list[can.Message](), list[int]()
+            assert clock is not None
+            bench.unit.start()
+            with bench.host.only_to(came.append):
+                for pair in zip(steps_s[::2], steps_s[1::2], strict=True):
+                    due = []
+                    for step_s in pair if ahead else ():
+                        clock.start_run(step_s)
+                        due += clock.finish_run()
+                    for k, step_s in enumerate(pair):
+                        if ahead:
+                            bench.host.receive_up_to(due[k])
+                        else:
+                            bench.run_for(step_s)
+                        counts.append(len(came))
+            seen.append(([(m.timestamp, bytes(m.data)) for m in came], counts, bench.time_s))
+    assert seen[0] == seen[1]
+    assert seen[0][1][-1] > 100

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -88,7 +89,7 @@ def test_a_place_that_jumps_and_stays_is_believed_in_the_end(truth: Truth) -> No
     assert (np.abs(error_between(koi.state.hybrid, other.state.hybrid)[6:]) < 2.0 * koi.sd[4:7]).all()
 
 
-WRONG = {
+WRONG: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "a jump of 100 s": lambda t: JUMP_M * (t < 100.0),
     "1 m/s": lambda t: 30.0 + 1.0 * t,
     "here and there": lambda t: JUMP_M * np.random.default_rng(1).uniform(1.0, 3.0, len(t)),

@@ -108,7 +108,7 @@ def test_all_that_failed_is_named(tree: Path) -> None:
     stand_in(tree, "python3", "exit 3")
     status, _, err = lint(tree)
     assert status == 1
-    assert err[-1] == "lint: failed: warnings of gcc, examples in C, includes and sizes, shape, symbols, phrases"
+    assert err[-1] == "lint: failed: warnings of gcc, examples in C, includes and sizes, shape, symbols, phrases, links"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)

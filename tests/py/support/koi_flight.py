@@ -152,7 +152,7 @@ def drawn_slow(cfg: KoiConfig, seconds: int, seed: int) -> Floats:
     sd, keep = np.array([*cfg.slow_r_sd_m, *cfg.slow_v_sd_mps]), math.exp(-1.0 / cfg.slow_s)
     drive = np.random.default_rng([seed, 60]).normal(size=(seconds, 6))
     drive[1:] *= math.sqrt(1.0 - keep * keep)
-    return sd * np.array(lfilter([1.0], [1.0, -keep], drive, axis=0))
+    return np.asarray(sd * lfilter([1.0], [1.0, -keep], drive, axis=0), np.float64)
 
 
 @dataclass

@@ -9,6 +9,7 @@ from typing import Any
 from psabench.boards.registry import DBC_NODE
 from psabench.instruments import EXAMPLES
 from psabench.options import natural, node_id, positive
+from psabench.passport.command import STORE
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2
 
 # Options of more than one procedure.
@@ -73,7 +74,11 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
 # Of the calibration on a rate table alone.
 ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
     "--table": {"metavar": "VISA-ADDRESS", "help": f"rate table, real or emulated: {EXAMPLES}"},
-    "--data": {"type": Path, "metavar": "FILE", "help": "increments of a recording in place of a bench"},
+    "--data": {
+        "type": Path,
+        "metavar": "PATH",
+        "help": "a recording in place of a bench: a file of increments; of a flight, OUT of its run",
+    },
     "--layout": {
         "type": Path,
         "metavar": "FILE",
@@ -101,4 +106,10 @@ IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
-EVERY: Mapping[str, Mapping[str, Any]] = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE, **FROM_OUTPUTS}
+# Of flights alone.
+IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
+    "--store": {"type": Path, "default": STORE, "metavar": "FILE", "help": "store of passports (%(default)s)"},
+    "--receiver": {"metavar": "PORT", "help": "serial port of the satellite receiver (the emulator's only one)"},
+}
+
+EVERY: Mapping[str, Mapping[str, Any]] = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE, **FROM_OUTPUTS, **IN_FLIGHT}

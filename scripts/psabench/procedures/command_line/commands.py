@@ -16,6 +16,8 @@ from psabench.procedures.command_line.offered import (
     COMPARE,
     CONDITIONS,
     COVARIANCE,
+    KOI_FLIGHT,
+    KOI_SEASON,
     ON_THE_HEAD,
     ON_THE_PLATFORM,
     SECONDARY,
@@ -42,6 +44,12 @@ outputs by more than its limits.
 
 NOTES_OUTPUTS = """
 Exit status 1: a figure is out of its limits. docs/procedures/sins_secondary.md derives the method.
+"""
+
+
+NOTES_FLIGHT = """
+Without --can or --control an emulator is started, with the scenario koi_flight. Exit status 1: the flight has no
+weight for the unit's passport; the reasons are printed.
 """
 
 
@@ -83,6 +91,8 @@ _CHAMBER = (
     *("--schedule", "--resume", "--can", "--head", "--chamber", "--control", "--truth", "--scenario", "--node"),
     *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
 )
+
+_FLIGHT = ("--scenario", "--can", "--control", "--receiver", "--data", "--seed", "--real-time", "--out", "--verbose")
 
 _EXAMPLES: Mapping[str, str] = {
     "turns": """\
@@ -134,6 +144,15 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run sins-snake
   psabench run sins-snake --flight my_flight.yaml --plan two_rates
 """,
+    KOI_FLIGHT[0]: """\
+  psabench run koi-flight --out build/koi                    an hour and 20 minutes, in a minute
+  psabench run koi-flight --data build/koi --corrects no     the same flight from its recording, without a correction
+  psabench run koi-flight --can slcan:/dev/ttyACM0 --receiver /dev/ttyUSB0   on these ports, in real time
+""",
+    KOI_SEASON[0]: """\
+  psabench run koi-season --out build/season --store build/season/passports.sqlite
+  psabench run koi-season --out build/season --store build/season/passports.sqlite --flights 12   four more
+""",
     COVARIANCE[0]: """\
   psabench run sins-covariance                                the article's two tables in every reading of its noise
   psabench run sins-covariance --plan mine.yaml --azimuth-deg 20
@@ -178,6 +197,18 @@ def _of_the_sins() -> Parameters:
     from psabench.sins.calibration_params import CalibrationParams
 
     return Parameters(fields=CalibrationParams.__dataclass_fields__)
+
+
+def _of_a_flight() -> Parameters:
+    from psabench.koi.wire.params import KoiParams
+
+    return Parameters(fields=KoiParams.__dataclass_fields__)
+
+
+def _of_a_season() -> Parameters:
+    from psabench.koi.wire.season import SeasonParams
+
+    return Parameters(fields=SeasonParams.__dataclass_fields__)
 
 
 def _of_the_covariance() -> Parameters:
@@ -246,12 +277,31 @@ _SINS = (
     ),
 )
 
+_KOI = (
+    _command(
+        KOI_FLIGHT,
+        handlers.fly_koi,
+        common=_FLIGHT,
+        load=_of_a_flight,
+        notes=NOTES_FLIGHT,
+        kept="what came is in OUT; --data goes through it",
+    ),
+    _command(
+        KOI_SEASON,
+        handlers.fly_season,
+        common=("--store", "--seed", "--out"),
+        load=_of_a_season,
+        kept="the flight is incomplete; the same command goes on with the next one",
+    ),
+)
+
 COMMANDS: Mapping[str, Command] = {
     c.name: c
     for c in (
         *_on_the_head(),
         _command(COMPARE, handlers.compare_units, common=_STARTED),
         *_SINS,
+        *_KOI,
         _THERMAL,
         *_on_the_platform(),
     )

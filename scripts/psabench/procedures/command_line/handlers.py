@@ -186,3 +186,28 @@ def calibrate_secondary(args: argparse.Namespace) -> int:
     print(secondary_page.verdict_words(found))
     print(f"report: {secondary_page.write_page(args.out, found)}")
     return 1 if found.within is False else 0
+
+
+def fly_koi(args: argparse.Namespace) -> int:
+    """A flight through the wire, or its recording."""
+    from psabench.koi.wire import page as flight_page
+    from psabench.koi.wire.params import KoiOptions
+    from psabench.koi.wire.run import run_flight
+
+    done = run_flight(of_fields(KoiOptions, args, params=_params(args)), Bar())
+    page = flight_page.write_page(args.out, done)
+    print("\n".join(flight_page.console_lines(done, verbose=args.verbose)))
+    print(f"report: {page}")
+    return 1 if done.found.verdict else 0
+
+
+def fly_season(args: argparse.Namespace) -> int:
+    """Flights until so many are complete; the passport is in --store."""
+    from psabench.koi.wire import season_page
+    from psabench.koi.wire.season import SeasonOptions, run_season
+
+    season = run_season(of_fields(SeasonOptions, args, params=_params(args)), Bar())
+    page = season_page.write_page(args.out, season)
+    print("\n".join(season_page.console_lines(season)))
+    print(f"report: {page}")
+    return 0

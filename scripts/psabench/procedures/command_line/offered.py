@@ -41,6 +41,15 @@ SECONDARY = (
     "a strapdown unit on a rate table from its own navigation: one experiment calibrates, the next one is compensated",
 )
 
+KOI_FLIGHT = (
+    "koi-flight",
+    "a flight of an inertial unit with a satellite receiver: alignment, correction at take-off, both solutions",
+)
+KOI_SEASON = (
+    "koi-season",
+    "flights of one unit, each with what its passport has learned of its sensors by then; stopped, it goes on",
+)
+
 G_MPS2 = 9.80665  # standard gravity (CGPM 1901); the site's own value is the user's to give
 SITE_G_MPS2 = 9.8094  # of the scenarios that the conditions use: an operator knows the gravity of the laboratory
 

@@ -107,6 +107,26 @@ static void clocks_may_be_fast_by_a_crystals_tolerance(void **state)
     if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
 }
 
+/* KPSA makes all frequencies from the crystal, the article says: 32-bit words at fCLK/2 fit with a longer lead-in. */
+static void words_of_32_bits_fit_at_half_the_crystal(void **state)
+{
+    (void)state;
+    const char *const rows[][2] = {{"line_hz", "4096000"}, {"line_div", "2"}, {"lead_in_clk", "12"}};
+    struct psa2_profile p;
+    fields_default(&psa2_fields, &p);
+    char why[300] = "";
+    for (size_t i = 0; i < COUNT(rows); i++)
+        if (!fields_set(&psa2_fields, &p, rows[i][0], 0, rows[i][1], why, sizeof why)) fail_msg("%s", why);
+    if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
+    assert_int_equal(psa2_frame_clks(&p), 152);
+    assert_int_equal(psa2_int_low_ns(&p), 74218);
+    p.lead_in_clk = 8;
+    assert_false(psa2_profile_check(&p, why, sizeof why));
+    assert_string_equal(why,
+                        "INT low: expected 74 us or more (lead_in_clk >= 12 or line_div >= 3), got (8 + 4*32 + 3*4) "
+                        "CLK / 2.048 MHz = 72.265 us");
+}
+
 static void texts_that_are_no_values_leave_the_profile_alone(void **state)
 {
     (void)state;
@@ -185,6 +205,7 @@ int main(void)
         cmocka_unit_test(the_default_is_the_file_article),
         cmocka_unit_test(what_a_board_cannot_run_is_refused_in_words),
         cmocka_unit_test(clocks_may_be_fast_by_a_crystals_tolerance),
+        cmocka_unit_test(words_of_32_bits_fit_at_half_the_crystal),
         cmocka_unit_test(texts_that_are_no_values_leave_the_profile_alone),
         cmocka_unit_test(the_data_period_follows_config0),
     };
