@@ -34,7 +34,7 @@ NAV = {  # unit, first count
     "kf-filterpy": ("steps", 1000),
     "sins-plan": ("plans", 2),
     "koi": ("hours", 1),
-    "koi-python-ins": ("minutes", 1),  # an hour of it takes two
+    "koi-python-ins": ("hours", 1),
     "strapdown": ("hours", 2),
     "strapdown-python-ins": ("hours", 1),
 }
@@ -139,12 +139,8 @@ def core(exe: Path, name: str, count: int) -> list[str]:
     return [str(exe), name, str(count)]
 
 
-ONE_THREAD = {"koi-python-ins"}  # OpenBLAS's idle threads would be most of its CPU time
-
-
 def python(name: str, count: int) -> list[str]:
-    first = ["env", "OPENBLAS_NUM_THREADS=1"] if name in ONE_THREAD else []
-    return [*first, sys.executable, "-m", "tests.bench.python_cases", name, str(count)]
+    return [sys.executable, "-m", "tests.bench.python_cases", name, str(count)]
 
 
 def has_cases(exe: Path) -> set[str]:
@@ -163,7 +159,7 @@ def _compiled(path: Path) -> list[Case]:
 def nav_cases(bench: Path) -> list[Case]:
     """Those of the page's table of filters: the whole of it is measured without the models."""
     python_cases = [
-        Case(name, unit, partial(printed, partial(python, name)), first, fixed=unit in ("hours", "minutes"))
+        Case(name, unit, partial(printed, partial(python, name)), first, fixed=unit == "hours")
         for name, (unit, first) in NAV.items()
     ]
     return _compiled(bench / "bench_kf") + python_cases

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 N, MOVING, M, TURNS = 45, 6, 3, 16  # as bench_kf.cpp has them
 
@@ -83,24 +80,25 @@ def strapdown_hours(count: int) -> str:
     return f"hours={count} ns={time.process_time_ns() - began_ns}"
 
 
-def _flight_of_python_ins(samples: int) -> tuple[pd.DataFrame, pd.Series[float]]:
-    """Increments of _hour() as python-ins has them, and the state they begin with."""
+def _hour_of_python_ins() -> tuple[Any, Any]:
+    """Its increments, frames of time by axis, and where they begin."""
     import pandas as pd
 
     turn, push = _hour()
     names = [f"{s}_{a}" for s in ("gyro", "accel") for a in "xyz"]
     to_other = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # forward, right, down
-    rows = np.hstack([turn @ to_other.T, push @ to_other.T])[:samples]
+    imu = pd.DataFrame(
+        np.hstack([turn @ to_other.T, push @ to_other.T]), index=0.01 * np.arange(len(turn)), columns=names
+    )
     states = ["lat", "lon", "alt", "VN", "VE", "VD", "roll", "pitch", "heading"]
-    began = pd.Series([55.7, 37.5, 150.0, 30.0, -20.0, 0.0, 3.0, -5.0, 77.0], states)
-    return pd.DataFrame(rows, index=0.01 * np.arange(len(rows)), columns=names), began
+    return imu, pd.Series([55.7, 37.5, 150.0, 30.0, -20.0, 0.0, 3.0, -5.0, 77.0], states)
 
 
 def python_ins_hours(count: int) -> str:
     """The same by python-ins, compiled by numba before the clock starts."""
     from pyins import strapdown as other  # type: ignore[import-untyped]
 
-    imu, began = _flight_of_python_ins(360_001)
+    imu, began = _hour_of_python_ins()
     increments = other.compute_increments_from_imu(imu, "increment")
     other.Integrator(began, with_altitude=False).integrate(increments.iloc[:100])
     began_ns = time.process_time_ns()
@@ -135,44 +133,43 @@ def koi_hours(count: int) -> str:
     return f"hours={count} ns={ns}"
 
 
-def python_ins_filter_minutes(count: int) -> str:
-    """Minutes of koi_hours() by python-ins: strapdown, then its feedforward filter, 33 states. Compiled before."""
+PART = 60  # of an hour: python-ins takes minutes for the whole
+
+
+def python_ins_filter_hours(count: int) -> str:
+    """The same by python-ins' feedforward filter with its 33 states, integration included; a minute, times 60."""
     import pandas as pd
     from pyins import filters, inertial_sensor, measurements
     from pyins import strapdown as other
 
-    imu, began = _flight_of_python_ins(6000 * count + 1)
-    times = np.arange(1.0, 60.0 * count)
-    place = pd.DataFrame(np.tile([55.7, 37.5, 150.0], (len(times), 1)), times, ["lat", "lon", "alt"])
-    speed = pd.DataFrame(np.zeros((len(times), 3)), times, ["VN", "VE", "VD"])
-    fixes = [measurements.Position(place, 5.0), measurements.NedVelocity(speed, 0.05)]
-
-    def fly(samples: int) -> int:
-        gyro, accel = (
-            inertial_sensor.EstimationModel(bias_sd=bias, noise=noise, scale_misal_sd=1e-4)
-            for bias, noise in ((5e-8, 5e-7), (5e-4, 1e-3))
-        )
-        increments = other.compute_increments_from_imu(imu.iloc[:samples], "increment")
-        path = other.Integrator(began).integrate(increments)
-        sds = (10.0, 0.01, 0.01, 0.1)
-        found = filters.run_feedforward_filter(path, path, *sds, gyro, accel, fixes, increments, time_step=0.1)
-        if not np.isfinite(found.trajectory_sd.to_numpy()).all():
-            raise RuntimeError("python-ins: the covariance is not finite")
-        return 9 + int(gyro.n_states) + int(accel.n_states)
-
-    states = fly(200)
+    whole, began = _hour_of_python_ins()
+    imu = whole.iloc[: len(whole) // PART]
+    at = pd.Index(np.arange(1.0, 3600 // PART))
+    place = pd.DataFrame(np.tile(began[["lat", "lon", "alt"]], (len(at), 1)), at, ["lat", "lon", "alt"])
+    speed = pd.DataFrame(np.zeros((len(at), 3)), at, ["VN", "VE", "VD"])
+    model = inertial_sensor.EstimationModel(bias_sd=1e-3, noise=1e-5, scale_misal_sd=np.full((3, 3), 1e-4))
+    other.Integrator(began).integrate(other.compute_increments_from_imu(imu.iloc[:100], "increment"))  # compiles
     began_ns = time.process_time_ns()
-    fly(len(imu))
+    for _ in range(count):
+        increments = other.compute_increments_from_imu(imu, "increment")
+        path = other.Integrator(began).integrate(increments)
+        found = filters.run_feedforward_filter(
+            *(path, path, 10.0, 0.1, 0.1, 0.5, model, model),
+            measurements=[measurements.Position(place, 5.0), measurements.NedVelocity(speed, 0.1)],
+            increments=increments,
+        )
     ns = time.process_time_ns() - began_ns
-    if states != 33:
-        raise RuntimeError(f"python-ins: expected 33 states, got {states}")
-    return f"minutes={count} ns={ns}"
+    if found.gyro.shape[1] + found.accel.shape[1] != 24:
+        raise RuntimeError(
+            f"python-ins: expected 24 parameters of sensors, got {list(found.gyro)}, {list(found.accel)}"
+        )
+    return f"hours={count} ns={ns * PART}"
 
 
 NAV_CASES: dict[str, Callable[[int], str]] = {
     "kf-filterpy": filterpy,
     "koi": koi_hours,
-    "koi-python-ins": python_ins_filter_minutes,
+    "koi-python-ins": python_ins_filter_hours,
     "sins-plan": sins_plan,
     "strapdown": strapdown_hours,
     "strapdown-python-ins": python_ins_hours,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from koi_flight import LEGS, Drawn, Floats, Truth, error_between, errors_of, with_errors
+from koi_flight import LEGS, Drawn, Truth, error_between, errors_of, with_errors
 from psabench.native.flight_model import Flight
 from psabench.native.koi import Kind, Koi, Reason, koi_default, koi_layout, koi_prior
 from psabench.native.nav import Refused
@@ -89,7 +89,7 @@ def test_a_place_that_jumps_and_stays_is_believed_in_the_end(truth: Truth) -> No
     assert (np.abs(error_between(koi.state.hybrid, other.state.hybrid)[6:]) < 2.0 * koi.sd[4:7]).all()
 
 
-WRONG: dict[str, Callable[[Floats], Floats]] = {
+WRONG: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "a jump of 100 s": lambda t: JUMP_M * (t < 100.0),
     "1 m/s": lambda t: 30.0 + 1.0 * t,
     "here and there": lambda t: JUMP_M * np.random.default_rng(1).uniform(1.0, 3.0, len(t)),
