@@ -82,8 +82,13 @@ class FlightHost:
         if self.koi is None:
             self._fixes.append(fix)
             return
-        self.koi.take(Kind.POSITION, fix.t_s, [fix.lat_rad, fix.lon_rad, fix.h_m], valid=fix.valid)
-        self.koi.take(Kind.VELOCITY, fix.t_s, fix.v_enu_mps, valid=fix.valid)
+        place = [fix.lat_rad, fix.lon_rad, fix.h_m]
+        reasons = (
+            self.koi.take(Kind.POSITION, fix.t_s, place, valid=fix.valid),
+            self.koi.take(Kind.VELOCITY, fix.t_s, fix.v_enu_mps, valid=fix.valid),
+        )
+        if Reason.REOPENED in reasons:
+            self.doubt(expected("a filter whose gates stay open", "one that has reopened", WHERE))
 
     def take_height(self, t_s: float, h_m: float) -> None:
         """Of the barometer, after the increments up to its time."""

@@ -154,6 +154,15 @@ def test_late_fixes_are_estimated_or_not_believed() -> None:
     assert found.decision.reasons
 
 
+def test_a_filter_that_reopens_is_a_doubt() -> None:
+    """A place that jumps by 600 m and stays there: after two minutes it is believed, and the flight teaches nothing."""
+    found = fly(1, lambda fix: replace(fix, lat_rad=fix.lat_rad + (1e-4 if fix.t_s > 1200.0 else 0.0)))
+    assert found.corrected
+    assert found.taken[Kind.POSITION].counts[Reason.REOPENED] > 0
+    assert "flight: expected a filter whose gates stay open, got one that has reopened" in found.verdict
+    assert found.estimate.weight == 0.0
+
+
 def test_a_flight_that_is_doubted_does_not_count() -> None:
     host = FlightHost(FlightSetup(cfg=CFG))
     host.doubt("increments: expected 100 in a second, got 60")
