@@ -27,7 +27,7 @@ const Doubt doubts[NAV_KOI_KINDS] = {
 };
 
 /* The receiver's place alone says nothing of where the error is; with velocities that are taken it is in the place. */
-bool widens(const nav_koi *k, int kind, double t_s, int state)
+bool widens_covariance(const nav_koi *k, int kind, double t_s, int state)
 {
     if (kind != NAV_KOI_POSITION) return doubts[kind].widens[state];
     return doubts[kind].widens[state] || t_s - k->last[NAV_KOI_VELOCITY].accepted_s > k->cfg.reopen_s;
@@ -42,7 +42,7 @@ double noise_of(const nav_koi *k, int kind, const koi_rows *rows, int i)
 }
 
 /* With the first of the run, but for what a wrong filter may have moved since. */
-bool agrees(const nav_koi *k, int kind, double t_s, const koi_rows *rows)
+bool agrees_with_first(const nav_koi *k, int kind, double t_s, const koi_rows *rows)
 {
     const koi_refused &run = k->refused[kind];
     double sum = 0.0;
@@ -57,7 +57,8 @@ void find_factors(const nav_koi *k, int kind, double t_s, double by, double fact
 {
     for (int i = 0; i < KOI_MOVING; i++) {
         const double sd = nav_root(kf_variance(&k->kf, i));
-        factors[i] = widens(k, kind, t_s, i) ? std::max(1.0, sd * by > limits[i] ? limits[i] / sd : by) : 1.0;
+        factors[i] =
+            widens_covariance(k, kind, t_s, i) ? std::max(1.0, sd * by > limits[i] ? limits[i] / sd : by) : 1.0;
     }
 }
 
@@ -72,7 +73,7 @@ double nis_with(const nav_koi *k, const koi_rows *rows, const double factors[KOI
 }
 
 /* P = D P D: correlations stay, so that what one of them is found to be moves the others. The estimates stay. */
-bool widen(nav_koi *k, const double factors[KOI_MOVING])
+bool widen_covariance(nav_koi *k, const double factors[KOI_MOVING])
 {
     double a[KOI_ERRORS * KOI_ERRORS] = {}, x[KF_MAX];
     for (int i = 0; i < KOI_ERRORS; i++) a[i * (KOI_ERRORS + 1)] = factors[KOI_OF_ERROR[i]];
@@ -87,7 +88,7 @@ bool widen(nav_koi *k, const double factors[KOI_MOVING])
 bool koi_reopen(nav_koi *k, int kind, double t_s, const koi_rows *rows)
 {
     koi_refused &run = k->refused[kind];
-    if (!agrees(k, kind, t_s, rows)) {
+    if (!agrees_with_first(k, kind, t_s, rows)) {
         std::copy(rows->y, rows->y + rows->count, run.first);
         run.since_s = t_s;
         run.count = 0;
@@ -97,7 +98,7 @@ bool koi_reopen(nav_koi *k, int kind, double t_s, const koi_rows *rows)
     double factors[KOI_MOVING];
     for (int power = 1; power <= MOST_POWER; power++) {
         find_factors(k, kind, t_s, (double)(1 << power), factors);
-        if (nis_with(k, rows, factors) <= rows->count) return widen(k, factors);
+        if (nis_with(k, rows, factors) <= rows->count) return widen_covariance(k, factors);
     }
     return false;
 }
