@@ -26,6 +26,7 @@ from psabench.report.grading import aligned
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/procedures/koi_fleet.md"
+NOT_SHOWN = ("first_good", "curves_good")
 TABLE = re.compile(r"(?<=<!-- koi_fleet: )(\w+)( -->\n)```\n.*?```\n", re.DOTALL)
 
 
@@ -55,6 +56,8 @@ def main(clean: str, harm: str) -> int:
     text = PAGE.read_text(encoding="utf-8")
     PAGE.write_text(TABLE.sub(lambda m: m[1] + m[2] + _fenced(tables[m[1]]), text), encoding="utf-8")
     for name, svg, _ in page.draw_pictures(usual):
+        if name in NOT_SHOWN:
+            continue
         (ROOT / f"docs/img/koi_{name}.svg").write_text(plots.standalone(svg), encoding="utf-8")
     return 0
 

@@ -91,7 +91,7 @@ def draw_linear(found: Mapping[str, Rows], predicted: Predicted) -> str:
             ax.set_title(name)
             ax.set_xlabel("flight")
         np.atleast_1d(axes)[0].set_ylabel("largest rms error in the hour, km")
-        np.atleast_1d(axes)[-1].legend(loc="upper right")
+        figure.legend(*np.atleast_1d(axes)[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
         return style.svg(figure, "koi-linear")
 
 
