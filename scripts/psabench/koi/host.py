@@ -221,7 +221,7 @@ class FlightHost:
             x=koi.x - untouched.x,
             sd=koi.sd,
             prior_sd=untouched.sd,
-            gates=_gates(state.taken),
+            gates=_gates_of(state.taken),
             alone_s=state.alone_s,
         )
 
@@ -238,7 +238,7 @@ class FlightHost:
             x=x - p,
             sd=sd,
             prior_sd=np.sqrt(np.diag(prior)),
-            gates=_gates(taken),
+            gates=_gates_of(taken),
             alone_s=koi.state.alone_s,
         )
         verdict = "; ".join((*find_doubts(evidence, limits, "passport"), *self.doubts))
@@ -285,7 +285,7 @@ def _median_place(fixes: list[Fix]) -> tuple[float, float, float]:
     return lat_rad, lon_rad, h_m
 
 
-def _gates(taken: dict[Kind, Taken]) -> dict[str, Gate]:
+def _gates_of(taken: dict[Kind, Taken]) -> dict[str, Gate]:
     return {kind.name.lower(): _gate_of(t) for kind, t in taken.items() if sum(t.counts.values())}
 
 

@@ -78,7 +78,9 @@ class Flight:
         """At all these instants since the beginning."""
         times = np.ascontiguousarray(t_ns, dtype=np.int64)
         out = np.empty((times.size, STATE))
-        status = library().flight_states(self.handle, _pointer(times, c.c_int64), times.size, _pointer(out, c.c_double))
+        status = library().flight_states(
+            self.handle, _pointer_to(times, c.c_int64), times.size, _pointer_to(out, c.c_double)
+        )
         if status < 0:
             raise BadInput(expected("times of 0 or more", times.min(initial=0), "flight"))
         return States(
@@ -100,14 +102,14 @@ class Flight:
     def increments(self, from_ns: int, dt_ns: int, n: int) -> tuple[Floats, Floats]:
         """Integrals of the rate, rad, and the specific force, m/s, over n intervals, (n, 3) each."""
         out = np.empty((n, 6))
-        status = library().flight_increments(self.handle, from_ns, dt_ns, n, _pointer(out, c.c_double))
+        status = library().flight_increments(self.handle, from_ns, dt_ns, n, _pointer_to(out, c.c_double))
         if status < 0:
             got = f"{n} of {dt_ns} ns from {from_ns} ns"
             raise BadInput(expected("intervals of 1 ns to 10 s from 0 on", got, "flight"))
         return out[:, :3], out[:, 3:]
 
 
-def _pointer(a: npt.NDArray[Any], kind: Any) -> Any:
+def _pointer_to(a: npt.NDArray[Any], kind: Any) -> Any:
     return a.ctypes.data_as(c.POINTER(kind))
 
 

@@ -53,7 +53,11 @@ def draw_solutions(
         v_mps = v_mps + to_enu(moves, np.cross(rate_to_earth(moves), np.array(c.lever_m)))
     valid = ~(c.outage & (t_s >= episode.begin_s) & (t_s < episode.end_s))
     return Solutions(
-        t_s=t_s, place=_places(there, off_m), v_enu_mps=v_mps, valid=valid, delays_s=(float(late[0]), float(late[1]))
+        t_s=t_s,
+        place=_places_off(there, off_m),
+        v_enu_mps=v_mps,
+        valid=valid,
+        delays_s=(float(late[0]), float(late[1])),
     )
 
 
@@ -104,7 +108,7 @@ def _lead_astray(c: Condition, e: Episode, t_s: Floats, off_m: Floats, off_mps: 
     off_mps[:, :2] += np.outer(np.where(holds, c.ramp_mps, 0.0), way)
 
 
-def _places(s: States, off_m: Floats) -> Floats:
+def _places_off(s: States, off_m: Floats) -> Floats:
     """East, north, up added to places."""
     meridian, vertical = np.array([radii_m(lat, h) for lat, h in zip(s.lat_rad, s.h_m, strict=True)]).T
     lat = s.lat_rad + off_m[:, 1] / meridian

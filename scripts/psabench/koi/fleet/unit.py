@@ -77,13 +77,13 @@ def draw_readings(
         gamma=stays.gamma,
         theta=stays.theta,
     )
-    nu_walk = _walk(rng, n // SECOND, sizes.nu_walk_degph_rth * DEGPH)
-    df_walk = _walk(rng, n // SECOND, sizes.df_walk_mps2_rth)
+    nu_walk = _draw_walk(rng, n // SECOND, sizes.nu_walk_degph_rth * DEGPH)
+    df_walk = _draw_walk(rng, n // SECOND, sizes.df_walk_mps2_rth)
     noise = rng.standard_normal((2, n, 3))
     noise[0] *= sizes.gyro_noise_degph_rts * DEGPH * math.sqrt(DT_S)
     noise[1] *= sizes.accel_noise_mps2_rts * math.sqrt(DT_S)
-    angle = _measured(dtheta_rad, errors.theta, errors.nu_radps, nu_walk, noise[0])
-    speed = _measured(dv_mps, errors.gamma, errors.df_mps2, df_walk, noise[1])
+    angle = _measure_rows(dtheta_rad, errors.theta, errors.nu_radps, nu_walk, noise[0])
+    speed = _measure_rows(dv_mps, errors.gamma, errors.df_mps2, df_walk, noise[1])
     return Readings(
         dtheta_rad=count_up(angle, sizes.angle_count_arcsec * ARCSEC),
         dv_mps=count_up(speed, sizes.speed_count_mps),
@@ -93,12 +93,12 @@ def draw_readings(
     )
 
 
-def _walk(rng: np.random.Generator, seconds: int, after_hour: float) -> Floats:
+def _draw_walk(rng: np.random.Generator, seconds: int, after_hour: float) -> Floats:
     steps = rng.normal(0.0, after_hour / 60.0, (seconds, 3))
     return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
-def _measured(exact: Floats, matrix: Floats, constant: Floats, walk: Floats, noise: Floats) -> Floats:
+def _measure_rows(exact: Floats, matrix: Floats, constant: Floats, walk: Floats, noise: Floats) -> Floats:
     """A walk stays for a second."""
     out = exact @ (np.eye(3) + matrix).T
     out += noise
