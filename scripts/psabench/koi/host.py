@@ -175,6 +175,7 @@ class FlightHost:
         take[:NAVIGATION_STATES] = True
         koi.correct(take)
         self.koi, self._parked = koi, _Second()
+        self._stop.take(angle[-self._per_second :], speed[-self._per_second :], self.cfg.sample_s, 0.0)
         self._untouched = Koi(self.cfg, self.t_s, koi.state.autonomous, x=koi.x, p=koi.p, sensors=sensors)
         self._say_alignment(koi, found.ratio)
 

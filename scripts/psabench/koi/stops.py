@@ -21,18 +21,19 @@ class StopLimits:
 
 @dataclass
 class StopDetector:
-    """Fed second by second."""
+    """Fed second by second, from rest."""
 
     limits: StopLimits = field(default_factory=StopLimits)
     _before: Floats | None = None
-    _quiet: int = 0
+    _quiet: int | None = None  # seconds; None: none was seen
 
     def take(self, dtheta_rad: Floats, dv_mps: Floats, sample_s: float, speed_mps: float) -> bool:
         """Whether the unit is at rest at the end of these increments, (n, 3) each."""
         whole_s = len(dtheta_rad) * sample_s
         rate, force = dtheta_rad.sum(axis=0) / whole_s, dv_mps.sum(axis=0) / whole_s
-        still = self._before is not None and bool(np.abs(force - self._before).max() < self.limits.change_mps2)
+        still = self._before is None or bool(np.abs(force - self._before).max() < self.limits.change_mps2)
         still = still and bool(np.abs(rate).max() < self.limits.rate_radps) and speed_mps < self.limits.speed_mps
         self._before = force
-        self._quiet = self._quiet + 1 if still else 0
+        quiet = self.limits.seconds if self._quiet is None else self._quiet
+        self._quiet = quiet + 1 if still else 0
         return self._quiet >= self.limits.seconds
