@@ -164,9 +164,10 @@ RULES = {
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
     # 61,700, 62,300 and 2,050 before the satellite receiver, the filter with it and faults of gyros.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 63_914, 63_914),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 63_515, 63_515),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_134, 2_134),
+    # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 64_140, 64_140),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 68_580, 68_580),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_210, 2_210),
 }
 
 
