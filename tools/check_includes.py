@@ -73,7 +73,7 @@ LIBRARIES = {
 KINDS = ("*.c", "*.h", "*.cpp", "*.hpp")
 FUNCTION_REASON, FUNCTION_MAX, FUNCTION_MEDIAN = 40, 70, 15  # lines, braces included
 SOURCE_MAX, HEADER_MAX = 600, 150  # lines; a file is about one topic, and the cap does not cut it
-FLAT = {"psabench.h"}  # includes it as it is installed: psabench_models.h
+FLAT = {"psabench.h", "psabench_models.h"}  # include each other as they are installed
 HEADER_EXCEPTIONS = {
     "emu/api/psabench.h": 250,
     "nav/koi.h": 200,

@@ -218,4 +218,7 @@ PSABENCH_API int psabench_board_write(psabench_part *p, unsigned group, unsigned
 #ifdef __cplusplus
 }
 #endif
+
+#include "psabench_models.h" /* what is without a bench */
+
 #endif

@@ -58,6 +58,7 @@ class Flight:
     ) -> None:
         """place: deg, deg, m; baro: lag, s, scale, ppm, offset, m, drift, m/h."""
         self.handle: int | None = None
+        self._free = library().flight_free  # at the interpreter's end modules are gone before objects
         rows = np.array([_leg_row(number, leg) for number, leg in enumerate(legs)])
         job = FlightJobStruct(size=c.sizeof(FlightJobStruct), legs=len(legs), leg=rows.ctypes.data)
         job.place[:], job.baro[:] = place, baro
@@ -72,7 +73,7 @@ class Flight:
 
     def __del__(self) -> None:
         if self.handle:
-            library().flight_free(self.handle)
+            self._free(self.handle)
 
     def states(self, t_ns: npt.NDArray[np.int64]) -> States:
         """At all these instants since the beginning."""
