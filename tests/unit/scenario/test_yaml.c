@@ -441,7 +441,7 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
         why,
         "nope: expected a path or a name from proto/scenarios: "
         "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, flight, "
-        "gyrocompass, gyrocompass_ideal, "
+        "gyrocompass, gyrocompass_ideal, koi_flight, "
         "multi, quartz_chamber, quartz_run_in, quiet, realistic, receiver, sins_coarse, sins_secondary, sins_table, "
         "six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
