@@ -15,8 +15,9 @@
  *   dV1' = g alpha2 + w3 dV2 + V2 beta3' + Df1 + (f3 - g) beta2          alpha1' = o3 alpha2 - u2 beta3 + u3 dr1/R + dV2/R + nu1
  *   dV2' = -g alpha1 - w3 dV1 - V1 beta3' + Df2 - (f3 - g) beta1         alpha2' = -o3 alpha1 + u1 beta3 + u3 dr2/R - dV1/R + nu2
  *   beta3' = o2 (alpha1 - dr2/R) - o1 (alpha2 + dr1/R) + nu3,  O transport rate, u Earth's, o = O + u, w = 2 u + O
- * Measurements, less slow_r or slow_v of the kind: z_r = dr + V Dt1, z_V1 = dV1 - beta3 V2 + t dr1 V2 + a1 (Dt1 + Dt2), z_V2 = dV2 + beta3 V1 - t dr1 V1 + a2 (Dt1 + Dt2),
- * zero velocity (the same without Dt), z_h = dr3 - baro. Innovations are of the whole hybrid solution, so that kilometres do no harm.
+ * Measurements, less slow_r or slow_v of the kind: z_r = dr + V Dt1, z_V1 = dV1 - beta3 V2 + t dr1 V2 + a1 (Dt1 + Dt2),
+ * z_V2 = dV2 + beta3 V1 - t dr1 V1 + a2 (Dt1 + Dt2), zero velocity (the same without Dt), z_h = dr3 - baro.
+ * Innovations are of the whole hybrid solution, so that kilometres do no harm.
  * Vertical channel (E0): each accepted barometric height moves the autonomous one, h by -k1 T (h - h_b) and vU by -k2 T (h - h_b), T
  * since the one before; dr3 and dV3 move by as much, which is known. Without barometer it diverges, e-fold in 9.5 min.
  * Position and velocity are the antenna's: antenna_m from the unit, l. C l and C (w x l), w of the last increment, are taken off,

@@ -13,7 +13,6 @@ _Static_assert((int)PSABENCH_FLIGHT_PARAMS == (int)FLIGHT_PARAMS, "parameters of
 
 #define HEIGHT_MIN_M (-1000.0)
 #define HEIGHT_MAX_M 9000.0
-#define TO_RAD       (0.5 * TURN_RAD / 180.0)
 
 struct range {
     const char *key;
@@ -92,7 +91,7 @@ psabench_flight *psabench_flight_new(const struct psabench_flight_job *job, char
     struct flight_cfg c = {.present = true};
     struct flight_error error;
     if (!job || job->size != sizeof *job || !job->leg || !read_cfg(&e, job, &c)) return NULL;
-    const double lat_rad = job->place[0] * TO_RAD, lon_rad = job->place[1] * TO_RAD, h_m = job->place[2];
+    const double lat_rad = job->place[0] * RAD_PER_DEG, lon_rad = job->place[1] * RAD_PER_DEG, h_m = job->place[2];
     const struct site site = {earth_gravity_mps2(lat_rad, h_m), lat_rad, lon_rad, h_m, 0.0, true};
     psabench_flight *f = malloc(sizeof *f);
     if (f && flight_init(&f->f, &c, &site, &error)) return f;

@@ -11,13 +11,14 @@ namespace
 constexpr int LEAST_COUNT = 10;
 constexpr int MOST_POWER = 20;
 
-/* Standard deviations that widening does not pass (E0): beyond them errors are not of first order. In the order of enum koi_moving. */
+/* Standard deviations that widening does not pass (E0): beyond them errors are not of first order. m, m/s, rad in the
+ * order of enum koi_moving. */
 const double limits[KOI_MOVING] = {1e5, 1e5, 100.0, 100.0, 0.02, 0.02, 0.1, 1e4, 100.0};
 
 /* By kind: what widens, and how fast the innovation of a filter that is wrong may move (E0): 0.03 m/s^2 is 10' of level. */
 struct Doubt {
     bool widens[KOI_MOVING];
-    double rate;
+    double per_s; /* m/s, m/s^2 */
 };
 const Doubt doubts[NAV_KOI_KINDS] = {
     {{true, true, false, false, false, false, false, true, false}, 0.5},
@@ -47,7 +48,7 @@ bool agrees_with_first(const nav_koi *k, int kind, double t_s, const koi_rows *r
     const koi_refused &run = k->refused[kind];
     double sum = 0.0;
     for (int i = 0; i < rows->count; i++) {
-        const double off = std::fabs(rows->y[i] - run.first[i]) - doubts[kind].rate * (t_s - run.since_s);
+        const double off = std::fabs(rows->y[i] - run.first[i]) - doubts[kind].per_s * (t_s - run.since_s);
         if (off > 0.0) sum += off * off / (2.0 * noise_of(k, kind, rows, i));
     }
     return run.count > 0 && sum <= k->cfg.gate_nis[rows->count == 3];

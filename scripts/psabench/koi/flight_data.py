@@ -35,7 +35,7 @@ class FlightSetup:
     time_s: float = 0.0  # of the beginning, Unix
     known: Knowledge | None = None  # of the unit's passport
     corrects: bool = True  # at take-off, if the decision passes
-    place: tuple[float, float, float] | None = None  # latitude, longitude, height; None: median of the receiver's
+    place_rad_m: tuple[float, float, float] | None = None  # latitude, longitude, height; None: the receiver's median
     align_s: float = 600.0
     coarse_s: float = 120.0
     stop: StopLimits = field(default_factory=StopLimits)

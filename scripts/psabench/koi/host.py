@@ -27,10 +27,10 @@ from psabench.koi.stops import StopDetector
 from psabench.koi.take_off import Decision, TakeOffDetector, decide_correction, taxi_of
 from psabench.koi.trust import Evidence, Gate, find_doubts, trust_weight
 from psabench.link.signals import Floats
-from psabench.native.koi import Kind, Koi, KoiConfig, Reason, Taken, coarse_alignment, koi_prior
+from psabench.native.koi import Integrated, Kind, Koi, KoiConfig, Reason, Taken, coarse_alignment, koi_prior
+from psabench.native.nav import ARCMIN
 from psabench.native.strapdown import State
 
-ARCMIN = math.pi / 10_800
 COARSE_LEVEL_RAD, COARSE_HEADING_RAD = 2.0 * ARCMIN, math.radians(1.5)  # of the coarse alignment (E0)
 PARKED_SD_M, PARKED_SD_MPS = 5.0, 0.02  # of the place and of the velocity of rest (E0)
 STOPS_REFUSED = 0.05  # during the alignment: more, and it has moved (E0)
@@ -44,7 +44,8 @@ class FlightHost:
     def __init__(self, setup: FlightSetup) -> None:
         self.setup, self.cfg = setup, _alignment_config(setup.cfg)
         self.kind, self.names = instrument_class(setup.cfg), state_names(setup.cfg)
-        self.known = setup.known or nothing_known(self.kind, setup.serial)
+        known = setup.known or nothing_known(self.kind, setup.serial)
+        self._p, self._prior = filter_prior(known, self.kind, setup.time_s)  # of the sensors
         self.events, self.doubts = list[Event](), list[str]()
         self.koi: Koi | None = None
         self._untouched: Koi | None = None  # beside it until take-off: without the receiver and stops
@@ -105,8 +106,8 @@ class FlightHost:
         """After the last increment. Raises BadInput for a flight that ended before its alignment."""
         if self.koi is None:
             raise BadInput(expected(f"{self.setup.align_s:g} s of increments at rest", f"{self.t_s:.2f} s", WHERE))
-        koi, taken = self.koi, self.koi.state.taken
-        estimate, verdict = self._estimate(koi, taken)
+        koi, state = self.koi, self.koi.state
+        estimate, verdict = self._estimate(koi, state)
         return FlightFound(
             names=self.names,
             **self._series.arrays(),
@@ -116,7 +117,7 @@ class FlightHost:
             x_take_off=self._x_take_off,
             x=koi.x,
             p=koi.p,
-            taken=taken,
+            taken=state.taken,
             estimate=estimate,
             verdict=verdict,
             corrected=self._corrected,
@@ -160,13 +161,12 @@ class FlightHost:
 
     def _align(self) -> None:
         angle, speed = self._parked.arrays()
-        lat_rad, lon_rad, h_m = self.setup.place or _median_place(self._fixes)
+        lat_rad, lon_rad, h_m = self.setup.place_rad_m or _median_place(self._fixes)
         coarse = round(self.setup.coarse_s * self._per_second)
         found = coarse_alignment(angle[:coarse], speed[:coarse], self.cfg.sample_s, lat_rad)
         at = State(lat_rad=lat_rad, lon_rad=lon_rad, h_m=h_m, v_n_mps=np.zeros(3), C_nb=found.begin_C_nb)
-        p, prior = filter_prior(self.known, self.kind, self.setup.time_s)
-        sensors = sensors_of_vector(self.cfg, p)
-        koi = Koi(self.cfg, 0.0, at, p=self._prior_with(at, prior), sensors=sensors)
+        sensors = sensors_of_vector(self.cfg, self._p)
+        koi = Koi(self.cfg, 0.0, at, p=self._prior_at(at), sensors=sensors)
         for begin in range(0, len(angle), self._per_second):
             end = begin + self._per_second
             koi.push(angle[begin:end], speed[begin:end])
@@ -179,10 +179,10 @@ class FlightHost:
         self._untouched = Koi(self.cfg, self.t_s, koi.state.autonomous, x=koi.x, p=koi.p, sensors=sensors)
         self._say_alignment(koi, found.ratio)
 
-    def _prior_with(self, at: State, sensors: Floats) -> Floats:
+    def _prior_at(self, at: State) -> Floats:
         """Covariance at the beginning, the sensors' part by what is known of the unit."""
         p, rows = koi_prior(self.cfg, at), sensor_rows(self.cfg)
-        p[rows, rows] = sensors
+        p[rows, rows] = self._prior
         return p
 
     def _say_alignment(self, koi: Koi, ratio: float) -> None:
@@ -228,19 +228,18 @@ class FlightHost:
 
     # ---- the passport
 
-    def _estimate(self, koi: Koi, taken: dict[Kind, Taken]) -> tuple[FlightEstimate, str]:
+    def _estimate(self, koi: Koi, state: Integrated) -> tuple[FlightEstimate, str]:
         rows, limits = sensor_rows(self.cfg), self.setup.trust
-        p, prior = filter_prior(self.known, self.kind, self.setup.time_s)
-        x = vector_of_sensors(self.cfg, koi.state.total)
+        x = vector_of_sensors(self.cfg, state.total)
         covariance = np.ascontiguousarray(koi.p[rows, rows])
         sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         evidence = Evidence(
             names=sensor_names(self.cfg),
-            x=x - p,
+            x=x - self._p,
             sd=sd,
-            prior_sd=np.sqrt(np.diag(prior)),
-            gates=_gates_of(taken),
-            alone_s=koi.state.alone_s,
+            prior_sd=np.sqrt(np.diag(self._prior)),
+            gates=_gates_of(state.taken),
+            alone_s=state.alone_s,
         )
         verdict = "; ".join((*find_doubts(evidence, limits, "passport"), *self.doubts))
         weight = 0.0 if verdict else trust_weight(evidence.gates, limits)
@@ -248,8 +247,8 @@ class FlightHost:
             serial=self.setup.serial,
             names=evidence.names,
             time_s=self.setup.time_s,
-            x=x if np.isfinite(x).all() else p,
-            covariance=covariance if np.isfinite(covariance).all() else prior,
+            x=x if np.isfinite(x).all() else self._p,
+            covariance=covariance if np.isfinite(covariance).all() else self._prior,
             weight=weight,
         )
         return estimate, verdict

@@ -24,6 +24,15 @@ class Gate:
     nis_sum: float  # normalised innovations squared of the taken ones
     nis_dof: int
 
+    @property
+    def gated_share(self) -> float:
+        return self.gated / max(self.taken + self.gated, 1)
+
+    @property
+    def nis_mean(self) -> float:
+        """By degree of freedom; not a number where none was taken."""
+        return self.nis_sum / self.nis_dof if self.nis_dof else math.nan
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
@@ -73,13 +82,13 @@ def _measurement_doubts(e: Evidence, limits: TrustLimits, where: str) -> Iterato
         gate = e.gates.get(kind, Gate(taken=0, gated=0, nis_sum=0.0, nis_dof=0))
         if gate.taken < limits.taken:
             yield expected(f"{limits.taken} measurements of {kind} or more", gate.taken or "none", where)
-        share = gate.gated / max(gate.taken + gate.gated, 1)
-        if share > limits.gated_share:
-            yield expected(f"at most {limits.gated_share:.0%} of {kind} outside its gate", f"{share:.1%}", where)
-        mean = gate.nis_sum / gate.nis_dof if gate.nis_dof else math.nan
+        if gate.gated_share > limits.gated_share:
+            what = f"at most {limits.gated_share:.0%} of {kind} outside its gate"
+            yield expected(what, f"{gate.gated_share:.1%}", where)
         low, high = limits.nis_mean
-        if gate.taken and not low <= mean <= high:
-            yield expected(f"innovations of {kind} with a mean square of {low:g} to {high:g}", f"{mean:.2f}", where)
+        if gate.taken and not low <= gate.nis_mean <= high:
+            what = f"innovations of {kind} with a mean square of {low:g} to {high:g}"
+            yield expected(what, f"{gate.nis_mean:.2f}", where)
 
 
 def _estimate_doubts(e: Evidence, limits: TrustLimits, where: str) -> Iterator[str]:
@@ -97,10 +106,8 @@ def _estimate_doubts(e: Evidence, limits: TrustLimits, where: str) -> Iterator[s
 
 def trust_weight(gates: Mapping[str, Gate], limits: TrustLimits) -> float:
     """Of a flight without doubts, above 0 to 1 (E0): less for a share outside the gates and for large innovations."""
-    weight = 1.0
-    for kind in limits.kinds:
-        gate = gates[kind]
-        share = gate.gated / max(gate.taken + gate.gated, 1)
-        mean = gate.nis_sum / gate.nis_dof if gate.nis_dof else 1.0
-        weight = min(weight, (1.0 - share / (2.0 * limits.gated_share)) / max(1.0, mean))
-    return weight
+    worth = [
+        (1.0 - gate.gated_share / (2.0 * limits.gated_share)) / max(1.0, gate.nis_mean)
+        for gate in (gates[kind] for kind in limits.kinds)
+    ]
+    return min(worth, default=1.0)

@@ -49,19 +49,19 @@ class Flight:
         self,
         legs: Sequence[Leg],
         *,
-        place: tuple[float, float, float] = (55.7, 37.5, 150.0),
+        place_deg_m: tuple[float, float, float] = (55.7, 37.5, 150.0),
         heading_deg: float = 0.0,
         jerk_mps3: float = 4.0,
         roll_rate_dps: float = 8.0,
         angle_of_attack_deg: float = 4.0,
         baro: tuple[float, float, float, float] = (0.5, 0.0, 0.0, 0.0),
     ) -> None:
-        """place: deg, deg, m; baro: lag, s, scale, ppm, offset, m, drift, m/h."""
+        """place_deg_m: latitude, longitude, height; baro: lag, s, scale, ppm, offset, m, drift, m/h."""
         self.handle: int | None = None
         self._free = library().flight_free  # at the interpreter's end modules are gone before objects
         rows = np.array([_leg_row(number, leg) for number, leg in enumerate(legs)])
         job = FlightJobStruct(size=c.sizeof(FlightJobStruct), legs=len(legs), leg=rows.ctypes.data)
-        job.place[:], job.baro[:] = place, baro
+        job.place[:], job.baro[:] = place_deg_m, baro
         job.plan[:] = heading_deg, jerk_mps3, roll_rate_dps, angle_of_attack_deg
         why = c.create_string_buffer(256)
         self.handle = library().flight_new(c.byref(job), why, len(why))

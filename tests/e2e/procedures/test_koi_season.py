@@ -14,6 +14,7 @@ from psabench import cli
 from psabench.koi.flight_log import read_log
 from psabench.koi.wire import season
 from psabench.koi.wire.feed import FlightFeed
+from psabench.koi.wire.nav_pvt import Solution
 from psabench.koi.wire.recording import Look
 from psabench.passport.store import PassportStore
 
@@ -28,11 +29,11 @@ import os, signal, sys
 from psabench import cli
 from psabench.koi.wire.feed import FlightFeed
 look, looks = FlightFeed.look, [0]
-def counted(self, at):
+def counted(self, at, found=None):
     looks[0] += self.grid.now_s < 1.0
     if looks[0] > FIRST and self.grid.now_s > 150.0:
         os.kill(os.getpid(), signal.SIGKILL)
-    look(self, at)
+    look(self, at, found)
 FlightFeed.look = counted
 FIRST = int(sys.argv[1])
 sys.exit(cli.main(sys.argv[2:]))
@@ -77,10 +78,10 @@ def test_a_season_that_is_killed_goes_on(tmp_path: Path, capsys: Lines) -> None:
 def test_ctrl_c_leaves_the_flight_incomplete(tmp_path: Path, capsys: Lines, monkeypatch: pytest.MonkeyPatch) -> None:
     look = FlightFeed.look
 
-    def interrupted(self: FlightFeed, at: Look) -> None:
+    def interrupted(self: FlightFeed, at: Look, found: list[Solution] | None = None) -> None:
         if self.grid.now_s > 20.0:
             raise KeyboardInterrupt
-        look(self, at)
+        look(self, at, found)
 
     monkeypatch.setattr(FlightFeed, "look", interrupted)
     assert cli.main(words(tmp_path, 1)) == 130

@@ -31,7 +31,7 @@ from psabench.report.page import page_without_foot
 from scipy.spatial.transform import Rotation
 
 SHORT = Route(
-    place=(55.7, 37.5, 150.0),
+    place_deg_m=(55.7, 37.5, 150.0),
     heading_deg=30.0,
     taxi=(
         {"taxi_m": 300},

@@ -8,17 +8,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from psabench.koi.fleet.classes import ARCSEC, CLASSES, DEGPH, ReceiverSizes
+from psabench.koi.fleet.classes import ARCSEC, CLASSES, ReceiverSizes
 from psabench.koi.fleet.conditions import CONDITIONS, Condition, Episode, draw_episode
 from psabench.koi.fleet.receiver import Solutions, draw_heights, draw_slow, draw_solutions, states_at
 from psabench.koi.fleet.routes import HOUR_S, ROUTES, Journey, Route, make_journey
 from psabench.koi.fleet.unit import GAMMA, count_up, draw_readings, draw_unit
 from psabench.link.signals import Floats
 from psabench.native.flight_model import Flight
+from psabench.native.nav import DEGPH
 from psabench.native.strapdown import radii_m
 
 SHORT = Route(
-    place=(55.7, 37.5, 150.0),
+    place_deg_m=(55.7, 37.5, 150.0),
     heading_deg=30.0,
     taxi=({"taxi_m": 300}, {"turn_deg": 90}, {"taxi_m": 60}, {"stop_s": 20}),
     air=({"climb_m": 300, "speed_mps": 110}, {"turn_deg": 120}, {"land_mps": 70}, {"stop_s": 30}),
@@ -43,14 +44,14 @@ def off_m(s: Solutions, late_s: float) -> Floats:
     """East, north, up of the solutions from where the aircraft was so long before, (n, 3)."""
     true = states_at(journey(), s.t_s - late_s)
     meridian, vertical = np.array([radii_m(a, h) for a, h in zip(true.lat_rad, true.h_m, strict=True)]).T
-    east = (s.place[:, 1] - true.lon_rad) * vertical * np.cos(true.lat_rad)
-    return np.stack([east, (s.place[:, 0] - true.lat_rad) * meridian, s.place[:, 2] - true.h_m], axis=1)
+    east = (s.place_rad_m[:, 1] - true.lon_rad) * vertical * np.cos(true.lat_rad)
+    return np.stack([east, (s.place_rad_m[:, 0] - true.lat_rad) * meridian, s.place_rad_m[:, 2] - true.h_m], axis=1)
 
 
 @pytest.mark.parametrize("name", ROUTES)
 def test_routes_park_taxi_and_fly_an_hour(name: str) -> None:
     route = ROUTES[name]
-    path = Flight(route.legs, place=route.place, heading_deg=route.heading_deg)
+    path = Flight(route.legs, place_deg_m=route.place_deg_m, heading_deg=route.heading_deg)
     leg_s = [ns * 1e-9 for ns in path.leg_ns]
     kinds = [next(iter(leg)) for leg in route.legs]
     run, land = kinds.index("takeoff_mps"), kinds.index("land_mps")
@@ -168,7 +169,7 @@ def test_conditions_do_what_they_say_and_nothing_else() -> None:
     holds = (clean.t_s >= 700.0) & (clean.t_s < 750.0)
     outage = solutions(c=CONDITIONS["outage"], e=e)
     assert np.array_equal(outage.valid, ~holds)
-    assert np.array_equal(outage.place, clean.place)
+    assert np.array_equal(outage.place_rad_m, clean.place_rad_m)
     late_s = clean.delays_s[0]
     spoof = solutions(c=CONDITIONS["spoof"], e=e)
     east_m, faster_mps = off_m(spoof, late_s)[:, 0], (spoof.v_enu_mps - clean.v_enu_mps)[:, 0]

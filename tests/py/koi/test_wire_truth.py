@@ -13,8 +13,9 @@ import pytest
 from koi_flight import Truth, state_of
 from psabench.errors import BadInput
 from psabench.koi.flight_data import FlightFound
+from psabench.koi.geodesy import MILE_M
 from psabench.koi.wire.live import LandedRule, Landing
-from psabench.koi.wire.truth import MILE_M, Graded, grade_flight, read_truth
+from psabench.koi.wire.truth import Graded, grade_flight, read_truth
 from psabench.link.signals import Floats
 from psabench.native.flight_model import Flight, Leg
 

@@ -69,9 +69,9 @@ def test_what_cannot_be_flown_is_one_line(legs: list[Leg], said: str) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"place": (86.0, 0.0, 0.0)}, "latitude_deg: expected -85 to 85, got 86"),
-        ({"place": (0.0, 181.0, 0.0)}, "longitude_deg"),
-        ({"place": (0.0, 0.0, float("inf"))}, "height_m"),
+        ({"place_deg_m": (86.0, 0.0, 0.0)}, "latitude_deg: expected -85 to 85, got 86"),
+        ({"place_deg_m": (0.0, 181.0, 0.0)}, "longitude_deg"),
+        ({"place_deg_m": (0.0, 0.0, float("inf"))}, "height_m"),
         ({"jerk_mps3": 0.0}, "jerk_mps3: expected 0.1 to 100, got 0"),
         ({"baro": (-1.0, 0.0, 0.0, 0.0)}, "baro.lag_s: expected 0 to 60, got -1"),
     ],

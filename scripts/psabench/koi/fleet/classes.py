@@ -6,11 +6,12 @@ mile in an hour before, and about half of it afterwards. The article gives none.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-DEGPH = ARCSEC = math.radians(1.0) / 3600.0
+from psabench.native.nav import ARCMIN
+
+ARCSEC = ARCMIN / 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.koi.fleet.grade import COLUMNS, MINUTES, REASONS
+from psabench.koi.geodesy import MILE_M
 from psabench.link.signals import Floats
 from psabench.quartz.draws import draw_source
 
-MILE_M = 1852.0  # the article's mile in an hour, read as a nautical one
 FIRST_LATE = 3  # from the fourth flight on a passport knows something
 RESAMPLES, LEVEL = 2000, (2.5, 97.5)
 

@@ -10,16 +10,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from psabench.koi.autocal import Knowledge
-from psabench.koi.fleet.classes import ARCSEC, DEGPH
-from psabench.koi.fleet.receiver import states_at
+from psabench.koi.fleet.receiver import place_rows, states_at
 from psabench.koi.fleet.routes import HOUR_S, Journey
 from psabench.koi.fleet.unit import Errors, Readings
 from psabench.koi.flight_data import FlightFound
+from psabench.koi.geodesy import offset_m
 from psabench.link.signals import Floats
 from psabench.native.flight_model import States
+from psabench.native.nav import ARCMIN, DEGPH
 from psabench.native.strapdown import radii_m
 
-ARCMIN = 60.0 * ARCSEC
 MINUTES = 60  # of an error curve, from take-off
 TO_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 # Words of a reason why a unit did not correct itself, for counting: psabench.koi.trust, take_off, host.
@@ -99,10 +99,7 @@ def minute_rows(t_s: Floats, rows: Floats, j: Journey) -> Floats:
 def place_errors(found: FlightFound, j: Journey) -> Floats:
     """Of the autonomous solution, north and east, m: (m, 2)."""
     true = states_at(j, found.t_s)
-    meridian, vertical = np.array([radii_m(a, h) for a, h in zip(true.lat_rad, true.h_m, strict=True)]).T
-    north = (found.autonomous[:, 0] - true.lat_rad) * meridian
-    east = (found.autonomous[:, 1] - true.lon_rad) * vertical * np.cos(true.lat_rad)
-    return np.stack([north, east], axis=1)
+    return offset_m(found.autonomous[:, :3], place_rows(true))[:, [1, 0]]
 
 
 def in_hour(t_s: Floats, j: Journey) -> np.ndarray:
@@ -144,13 +141,12 @@ def normalised_square(off: Floats, p: Floats) -> float:
 
 def moving_errors(row: Floats, true: States) -> Floats:
     """The nine moving states of koi.h that a solution (15,) has, by the truth at one instant."""
-    lat, h = float(true.lat_rad[0]), float(true.h_m[0])
-    meridian, vertical = radii_m(lat, h)
-    dr = [(row[1] - true.lon_rad[0]) * vertical * math.cos(lat), (row[0] - lat) * meridian, row[2] - h]
+    lat_rad = float(true.lat_rad[0])
+    dr = offset_m(row[None, :3], place_rows(true))[0]
     dv = row[3:6] - true.v_enu_mps[0]
     beta = Rotation.from_matrix(row[6:].reshape(3, 3) @ (TO_ENU @ true.C_nb[0]).T).as_rotvec()
     east, north = row[3] * beta[2], row[4] * beta[2]
-    beta3 = beta[2] + math.tan(lat) / vertical * dr[0]
+    beta3 = beta[2] + math.tan(lat_rad) / radii_m(lat_rad, float(true.h_m[0]))[1] * dr[0]
     return np.array([dr[0], dr[1], dv[0] + north, dv[1] - east, beta[0], beta[1], beta3, dr[2], dv[2]])
 
 

@@ -212,7 +212,9 @@ def predict_season(unit_class: str, journeys: list[Journey], *, learns: bool) ->
 def fly_ideal(j: Journey, cfg: KoiConfig, known: Knowledge, time_s: float) -> tuple[Tracks, FlightHost]:
     """Step by step of the filter's. Raises BadInput for a journey that ends before its alignment."""
     feed = IdealFeed(j)
-    setup = FlightSetup(cfg=cfg, serial="ideal", time_s=time_s, known=known, corrects=False, place=feed.place_at(0))
+    setup = FlightSetup(
+        cfg=cfg, serial="ideal", time_s=time_s, known=known, corrects=False, place_rad_m=feed.place_at(0)
+    )
     host = FlightHost(setup)
     align_s = round(setup.align_s)
     for t in range(1, align_s + 1):

@@ -252,7 +252,7 @@ def html_page(r: Report) -> str:
 
 
 def result_dict(r: Report) -> dict[str, Any]:
-    """For result.json: the same for the same seed, whoever computes."""
+    """For result.json: the same bytes for the same seed."""
     return {
         "format": FORMAT,
         "fleet": asdict(r.fleet),

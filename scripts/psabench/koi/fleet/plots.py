@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from psabench.koi.fleet.figures import MILE_M, Rows, error_curves, largest_errors, rms_curves
+from psabench.koi.fleet.figures import Rows, error_curves, largest_errors, rms_curves
 from psabench.koi.fleet.grade import MINUTES
 from psabench.koi.fleet.linear import Predicted
 from psabench.koi.fleet.season import MODES
+from psabench.koi.geodesy import MILE_M
 from psabench.link.signals import Floats
 from psabench.report import plots as style
 

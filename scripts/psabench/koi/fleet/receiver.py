@@ -14,9 +14,9 @@ import numpy as np
 from psabench.koi.fleet.classes import BaroSizes, ReceiverSizes
 from psabench.koi.fleet.conditions import Condition, Episode
 from psabench.koi.fleet.routes import HOUR_S, Journey
+from psabench.koi.geodesy import moved_place
 from psabench.link.signals import Floats
 from psabench.native.flight_model import States
-from psabench.native.strapdown import radii_m
 
 EARTH_RADPS = 7.292115e-5
 
@@ -27,7 +27,7 @@ class Solutions:
     behind the position."""
 
     t_s: Floats
-    place: Floats  # (m, 3): latitude, longitude, rad; height, m
+    place_rad_m: Floats  # (m, 3): latitude, longitude, height
     v_enu_mps: Floats  # (m, 3)
     valid: np.ndarray
     delays_s: tuple[float, float]
@@ -54,7 +54,7 @@ def draw_solutions(
     valid = ~(c.outage & (t_s >= episode.begin_s) & (t_s < episode.end_s))
     return Solutions(
         t_s=t_s,
-        place=_places_off(there, off_m),
+        place_rad_m=moved_place(place_rows(there), off_m),
         v_enu_mps=v_mps,
         valid=valid,
         delays_s=(float(late[0]), float(late[1])),
@@ -108,9 +108,6 @@ def _lead_astray(c: Condition, e: Episode, t_s: Floats, off_m: Floats, off_mps: 
     off_mps[:, :2] += np.outer(np.where(holds, c.ramp_mps, 0.0), way)
 
 
-def _places_off(s: States, off_m: Floats) -> Floats:
-    """East, north, up added to places."""
-    meridian, vertical = np.array([radii_m(lat, h) for lat, h in zip(s.lat_rad, s.h_m, strict=True)]).T
-    lat = s.lat_rad + off_m[:, 1] / meridian
-    lon = s.lon_rad + off_m[:, 0] / (vertical * np.cos(s.lat_rad))
-    return np.stack([lat, lon, s.h_m + off_m[:, 2]], axis=1)
+def place_rows(s: States) -> Floats:
+    """As geodesy has them."""
+    return np.stack([s.lat_rad, s.lon_rad, s.h_m], axis=1)

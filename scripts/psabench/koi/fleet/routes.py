@@ -48,7 +48,7 @@ TAXI_RIGHT: tuple[Leg, ...] = (
 class Route:
     """What is flown, from where; more than HOUR_S in the air."""
 
-    place: tuple[float, float, float]  # latitude, longitude, deg; height, m
+    place_deg_m: tuple[float, float, float]  # latitude, longitude, height
     heading_deg: float
     taxi: tuple[Leg, ...]
     air: tuple[Leg, ...]  # from the end of the run to the landing
@@ -60,7 +60,7 @@ class Route:
 
 ROUTES: Mapping[str, Route] = {
     "north-west": Route(
-        place=(55.7, 37.5, 150.0),
+        place_deg_m=(55.7, 37.5, 150.0),
         heading_deg=30.0,
         taxi=TAXI_RIGHT,
         air=(
@@ -82,7 +82,7 @@ ROUTES: Mapping[str, Route] = {
         ),
     ),
     "east": Route(
-        place=(55.7, 37.5, 150.0),
+        place_deg_m=(55.7, 37.5, 150.0),
         heading_deg=0.0,
         taxi=TAXI_LEFT,
         air=(
@@ -101,7 +101,7 @@ ROUTES: Mapping[str, Route] = {
         ),
     ),
     "south": Route(
-        place=(46.3, 48.0, 20.0),
+        place_deg_m=(46.3, 48.0, 20.0),
         heading_deg=250.0,
         taxi=TAXI_RIGHT,
         air=(
@@ -122,7 +122,7 @@ ROUTES: Mapping[str, Route] = {
         ),
     ),
     "circles": Route(
-        place=(55.7, 37.5, 150.0),
+        place_deg_m=(55.7, 37.5, 150.0),
         heading_deg=120.0,
         taxi=TAXI_LEFT,
         air=(
@@ -172,7 +172,7 @@ def fly_route(name: str) -> Journey:
 
 def make_journey(route: Route) -> Journey:
     """Raises BadInput for legs that cannot be flown."""
-    path = Flight(route.legs, place=route.place, heading_deg=route.heading_deg)
+    path = Flight(route.legs, place_deg_m=route.place_deg_m, heading_deg=route.heading_deg)
     n = path.end_ns // 10**9 * 10**9 // DT_NS
     angle, speed = path.increments(0, DT_NS, n)
     run = 1 + len(route.taxi)

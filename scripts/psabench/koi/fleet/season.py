@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -18,8 +17,6 @@ from psabench.koi.fleet.unit import SECOND, Errors, Readings, draw_readings, dra
 from psabench.koi.flight_data import Fix, FlightFound, FlightSetup
 from psabench.koi.host import FlightHost
 from psabench.koi.sensors import instrument_class
-from psabench.koi.take_off import DecisionLimits
-from psabench.koi.trust import TrustLimits
 from psabench.link.signals import Floats
 from psabench.native.koi import KoiConfig, UnitClass, koi_default
 from psabench.quartz.draws import draw_source
@@ -27,10 +24,6 @@ from psabench.quartz.draws import draw_source
 DAY_S = 86_400.0
 PARKED_S = 600.0
 VERTICAL_RATIO = 1.5  # as receivers of satellite navigation are (E0)
-# The filter's 5 m stand for slow errors, too: innovations of a receiver of 2 m have a mean square of 0.08, which is no
-# reason to doubt it. Below 0.02 a receiver does not move.
-NIS_MEAN = (0.02, 1.3)
-FLIGHT_TAKEN = 600  # measurements of a flight for the passport, as the host's default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,9 +122,7 @@ def fly_host(d: Drawn, cfg: KoiConfig, mode: Mode, known: Knowledge | None, seri
             time_s=time_s,
             known=known,
             corrects=mode.corrects,
-            place=place,
-            decision=DecisionLimits(nis_mean=NIS_MEAN),
-            trust=TrustLimits(nis_mean=NIS_MEAN, taken=FLIGHT_TAKEN, alone_s=math.inf),
+            place_rad_m=place,
         )
     )
     r, s = d.readings, d.solutions
@@ -145,7 +136,7 @@ def fly_host(d: Drawn, cfg: KoiConfig, mode: Mode, known: Knowledge | None, seri
 
 def fix_of(s: Solutions, k: int) -> Fix:
     """What the receiver puts out at its k-th second."""
-    lat, lon, h = (float(x) for x in s.place[k])
+    lat, lon, h = (float(x) for x in s.place_rad_m[k])
     east, north, up = (float(x) for x in s.v_enu_mps[k])
     return Fix(
         t_s=float(s.t_s[k]), lat_rad=lat, lon_rad=lon, h_m=h, v_enu_mps=(east, north, up), valid=bool(s.valid[k])

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.koi.fleet.classes import ARCSEC, DEGPH, UnitSizes
+from psabench.koi.fleet.classes import ARCSEC, UnitSizes
 from psabench.koi.fleet.routes import DT_S
 from psabench.link.signals import Floats
+from psabench.native.nav import DEGPH
 from psabench.quartz.draws import draw_source
 
 GAMMA = ((0, 0), (1, 0), (1, 1), (1, 2), (2, 0), (2, 2))  # the article's {11, 21, 22, 23, 31, 33}

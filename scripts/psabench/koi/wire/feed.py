@@ -95,9 +95,9 @@ class FlightFeed:
         else:
             self._readings.on_message(m)  # type: ignore[arg-type]
 
-    def look(self, look: Look) -> None:
-        """What the port had, after the frames before it."""
-        solutions = self.stream.take(look.data) if look.data else []
+    def look(self, look: Look, found: list[Solution] | None = None) -> None:
+        """What the port had, after the frames before it. found: by `stream` already."""
+        solutions = self.stream.take(look.data) if found is None else found
         if solutions or not look.data:
             self._drain()
         self._silent.take(self.grid.now_s, look.data, len(solutions))

@@ -21,6 +21,8 @@ from psabench.link.can_host import StepClock
 QUIET_LOOK_S = 1.0  # between two entries of a port without bytes
 SHOWN_S = 60.0  # of the flight, between two reports of its progress
 
+Steps = Generator[tuple[bytes, list[Solution], float], None, None]  # bytes of the port, what they complete, time
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandedRule:
@@ -57,7 +59,6 @@ class LiveFlight:
     def __init__(self, bench: Bench, unit: Bins, port: SerialPort) -> None:
         self._bench, self._unit, self._port = bench, unit, port
         self._landing = Landing(LandedRule())
-        self._watch = PvtStream()  # of the port's bytes as they come: when to look again, and whether it has landed
         self._landed = False
 
     def prepare(self) -> Weights:
@@ -78,8 +79,8 @@ class LiveFlight:
             self._port.take()  # what came before belongs to no time
             self._unit.start()
             begin_s, shown_s = self._bench.time_s, 0.0
-            for look in stack.enter_context(closing(self._looks(recorder))):
-                feed.look(look)
+            for look, found in stack.enter_context(closing(self._looks(feed.stream, recorder))):
+                feed.look(look, found)
                 if feed.grid.now_s >= shown_s + SHOWN_S:
                     shown_s = feed.grid.now_s
                     advance(shown_s)
@@ -88,21 +89,21 @@ class LiveFlight:
                 if self._bench.time_s - begin_s > for_s + END_S:
                     raise DeviceError("increments", 0, expected("readings", f"none since {feed.grid.now_s:.1f} s"))
 
-    def _looks(self, recorder: FlightRecorder) -> Generator[Look, None, None]:
-        """At the port: those with bytes, and others now and then."""
+    def _looks(self, stream: PvtStream, recorder: FlightRecorder) -> Generator[tuple[Look, list[Solution]], None, None]:
+        """At the port, with what it had: those with bytes, and others now and then."""
         clock = self._bench.step_clock
         begin_s = recorder.last_s
         looked_s = self._bench.time_s
-        with closing(self._steps(clock) if clock else self._moments()) as steps:
-            for data, now_s in steps:
+        with closing(self._steps(stream, clock) if clock else self._moments(stream)) as steps:
+            for data, found, now_s in steps:
                 if data or now_s - looked_s >= QUIET_LOOK_S:
                     look = Look(recorder.last_s, begin_s or recorder.last_s - LOOK_S, recorder.frames, data)
                     recorder.look(look)
                     looked_s = now_s
-                    yield look
+                    yield look, found
                 begin_s = recorder.last_s
 
-    def _steps(self, clock: StepClock) -> Generator[tuple[bytes, float], None, None]:
+    def _steps(self, stream: PvtStream, clock: StepClock) -> Steps:
         """In lockstep: while the emulator makes a step, what came in the step before is taken."""
         plan, host, before_s = LookPlan(), self._bench.host, clock.now_s()
         clock.start_run(plan.next_look_s(before_s) - before_s)
@@ -111,31 +112,30 @@ class LiveFlight:
             while True:
                 counts, under_way = clock.finish_run(), False
                 now_s, data = clock.now_s(), self._port.take()
-                if solutions := self._follow(data, now_s):
-                    plan.arrived(before_s, now_s, solutions[-1].tow_s)
+                if found := self._follow(stream, data, now_s):
+                    plan.arrived(before_s, now_s, found[-1].tow_s)
                 else:
                     plan.missed(now_s)
                 clock.start_run(plan.next_look_s(now_s) - now_s)
                 under_way = True
                 host.receive_up_to(counts[0])
-                yield data, now_s
+                yield data, found, now_s
                 before_s = now_s
         finally:
             with suppress(BenchError):  # one that has gone
                 if under_way:
                     host.receive_up_to(clock.finish_run()[0])
 
-    def _moments(self) -> Generator[tuple[bytes, float], None, None]:
+    def _moments(self, stream: PvtStream) -> Steps:
         """In real time, or over a link that does not count."""
         while True:
             self._bench.wait(WALL_S)
             data, now_s = self._port.take(), self._bench.time_s
-            self._follow(data, now_s)
-            yield data, now_s
+            yield data, self._follow(stream, data, now_s), now_s
 
-    def _follow(self, data: bytes, now_s: float) -> list[Solution]:
+    def _follow(self, stream: PvtStream, data: bytes, now_s: float) -> list[Solution]:
         """The solutions that these bytes complete; whether it has landed."""
-        found = self._watch.take(data) if data else []
+        found = stream.take(data) if data else []
         for s in found:
             self._landed = self._landing.take(now_s, math.hypot(*s.v_enu_mps[:2]), valid=s.valid) or self._landed
         return found

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from psabench.koi.flight_data import FlightFound
+from psabench.koi.geodesy import MILE_M
 from psabench.koi.wire.params import NAME
 from psabench.koi.wire.run import KoiRun
-from psabench.koi.wire.truth import MILE_M, Graded
+from psabench.koi.wire.truth import Graded
 from psabench.native.koi import Kind, Reason, Taken
+from psabench.native.nav import ARCMIN, DEGPH
 from psabench.report.page import bullets, section, table, verdict_line, whole_page, write_report
 
-ARCMIN, DEGPH = math.pi / 10_800, math.pi / 648_000
 SHOWN_NAMES = {"beta3": (ARCMIN, "′"), "alpha1": (ARCMIN, "′"), "nu1_radps": (DEGPH, "°/h"), "df1_mps2": (1.0, "m/s²")}
 
 

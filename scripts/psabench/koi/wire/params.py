@@ -69,7 +69,7 @@ class KoiParams:
             time_s=time_s,
             known=known,
             corrects=self.corrects,
-            place=place,
+            place_rad_m=place,
             align_s=self.align_s,
             coarse_s=min(120.0, self.align_s / 2.0),
         )

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from psabench.koi.flight_data import FlightFound
+from psabench.koi.geodesy import MILE_M, offset_m
 from psabench.koi.wire.run import KoiRun
-from psabench.koi.wire.truth import MILE_M, Graded
+from psabench.koi.wire.truth import Graded
+from psabench.native.nav import ARCMIN, DEGPH
 from psabench.report import plots as style
 from psabench.report.page import figure
 
 MINUTE_S, KM = 60.0, 1000.0
 TURN_RADPS = math.radians(0.5)  # more is a turn, on the ground as well
-DEGPH, ARCMIN = math.pi / 648_000, math.pi / 10_800
 SIGMAS = (
     ("beta3", ARCMIN, "heading, ′"),
     ("nu1_radps", DEGPH, "drift ν₁, °/h"),
@@ -39,15 +40,14 @@ def draw_pictures(run: KoiRun) -> Iterator[tuple[str, str]]:
 def _draw_way(run: KoiRun) -> str:
     """Both solutions, and the truth where it is known."""
     f = run.found
-    first = f.hybrid[0, :3]
-    scale_m = np.array([6.378e6 * math.cos(first[0]), 6.378e6])
+    first = np.broadcast_to(f.hybrid[0, :3], (len(f.hybrid), 3))
     with style.drawing(4.2) as (fig, ax):
         for rows, label, color in (
             (f.autonomous, "autonomous", style.SERIES[1]),
             (f.hybrid, "hybrid", style.SERIES[0]),
         ):
-            way = (rows[:, [1, 0]] - first[[1, 0]]) * scale_m / KM
-            ax.plot(*way.T, color=color, lw=1.3, label=label)
+            way_km = offset_m(rows[:, :3], first)[:, :2] / KM
+            ax.plot(*way_km.T, color=color, lw=1.3, label=label)
         if run.graded is not None:
             ax.plot(*(run.graded.way_m.T / KM), color=style.MUTED, lw=0.8, ls=":", label="truth")
         ax.set_xlabel("east, km")

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from psabench.koi.geodesy import MILE_M
 from psabench.koi.sensors import instrument_class
 from psabench.koi.wire.season import NAME, Season
-from psabench.koi.wire.truth import MILE_M
+from psabench.native.nav import DEGPH
 from psabench.report import plots as style
 from psabench.report.page import bullets, figure, section, table, verdict_line, whole_page, write_report
 
-DEGPH = math.pi / 648_000
 NOTES = (
     "Each flight begins with what the passport knows by then: the sensors are corrected by it. What is not known is "
     "the persistent error less that, of the drawn unit; the host does not see it.",

@@ -15,9 +15,9 @@ from psabench.errors import BadInput, expected
 from psabench.koi.autocal import InstrumentClass
 from psabench.link.own import replace_file
 from psabench.link.signals import Floats
+from psabench.native.nav import DEGPH
 from psabench.places import proto_file
 
-DEGPH = np.pi / 648_000
 FLIGHT_SEEDS = 1000  # of a season's flights behind one another
 
 

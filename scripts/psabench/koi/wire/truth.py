@@ -11,10 +11,10 @@ import numpy as np
 
 from psabench.errors import BadInput, expected
 from psabench.koi.flight_data import FlightFound
+from psabench.koi.geodesy import offset_m, radii_rows_m
 from psabench.link.signals import Floats
 
-A_M, E2 = 6_378_137.0, 6.694379990141317e-3  # WGS 84
-HOUR_S, MILE_M = 3600.0, 1852.0
+HOUR_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,11 +97,11 @@ def grade_flight(found: FlightFound, begin_s: float, truth: FlightTruth) -> Grad
     first = np.array([truth.lat_rad[0], truth.lon_rad[0], truth.h_m[0]])
     return Graded(
         t_s=found.t_s[there],
-        autonomous_m=_offset_m(autonomous[:, :3], place),
-        hybrid_m=_offset_m(hybrid[:, :3], place),
+        autonomous_m=offset_m(autonomous[:, :3], place),
+        hybrid_m=offset_m(hybrid[:, :3], place),
         hybrid_mps=hybrid[:, 3:6] - speed,
         heading_rad=(heading - true_heading + math.pi) % (2.0 * math.pi) - math.pi,
-        way_m=_offset_m(place, np.broadcast_to(first, place.shape))[:, :2],
+        way_m=offset_m(place, np.broadcast_to(first, place.shape))[:, :2],
         bank_rad=np.interp(at_s, truth.t_s, truth.bank_rad),
     )
 
@@ -125,18 +125,7 @@ def _place_at(truth: FlightTruth, at_s: Floats) -> tuple[Floats, Floats]:
 
 
 def _place_rates(truth: FlightTruth) -> Floats:
-    """Of latitude, longitude, height; WGS 84."""
-    sin2 = np.sin(truth.lat_rad) ** 2
-    w = np.sqrt(1.0 - E2 * sin2)
-    meridian, vertical = A_M * (1.0 - E2) / w**3 + truth.h_m, A_M / w + truth.h_m
+    """Of latitude, longitude, height."""
+    meridian, vertical = radii_rows_m(truth.lat_rad, truth.h_m)
     east, north, up = truth.v_enu_mps.T
     return np.stack([north / meridian, east / (vertical * np.cos(truth.lat_rad)), up], axis=1)
-
-
-def _offset_m(place: Floats, true: Floats) -> Floats:
-    """East, north, up, (m, 3)."""
-    lat = true[:, 0]
-    w = np.sqrt(1.0 - E2 * np.sin(lat) ** 2)
-    meridian, vertical = A_M * (1.0 - E2) / w**3 + true[:, 2], A_M / w + true[:, 2]
-    off = place - true
-    return np.stack([off[:, 1] * vertical * np.cos(lat), off[:, 0] * meridian, off[:, 2]], axis=1)
