@@ -136,7 +136,7 @@ def one_word_functions(root: Path) -> list[str]:
 
 
 def loose_modules(root: Path) -> list[str]:
-    return [p.name for p in sorted((root / PACKAGE).glob("*.py")) if p.name != "__init__.py"]
+    return [p.name for p in sorted((root / PACKAGE).glob("*.py")) if not p.name.startswith("__")]
 
 
 def lines_of(root: Path, room: str, endings: tuple[str, ...]) -> int:
@@ -166,8 +166,8 @@ RULES = {
     # 61,700, 62,300 and 2,050 before the satellite receiver, the filter with it and faults of gyros.
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 64_140, 64_140),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 68_580, 68_580),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_211, 2_211),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 68_760, 68_760),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_218, 2_218),
 }
 
 

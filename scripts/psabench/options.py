@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -24,11 +24,20 @@ CAN_HELP = f"""\
 {BUS_HELP}. Default: python-can's configuration ($CAN_INTERFACE, $CAN_CHANNEL, ~/.canrc)"""
 
 
+def _choice_text(given: str, choices: str) -> str:
+    return expected(choices, f"{given!r}{did_you_mean(given, choices.split(', '))}")
+
+
+def did_you_mean(given: str, known: Sequence[str]) -> str:
+    """For the end of an error: the known word that is nearest to a mistyped one, if any is near."""
+    return "".join(f" (did you mean {near}?)" for near in difflib.get_close_matches(given, known, 1))
+
+
 # argparse's messages: what to make of the parts that each pattern finds, in the form of `expected`.
 _VALUES = {"int": "an integer", "float": "a number", "Path": "a path"}
 _MESSAGES: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
     (r"invalid (\w+) value: (.*)", lambda m: expected(_VALUES.get(m[1], f"a value ({m[1]})"), m[2])),
-    (r"invalid choice: (.*) \(choose from (.*)\)", lambda m: expected(m[2].replace("'", ""), m[1])),
+    (r"invalid choice: '?(.*?)'? \(choose from (.*)\)", lambda m: _choice_text(m[1], m[2].replace("'", ""))),
     (r"expected one argument", lambda m: expected("a value", "none")),
     (r"expected at least one argument", lambda m: expected("at least one value", "none")),
     (r"ignored explicit argument (.*)", lambda m: expected("no value", m[1])),
@@ -53,9 +62,8 @@ class Parser(argparse.ArgumentParser):
         if rest:
             given = rest[0].partition("=")[0]
             options = [a.option_strings[-1] for a in self._actions if a.option_strings and a.dest != "help"]
-            hint = "".join(f" (did you mean {o}?)" for o in difflib.get_close_matches(given, options, 1))
             known = ", ".join(options) if len(options) <= LISTED else "an option that --help lists"
-            raise BadInput(expected(known, f"{given}{hint}", self._name()))
+            raise BadInput(expected(known, f"{given}{did_you_mean(given, options)}", self._name()))
         return found, rest
 
     def error(self, message: str) -> NoReturn:

@@ -33,6 +33,9 @@ MISTAKES: list[tuple[str, str]] = [
     ("run --out turns", "run: expected turns"),
     ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, "),
     ("run spin --positions 80", "heading-hold or script, got 'spin'"),
+    ("run gyrocompas", "heading-hold or script, got 'gyrocompas' (did you mean gyrocompass?)"),
+    ("rnu", "COMMAND: expected run, record, convert, "),
+    ("rnu", "shell, got 'rnu' (did you mean run?)"),
     (
         "run turns --positions 80",
         "turns: expected an option that --help lists, got --positions (did you mean --condition?)",

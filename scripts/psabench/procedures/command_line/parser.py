@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, yes_no
+from psabench.options import Parser, did_you_mean, yes_no
 from psabench.procedures.command_line.bench_options import EVERY
 from psabench.procedures.command_line.commands import COMMANDS, Command
 from psabench.shell import command_line
@@ -133,4 +133,4 @@ def _without_procedure(args: argparse.Namespace) -> int:
     known = f"{', '.join(COMMANDS)} or {SCRIPT}"
     if args.procedure is None:
         raise BadInput(expected(f"{known} (psabench run --help explains them)", "none", "run"))
-    raise BadInput(expected(known, repr(args.procedure), "run"))
+    raise BadInput(expected(known, f"{args.procedure!r}{did_you_mean(args.procedure, list(COMMANDS))}", "run"))
