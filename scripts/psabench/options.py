@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -131,6 +132,16 @@ def node_id(text: str) -> int:
 def add_scpi(p: Any, what: str) -> None:
     """--scpi NAME=ADDRESS, which may be repeated."""
     p.add_argument("--scpi", action="append", default=[], metavar="NAME=ADDRESS", help=what)
+
+
+def add_json(p: Any) -> None:
+    """--json: the command prints its data with `print_json`."""
+    p.add_argument("--json", action="store_true", help="print JSON in place of tables")
+
+
+def print_json(data: object) -> None:
+    """As every command with --json does."""
+    print(json.dumps(data, indent=1, ensure_ascii=False))
 
 
 def add_inputs(p: Any) -> None:

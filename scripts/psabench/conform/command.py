@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from psabench.boards.registry import BUS_BOARDS, NAMES, PLAYED
 from psabench.conform.defaults import LINKS, MAX_S, OUT
@@ -17,9 +17,14 @@ from psabench.options import (
     add_clock_ppm,
     add_default_node,
     add_inputs,
+    add_json,
     add_scpi,
     add_selection,
+    print_json,
 )
+
+if TYPE_CHECKING:
+    from psabench.conform.requirements import Requirement
 
 EPILOG = """\
 examples:
@@ -172,6 +177,7 @@ def _add_list(suites: Any) -> None:
     )
     p.set_defaults(handler=_list)
     _add_board(p)
+    add_json(p)
 
 
 def _add_board(p: argparse.ArgumentParser) -> None:
@@ -192,6 +198,16 @@ def _list(args: argparse.Namespace) -> int:
     from psabench.conform.profile import variant
     from psabench.conform.selection import requirements_of
 
-    for r in requirements_of(variant(args.board, args.profile)):
+    found = requirements_of(variant(args.board, args.profile))
+    if args.json:
+        print_json([_requirement_dict(r) for r in found])
+        return 0
+    for r in found:
         print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
     return 0
+
+
+def _requirement_dict(r: Requirement) -> dict[str, Any]:
+    """Of JSON's types."""
+    found: dict[str, Any] = {name: getattr(r, name) for name in ("id", "kind", "grade", "text", "original", "source")}
+    return found | {"observe": dict(r.observe), "unobservable": r.unobservable, "limits": dict(r.limits)}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from psabench.options import Parser
+from psabench.options import Parser, add_json, print_json
 
 STORE = Path("build/passports.sqlite")
 
@@ -36,17 +37,18 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     add.add_argument("result", type=Path, metavar="RESULT", help="folder of a report, or its result.json")
     add.add_argument("--serial", required=True, metavar="SERIAL", help="of the unit; made where it is new")
     add.add_argument("--type", required=True, metavar="TYPE", help="of the unit: mems, quartz, ...")
-    _add_subcommand(commands, "list", "list the units", _list_units)
+    add_json(_add_subcommand(commands, "list", "list the units", _list_units))
     show = _add_subcommand(commands, "show", "show what is valid of a unit", _show_unit)
     show.add_argument("serial", metavar="SERIAL")
     show.add_argument("--all", action="store_true", help="show the runs that are superseded as well")
+    add_json(show)
     export = _add_subcommand(commands, "export", "write a passport as JSON (proto/passport.schema.json)", _export_unit)
     export.add_argument("serial", metavar="SERIAL")
     export.add_argument("--out", type=Path, metavar="FILE", help="in place of the terminal")
     diff = _add_subcommand(commands, "diff", "compare two runs", _compare_runs)
     diff.add_argument("a", metavar="A", help="SERIAL@NUMBER of a run; SERIAL: its latest one")
     diff.add_argument("b", metavar="B", help="the other one; SERIAL: its latest of the same method")
-    diff.add_argument("--json", action="store_true", help="print JSON in place of tables")
+    add_json(diff)
     header = _add_subcommand(commands, "header", "write a compensation as a C header in integers", _write_header)
     header.add_argument("serial", metavar="SERIAL[@NUMBER]")
     header.add_argument("--quantity", required=True, metavar="NAME", help="that was fitted against temperature")
@@ -76,20 +78,28 @@ def _add_results(args: argparse.Namespace) -> int:
 
 
 def _list_units(args: argparse.Namespace) -> int:
-    from psabench.passport.document import list_lines
+    from psabench.passport.document import list_lines, passport_dict
     from psabench.passport.store import PassportStore
 
     with PassportStore(args.store, read_only=True) as store:
-        print("\n".join(list_lines([store.read_passport(serial) for serial in store.unit_serials()])))
+        units = [store.read_passport(serial) for serial in store.unit_serials()]
+    if args.json:
+        print_json([passport_dict(unit) for unit in units])
+    else:
+        print("\n".join(list_lines(units)))
     return 0
 
 
 def _show_unit(args: argparse.Namespace) -> int:
-    from psabench.passport.document import passport_lines
+    from psabench.passport.document import passport_dict, passport_lines
     from psabench.passport.store import PassportStore
 
     with PassportStore(args.store, read_only=True) as store:
-        print("\n".join(passport_lines(store.read_passport(args.serial), history=args.all)))
+        unit = store.read_passport(args.serial)
+    if args.json:
+        print_json(passport_dict(unit if args.all else replace(unit, runs=unit.current_runs())))
+    else:
+        print("\n".join(passport_lines(unit, history=args.all)))
     return 0
 
 
@@ -112,7 +122,7 @@ def _compare_runs(args: argparse.Namespace) -> int:
         b = find_run(store, args.b, lambda run: run.method == a.method, f"a run of {a.method}")
     found = diff.compare_results(comparable_dict(a), comparable_dict(b))
     if args.json:
-        print(json.dumps(diff.diff_dict(found), indent=1, ensure_ascii=False))
+        print_json(diff.diff_dict(found))
     else:
         print("\n".join(diff.diff_lines(found)))
     return 0 if found.same else 1

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import Parser
+from psabench.options import Parser, add_json, print_json
 
 EPILOG = """\
 A and B are folders of reports, or files result.json or conform.json. The results are the same when all but provenance
@@ -32,7 +31,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     diff.set_defaults(handler=_compare_reports)
     diff.add_argument("a", type=Path, metavar="A", help="folder or file of a result")
     diff.add_argument("b", type=Path, metavar="B", help="the other one")
-    diff.add_argument("--json", action="store_true", help="print JSON in place of tables")
+    add_json(diff)
     return p.parse_args(words)
 
 
@@ -41,7 +40,7 @@ def _compare_reports(args: argparse.Namespace) -> int:
 
     found = diff.compare_results(diff.read_result(args.a), diff.read_result(args.b))
     if args.json:
-        print(json.dumps(diff.diff_dict(found), indent=1, ensure_ascii=False))
+        print_json(diff.diff_dict(found))
     else:
         print("\n".join(diff.diff_lines(found)))
     return 0 if found.same else 1

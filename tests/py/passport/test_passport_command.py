@@ -60,6 +60,11 @@ def test_a_calibration_enters_and_is_shown(tmp_path: Path, capsys: pytest.Captur
     assert "run 1:" not in shown
     assert run_passport(tmp_path, "show", "QA-1", "--all") == 0
     assert "run 1:" in capsys.readouterr().out
+    for words, numbers in ((["show", "QA-1"], [2]), (["show", "QA-1", "--all"], [1, 2]), (["list"], [1, 2])):
+        assert run_passport(tmp_path, *words, "--json") == 0
+        found_json = json.loads(capsys.readouterr().out)
+        (unit,) = found_json if words == ["list"] else [found_json]
+        assert [run["number"] for run in unit["runs"]] == numbers
     with PassportStore(tmp_path / "p.sqlite", read_only=True) as store:
         found = store.read_passport("QA-1").runs[0].covariance
     assert found is not None

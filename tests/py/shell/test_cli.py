@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import shlex
@@ -213,7 +214,7 @@ def test_help_of_run_names_each_procedure_and_no_option_of_any(
     for c in COMMANDS.values():
         assert re.search(rf"^  {c.name} +{re.escape(' '.join(c.summary.split()[:6]))}", told, re.MULTILINE)
     assert re.search(r"^  script +lines of the shell", told, re.MULTILINE)
-    assert set(re.findall(r"^  .*?(--[a-z-]+)", told, re.MULTILINE)) == {"--help", "--list"}
+    assert set(re.findall(r"^  .*?(--[a-z-]+)", told, re.MULTILINE)) == {"--help", "--list", "--json"}
 
 
 @pytest.mark.parametrize("name", list(COMMANDS))
@@ -289,6 +290,24 @@ def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFi
     assert [line.partition(":")[0] for line in lines[::2]] == list(COMMANDS)
     for line, c in zip(lines[1::2], COMMANDS.values(), strict=True):
         assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.parameters.fields), *c.common]
+
+
+def test_list_as_json_has_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "--list", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [c["name"] for c in found] == list(COMMANDS)
+    turns = COMMANDS["turns"].parameters.fields
+    assert {p["option"]: p["default"] for p in found[0]["parameters"]} == {
+        f"--{name.replace('_', '-')}": f.default for name, f in turns.items()
+    }
+
+
+def test_requirements_as_json_are_those_of_the_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["conform", "list", "--board", "pik"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert cli.main(["conform", "list", "--board", "pik", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [f"{r['id']:16} {r['grade']} {'/'.join(r['observe']) or '-':16} {r['text']}" for r in found] == lines
 
 
 def test_without_a_command_help_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

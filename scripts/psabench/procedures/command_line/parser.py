@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, did_you_mean, yes_no
+from psabench.options import Parser, add_json, did_you_mean, print_json, yes_no
 from psabench.procedures.command_line.bench_options import EVERY
 from psabench.procedures.command_line.commands import COMMANDS, Command
 from psabench.shell import command_line
@@ -46,6 +46,7 @@ def _parser() -> Parser:
     )
     p.set_defaults(handler=_without_procedure)
     p.add_argument("--list", action="store_true", help="list the procedures and their parameters")
+    add_json(p)
     p.add_argument("procedure", nargs="?", metavar="PROCEDURE", help=argparse.SUPPRESS)
     return p
 
@@ -54,7 +55,7 @@ def words(argv: Sequence[str]) -> tuple[str, list[str]]:
     """The procedure, wherever among its options it is, and the other words; "": none, and what `run` takes."""
     rest = list(argv)
     if "--list" in rest:
-        return "", ["--list"]
+        return "", [w for w in rest if w in ("--list", "--json")]
     at = _procedure_at(rest)
     if at is None:
         return "", [w for w in rest if w in ("-h", "--help")]
@@ -125,6 +126,9 @@ def _option(parameter: str) -> str:
 
 
 def _without_procedure(args: argparse.Namespace) -> int:
+    if args.list and args.json:
+        print_json([_command_dict(c) for c in COMMANDS.values()])
+        return 0
     if args.list:
         for c in COMMANDS.values():
             print(f"{c.name}: {c.summary}")
@@ -134,3 +138,12 @@ def _without_procedure(args: argparse.Namespace) -> int:
     if args.procedure is None:
         raise BadInput(expected(f"{known} (psabench run --help explains them)", "none", "run"))
     raise BadInput(expected(known, f"{args.procedure!r}{did_you_mean(args.procedure, list(COMMANDS))}", "run"))
+
+
+def _command_dict(c: Command) -> dict[str, Any]:
+    """Of JSON's types: parameters with their defaults, and the options of the bench and the report."""
+    taken = [
+        {"option": _option(name), "unit": f.metadata["unit"], "default": f.default, "help": f.metadata["help"]}
+        for name, f in c.parameters.fields.items()
+    ]
+    return {"name": c.name, "summary": c.summary, "parameters": taken, "options": list(c.common)}
