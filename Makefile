@@ -44,6 +44,7 @@ CXXSANFL := $(SANFL) $(if $(findstring undefined,$(SAN)),-fsanitize=float-cast-o
 CXXCOMPILE = $(CXX) $(CXXSTD) $(CXXWARN) -I. $(EIGEN) $(CPPFLAGS) $(CXXSANFL) $(CXXFLAGS)
 COMPILE = $(CC) $(FLAGS) $(SANFL) $(CFLAGS)
 LINK    = $(CC) $(SANFL) $(CFLAGS) $(LDFLAGS)
+RPATH  ?= -Wl,-rpath,'$$ORIGIN/../lib'#   of the emulator: libraries that a wheel has beside it (setup.py); a distribution sets it to nothing
 # One word a step; V=1 shows the whole commands.
 Q   = $(if $(V),,@)
 say = @mkdir -p $(@D)$(if $(V),,; echo '  $(1)	$@')
@@ -74,7 +75,7 @@ all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emula
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
 $(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
 	$(call say,LINK)
-	$(Q)$(LINK) -o $@ $^ $(LIBS)
+	$(Q)$(LINK) $(RPATH) -o $@ $^ $(LIBS)
 
 # For the programs of tests. A thin archive (T): an ordinary one would keep one object of each file name, and every board has its board.o.
 $(BUILD)/lib/emu.a: $(LIB_OBJ)

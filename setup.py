@@ -4,6 +4,7 @@ An editable install compiles nothing: it finds the emulator and the library in b
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,9 @@ ROOT = Path(__file__).resolve().parent
 SCRATCH = ROOT / "build" / "wheel"  # build/ itself holds the emulator's objects
 # For linking, with paths of this machine in them: who compiles against the library installs it with make.
 NOT_IN_THE_WHEEL = ["lib/*.a", "lib/pkgconfig", "lib/*.so", "share/libsigrokdecode"]
+
+
+SYSTEM = re.compile(r"linux-vdso|ld-linux|lib(c|m|dl|rt|pthread|gcc_s)\.so")  # each Linux has these
 
 
 class BuildPy(build_py):
@@ -55,8 +59,20 @@ def install(bundle: Path) -> None:
     for pattern in NOT_IN_THE_WHEEL:
         for path in bundle.glob(pattern):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
+    add_libraries(bundle)
     for binary in [*bundle.glob("bin/*"), *bundle.glob("lib/*.so.*")]:
         subprocess.run(["strip", "--strip-unneeded", binary], check=True)  # debug information names our folders
+
+
+def add_libraries(bundle: Path) -> None:
+    """What the emulator needs beside libc, so that a machine that installs the wheel needs no package of its system.
+
+    The emulator looks in ../lib first (RPATH of the Makefile).
+    """
+    needed = subprocess.run(["ldd", bundle / "bin/psa-emu"], capture_output=True, text=True, check=True).stdout
+    for name, path in re.findall(r"^\s*(\S+) => (/\S+)", needed, re.MULTILINE):
+        if not SYSTEM.match(name):
+            shutil.copyfile(path, bundle / "lib" / name)
 
 
 if __name__ == "__main__":

@@ -167,7 +167,7 @@ RULES = {
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 64_140, 64_140),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 68_800, 68_800),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_218, 2_218),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_219, 2_219),
 }
 
 

@@ -6,6 +6,7 @@ The environment sees the packages of .venv (numpy and so on) but not the psabenc
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -87,6 +88,14 @@ def test_the_command_runs_a_procedure_on_its_own_emulator(programs: Path, tmp_pa
 def test_the_emulator_is_a_command_too(programs: Path, tmp_path: Path) -> None:
     said = run([programs / "psa-emu", "quiet", "--pace", "free", "--for", "5ms"], tmp_path, timeout_s=30)
     assert said.splitlines()[-1] == "ready all"
+
+
+def test_the_emulator_needs_no_library_but_libc_of_the_machine(programs: Path) -> None:
+    (emulator,) = programs.parent.glob("lib/python3*/site-packages/psabench/bundle/bin/psa-emu")
+    loaded = dict(re.findall(r"^\s*(\S+) => (\S+)", run(["ldd", emulator], programs), re.MULTILINE))
+    foreign = {name for name, path in loaded.items() if not Path(path).resolve().is_relative_to(programs.parent)}
+    assert foreign == {"libc.so.6", "libm.so.6"}
+    assert {"libcjson.so.1", "libfyaml.so.0"} <= set(loaded)
 
 
 def test_python_uses_its_own_emulator_library_and_files(programs: Path, tmp_path: Path) -> None:
