@@ -283,7 +283,7 @@ static bool check_delays(const struct psa2_profile *p, char *why, size_t cap)
         const double fall_ns = p->line_delay_ns[i] + p->line_skew_ns[i];
         if (fall_ns < 0.0)
             return why_fail(why, cap, "line_skew_ns: expected -line_delay_ns = %g or more, got %g",
-                            -p->line_delay_ns[i], p->line_skew_ns[i]);
+                            0.0 - p->line_delay_ns[i], p->line_skew_ns[i]);
         if (p->line_skew_ns[i] >= half_ns || p->line_skew_ns[i] <= -half_ns)
             return why_fail(why, cap, "line_skew_ns: expected less than half a period of CLK = %g ns, got %g", half_ns,
                             p->line_skew_ns[i]);
