@@ -67,6 +67,6 @@ def _with_wires(s: Dut) -> Iterator[None]:
 
 
 @recorded("pairs", boards=("psa2",), before=Dut.wait_ready, around=_with_wires, streaming=True)
-def pairs(s: Dut, take: Take) -> None:
+def stream_with_wires(s: Dut, take: Take) -> None:
     """Some frames, with the wires of the pairs."""
     s.run_for(PAIRS_S)
