@@ -153,7 +153,7 @@ static bool arm_job(struct service *s, const struct control_capture *a)
     struct unit *u = &s->bench->unit[a->unit];
     const struct capture_cfg cfg = {.pre_ns = a->pre_ns,
                                     .post_ns = a->post_ns,
-                                    .mask = TRACE_FIRST(u->type->line_count),
+                                    .mask = bench_recorded(s->bench, a->unit, s->o->pairs),
                                     .sig = a->line,
                                     .when = (enum capture_when)a->when,
                                     .ring = malloc(a->ring_bytes),

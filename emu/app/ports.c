@@ -153,7 +153,10 @@ static bool line_start(void *ctx, int64_t t_ns)
     struct bench *b = ctx;
     (void)t_ns;
     const struct unit *u = &b->unit[b->watched];
-    const struct sampler_cfg cfg = sampler_line_port(&b->sampler.clock, u->type->port_lines, b->line_ring);
+    const bool wires = b->line_wires && u->type->pair_port_lines;
+    const char *const *const names = wires ? u->type->pair_port_lines : u->type->port_lines;
+    const struct sampler_cfg cfg = sampler_line_port(&b->sampler.clock, names, b->line_ring);
+    if (wires) line_pairs_show(&u->board->line);
     return sampler_start(&b->sampler, unit_trace(u), &cfg);
 }
 
@@ -179,6 +182,7 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     const struct line_source source = {b,         line_start,   line_stop,
                                        line_take, line_waiting, p->hub[0].lossless ? SAMPLER_RING / 2 : 0};
     b->sampler.clock = (struct clk){.hz = o->line_hz, .div = 1};
+    b->line_wires = o->pairs;
     p->line = calloc(1, sizeof *p->line);
     const int err = p->line ? line_pty_open(p->line, &p->links, &source, name) : -ENOMEM;
     if (!err) return true;
@@ -379,7 +383,8 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     if (!o->vcd) return true;
     p->vcd = own_file_output("--vcd ", o->vcd, &p->refused, why, cap);
     if (!p->vcd) return false;
-    return bench_record(b, b->watched, p->vcd, o->vcd_unit_ns, 0) ||
+    const struct bench_recording what = {b->watched, o->pairs, o->vcd_unit_ns, 0};
+    return bench_record(b, &what, p->vcd) ||
            why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);
 }
 

@@ -153,7 +153,7 @@ static bool do_vcd_flush(void *ctx, char *why)
     return !s->vcd_why[0];
 }
 
-static bool do_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why)
+static bool do_vcd_start(void *ctx, const char *path, unsigned unit, bool wires, uint64_t max_bytes, char *why)
 {
     struct service *s = ctx;
     bool user;
@@ -171,7 +171,8 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t ma
     s->ports.vcd = file;
     s->vcd_why[0] = '\0';
     snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
-    return bench_record(s->bench, unit, file, s->o->vcd_unit_ns, max_bytes);
+    const struct bench_recording what = {unit, wires || s->o->pairs, s->o->vcd_unit_ns, max_bytes};
+    return bench_record(s->bench, &what, file);
 }
 
 static bool do_vcd_stop(void *ctx, char *why)

@@ -162,14 +162,22 @@ void bench_free(struct bench *b)
     b->cycle = NULL;
 }
 
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes)
+uint64_t bench_recorded(struct bench *b, unsigned unit, bool wires)
 {
-    struct unit *u = &b->unit[unit];
+    const struct unit *u = &b->unit[unit];
+    if (!wires) return TRACE_FIRST(u->type->line_count);
+    line_pairs_show(&u->board->line);
+    return TRACE_FIRST(unit_trace(u)->count);
+}
+
+bool bench_record(struct bench *b, const struct bench_recording *r, FILE *out)
+{
+    struct unit *u = &b->unit[r->unit];
     const struct vcd_cfg cfg = {.out = out,
                                 .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
-                                .unit_ns = unit_ns,
-                                .max_bytes = max_bytes,
-                                .mask = TRACE_FIRST(u->type->line_count),
+                                .unit_ns = r->unit_ns,
+                                .max_bytes = r->max_bytes,
+                                .mask = bench_recorded(b, r->unit, r->wires),
                                 .from_ns = b->sched.now_ns};
     b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));
     return b->recording;

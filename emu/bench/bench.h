@@ -44,6 +44,7 @@ struct bench {
     bool recording;
     struct vcd vcd;
     struct sampler sampler; /* of the line port */
+    bool line_wires;        /* that has the wires B of differential pairs, too */
     uint8_t line_ring[SAMPLER_RING];
     struct trace_group traces; /* of all units */
     /* As many as the scenario has, from the heap: half a megabyte of addresses each, a tenth of it in use without observers */
@@ -60,9 +61,18 @@ void bench_free(struct bench *b); /* what bench_init() took; harmless after it f
 /* Index of the unit of that name, or -1. */
 int bench_find_unit(const struct scenario *s, const char *name);
 
-/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. max_bytes: as struct vcd_cfg has
- * it. False: no such time unit. */
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes);
+/* Signals of a unit that a recording has; with the wires of differential pairs, which move from then on. */
+uint64_t bench_recorded(struct bench *b, unsigned unit, bool wires);
+
+struct bench_recording {
+    unsigned unit;
+    bool wires; /* of differential pairs, too */
+    uint32_t unit_ns;
+    uint64_t max_bytes; /* as struct vcd_cfg has it */
+};
+
+/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. False: no such time unit. */
+bool bench_record(struct bench *b, const struct bench_recording *r, FILE *out);
 
 void bench_power_up(struct bench *b);
 

@@ -66,7 +66,10 @@ struct board_type {
     /* what is on it */
     const struct board_line *lines;
     unsigned line_count;
-    const char *const *port_lines;             /* bits 0.. of the line port's byte, up to 7 names, then NULL */
+    const char *const *port_lines;  /* bits 0.. of the line port's byte, up to 7 names, then NULL */
+    const struct board_pair *pairs; /* signals behind its lines: A and B of the first, of the next ...; NULL: none */
+    unsigned pair_count;
+    const char *const *pair_port_lines;        /* of the line port with wires; NULL: as without */
     unsigned frame_line;                       /* whose falls begin a frame */
     unsigned pulse_line;                       /* whose pulses have their number in a frame */
     unsigned (*pulses)(const struct board *b); /* how many of them; NULL: no line has such pulses */

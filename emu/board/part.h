@@ -15,6 +15,12 @@ struct board_line {
     bool level;       /* before the first power-up and at rest */
 };
 
+/* A line that leaves the board as a differential pair: its wires at the driver. */
+struct board_pair {
+    unsigned line;
+    const char *a, *b; /* "Int_A", "Int_B" */
+};
+
 /* A board's list of events names each once: as constants PREFIX_EV_NAME in the order of the list, and as names. */
 #define BOARD_EVENT(prefix, name)      prefix##_EV_##name,
 #define BOARD_EVENT_NAME(prefix, name) #name,

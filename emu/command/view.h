@@ -53,8 +53,8 @@ struct control_sim { /* the time */
 };
 
 struct control_recording { /* of the lines of a unit, as VCD; start NULL: there is none */
-    /* max_bytes: where a recording ends by itself; 0: it does not. */
-    bool (*start)(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why);
+    /* wires: with those of differential pairs. max_bytes: where a recording ends by itself; 0: it does not. */
+    bool (*start)(void *ctx, const char *path, unsigned unit, bool wires, uint64_t max_bytes, char *why);
     bool (*stop)(void *ctx, char *why);
     bool (*flush)(void *ctx, char *why);
 };

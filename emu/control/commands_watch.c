@@ -63,7 +63,8 @@ static enum control_outcome do_vcd_start(const struct control_call *call)
     const struct control_bench *b = call->bench;
     if (!b->recording.start || !b->units) return control_reject(call->control, "state", "no recordings on this bench");
     const double limit_mb = call->v[2].given ? call->v[2].real : VCD_LIMIT_MB;
-    const bool done = b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, (uint64_t)(limit_mb * 1e6),
+    const bool wires = call->v[3].given && call->v[3].on;
+    const bool done = b->recording.start(b->ctx, call->v[0].text, call->v[1].unit, wires, (uint64_t)(limit_mb * 1e6),
                                          call->control->error.why);
     return done ? CONTROL_DONE : control_failed(call->control, "state");
 }
@@ -98,7 +99,8 @@ static const struct control_command rows[] = {
     {"lines", "Reads the levels of a unit's lines; with a line fault, those of 0.2 ms ago.", CONTROL_ARGS(FIRST_UNIT), .run = do_lines},
     {"vcd.start", "Starts recording the lines of a unit to a VCD file. A converter word or STEP pulse that is in progress at the start is not recorded.",
      CONTROL_ARGS({"path", CONTROL_TEXT, .what = "file to write; an existing file is replaced"}, FIRST_UNIT,
-      {"limit_mb", CONTROL_REAL, true, "MB", 0.1, 1e6, .what = "size at which the recording ends; default: 1000", .def = VCD_LIMIT_MB}), .run = do_vcd_start},
+      {"limit_mb", CONTROL_REAL, true, "MB", 0.1, 1e6, .what = "size at which the recording ends; default: 1000", .def = VCD_LIMIT_MB},
+      {"pairs", CONTROL_BOOL, true, .what = "with the wires A and B of differential lines; default: as --pairs says"}), .run = do_vcd_start},
     {"vcd.stop", "Stops the recording; it ends 0.2 ms before now, since later edges are not final.", NULL, .run = do_vcd_stop},
     {"vcd.flush", "Flushes the recording to the VCD file with a closing time (in the first 0.2 ms: the header only).", NULL, .run = do_vcd_flush},
 };

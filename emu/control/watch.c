@@ -201,7 +201,7 @@ uint64_t control_lines(struct control *c, unsigned unit, int64_t t_ns)
     struct trace *t = unit_trace(c->bench->unit[unit]);
     struct trace_sink *probe = &c->watch.probe[unit];
     if (!probe->mask) {
-        *probe = (struct trace_sink){.mask = TRACE_FIRST(t->count), .steps = ignore_steps};
+        *probe = (struct trace_sink){.mask = TRACE_FIRST(t->count) & ~t->wires, .steps = ignore_steps};
         trace_attach(t, probe);
     }
     return trace_known(t, t_ns); /* a faulty line is known as far as it was delivered: TRACE_LAG_NS ago */

@@ -39,6 +39,16 @@ static void reseed_line(struct fault *f, uint64_t seed, int64_t t_ns)
     line_fault_reseed(line_faults_of(f), f->as.line, seed, t_ns);
 }
 
+/* The receiver's inputs are at one potential then, by its terminator: AM26LV32, open, shorted or terminated inputs: output high. */
+static bool has_pair(const struct control_bench *b, const struct fault *f, char *why)
+{
+    const struct unit *u = b->unit[f->point.unit];
+    return line_has_pair(&u->board->line, f->point.index) ||
+           why_fail(why, CONTROL_WHY_MAX, "%s: %s is no differential pair; %s%s", f->kind->name, f->name,
+                    u->type->pairs ? "such are the lines to the navigation computer of a " : "there is none on a ",
+                    u->type->title);
+}
+
 /* Only one line has pulses with a place in the frame. */
 static bool has_pulse(const struct control_bench *b, const struct fault *f, char *why)
 {
@@ -61,6 +71,8 @@ static const struct fault_kind line[] = {
      LINE(LINE_STUCK_LOW), .need = FAULT_BIT(FAULT_LEVEL)},
     {"line.swapped", "The wires A and B of the pair are swapped.", "the line is inverted",
      LINE(LINE_INVERTED)},
+    {"line.open", "A wire of the pair, A or B or both, is open at the terminated receiver.", "the line is high",
+     LINE(LINE_OPEN), .unless = "any line that is no differential pair (PSA-2: Int, Data, CLK)", .fits = has_pair},
     {"line.glitch", "One inverted pulse of width_ns.", "a spurious pulse of that width",
      LINE(LINE_GLITCH), .need = FAULT_BIT(FAULT_WIDTH_NS), .once = true},
     {"line.missing_pulse", "Each frame lacks the pulse of that number.", "one clock less in a frame; its bits are shifted from there on",

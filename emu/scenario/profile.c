@@ -18,10 +18,19 @@ static bool set_element(struct yaml_file *f, const struct yaml_node *node, const
     return yaml_file_fail(f, node, NULL, "%s", why);
 }
 
+/* One value for every element. */
+static bool set_each(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *profile)
+{
+    for (unsigned i = 0; i < d->count; i++)
+        if (!set_element(f, node, d, i, profile)) return false;
+    return true;
+}
+
 bool profile_yaml_value(struct yaml_file *f, const struct yaml_node *node, const struct field *d, void *profile)
 {
     unsigned index = 0;
     if (!field_is_list(d)) return set_element(f, node, d, 0, profile);
+    if (d->type == FIELD_EACH && node->kind == YAML_SCALAR) return set_each(f, node, d, profile);
     if (node->kind != YAML_SEQUENCE) return yaml_file_expected(f, node, d->key, "a list (%s)", d->what);
     for (const struct yaml_item *i = node->first; i; i = i->next)
         if (!set_element(f, i->value, d, index++, profile)) return false;

@@ -87,16 +87,40 @@ static void watch_step(struct line_fault_slot *s, const struct trace_step *step)
 
 /* ---- all faults of a trace ---- */
 
-static uint64_t faulty_levels(const struct line_faults *l)
+struct levels {
+    uint64_t near, far; /* at the drivers' inputs; as the receivers have them, before their delay */
+};
+
+static struct levels faulty_levels(const struct line_faults *l)
 {
-    uint64_t level = l->level, high = 0, low = 0;
+    uint64_t level = l->level, swapped = 0, high = 0, low = 0, open = 0;
     for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) {
         if (s->id == 0 || !s->began) continue;
-        if (s->flip || s->f.kind == LINE_INVERTED) level ^= bit_of(s);
+        if (s->flip) level ^= bit_of(s);
+        if (s->f.kind == LINE_INVERTED) swapped ^= bit_of(s);
         if (s->f.kind == LINE_STUCK_HIGH) high |= bit_of(s);
         if (s->f.kind == LINE_STUCK_LOW) low |= bit_of(s);
+        if (s->f.kind == LINE_OPEN) open |= bit_of(s);
     }
-    return (level | high) & ~low;
+    return (struct levels){.near = (level | high) & ~low, .far = (((level ^ swapped) | high) & ~low) | open};
+}
+
+static uint64_t with_bit(uint64_t level, unsigned sig, bool high)
+{
+    return high ? level | TRACE_BIT(sig) : level & ~TRACE_BIT(sig);
+}
+
+/* What is seen from t_ns on: lines behind their receivers, and the wires. */
+static uint64_t seen_levels(struct line_faults *l, int64_t t_ns)
+{
+    const struct levels now = faulty_levels(l);
+    uint64_t level = now.far;
+    for (struct pair *p = l->pair; p < l->pair + l->pairs; p++) {
+        const bool a = now.near >> p->cfg.line & 1;
+        pair_input(p, now.far >> p->cfg.line & 1, t_ns);
+        level = with_bit(with_bit(with_bit(level, p->cfg.line, p->out), p->cfg.a, a), p->cfg.b, !a);
+    }
+    return level;
 }
 
 static void flush_steps(const struct line_faults *l, struct out *o)
@@ -107,7 +131,7 @@ static void flush_steps(const struct line_faults *l, struct out *o)
 
 static void report_levels(struct line_faults *l, struct out *o, int64_t t_ns)
 {
-    const uint64_t level = faulty_levels(l);
+    const uint64_t level = seen_levels(l, t_ns);
     const uint64_t lines = level ^ l->filter.level;
     if (!lines) return;
     if (o->n == ROOM) flush_steps(l, o);
@@ -120,6 +144,8 @@ static int64_t next_due_ns(const struct line_faults *l)
     int64_t next_ns = NEVER;
     for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
         if (due_ns(s) < next_ns) next_ns = due_ns(s);
+    for (const struct pair *p = l->pair; p < l->pair + l->pairs; p++)
+        if (pair_due_ns(p) < next_ns) next_ns = pair_due_ns(p);
     return next_ns;
 }
 
@@ -130,6 +156,7 @@ static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
     for (int64_t at_ns; (at_ns = next_due_ns(l)) <= t_ns;) {
         for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
             if (due_ns(s) == at_ns) run_fault(s, at_ns);
+        for (struct pair *p = l->pair; p < l->pair + l->pairs; p++) pair_run(p, at_ns);
         if (at_ns < t_ns) report_levels(l, o, at_ns < l->done_ns ? l->done_ns : at_ns);
     }
 }
@@ -164,16 +191,56 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
     report_levels(l, &o, until_ns);
     flush_steps(l, &o);
     l->done_ns = until_ns;
-    if (!any_active(l)) l->trace->filter = NULL;
+    if (!any_active(l) && !(l->trace->standing && l->trace->sinks)) l->trace->filter = NULL;
 }
 
 /* ---- for the owner ---- */
+
+static void install(void *ctx)
+{
+    struct line_faults *l = ctx;
+    if (l->trace->filter) return;
+    l->level = l->filter.level = l->trace->level;
+    l->done_ns = l->trace->done_ns;
+    l->trace->filter = &l->filter;
+    for (struct pair *p = l->pair; p < l->pair + l->pairs; p++) pair_settle(p, l->level >> p->cfg.line & 1);
+    l->filter.level = seen_levels(l, l->done_ns);
+}
 
 void line_faults_init(struct line_faults *l, struct trace *t)
 {
     memset(l, 0, sizeof *l);
     l->trace = t;
-    l->filter = (struct trace_filter){.steps = on_steps, .ctx = l};
+    l->filter = (struct trace_filter){.steps = on_steps, .start = install, .ctx = l};
+}
+
+void line_pair_add(struct line_faults *l, const struct pair_cfg *cfg, const char *name_a, const char *name_b)
+{
+    struct trace *const t = l->trace;
+    const bool level = t->level >> cfg->line & 1;
+    struct pair *const p = &l->pair[l->pairs++];
+    assert(l->pairs <= LINE_PAIRS_MAX && cfg->rise_ns >= 0 && cfg->rise_ns <= PAIR_DELAY_MAX_NS && cfg->fall_ns >= 0 &&
+           cfg->fall_ns <= PAIR_DELAY_MAX_NS);
+    *p = (struct pair){.cfg = *cfg};
+    p->cfg.a = trace_add(t, name_a, level);
+    p->cfg.b = trace_add(t, name_b, !level);
+    t->wires |= TRACE_BIT(p->cfg.a) | TRACE_BIT(p->cfg.b);
+    t->wired |= TRACE_BIT(cfg->line);
+    if (pair_delays(p)) t->standing = &l->filter;
+}
+
+void line_pairs_show(struct line_faults *l)
+{
+    if (l->pairs == 0) return;
+    l->trace->standing = &l->filter;
+    if (l->trace->sinks) install(l);
+}
+
+bool line_has_pair(const struct line_faults *l, unsigned line)
+{
+    for (const struct pair *p = l->pair; p < l->pair + l->pairs; p++)
+        if (p->cfg.line == line) return true;
+    return false;
 }
 
 static struct line_fault_slot *slot_of(struct line_faults *l, uint32_t id)
@@ -191,11 +258,7 @@ uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f)
     assert(f->kind != LINE_NOISE || (f->rate_hz > 0.0 && f->rate_hz < 1e9));
     if (!s) return 0;
     trace_wake(l->trace);
-    if (!l->trace->filter) {
-        l->level = l->filter.level = l->trace->level;
-        l->done_ns = l->trace->done_ns;
-        l->trace->filter = &l->filter;
-    }
+    install(l);
     *s = (struct line_fault_slot){.f = *f, .id = ++l->last_id, .next_ns = NEVER};
     return s->id;
 }

@@ -72,11 +72,17 @@ static void deliver_until(struct trace *t, int64_t t_ns)
     trace_emit(t, due, n);
 }
 
+/* What a sink wants, and what that follows from. */
+static uint64_t sources_of(const struct trace *t, uint64_t mask)
+{
+    return mask & t->wires ? mask | t->wired : mask;
+}
+
 static void watch_again(struct trace *t)
 {
     if (t->group) t->group->changes++;
     t->watched = 0;
-    for (const struct trace_sink *s = t->sinks; s; s = s->next) t->watched |= s->mask;
+    for (const struct trace_sink *s = t->sinks; s; s = s->next) t->watched |= sources_of(t, s->mask);
 }
 
 unsigned trace_add(struct trace *t, const char *name, bool level)
@@ -108,8 +114,9 @@ void trace_wake(struct trace *t)
 void trace_attach(struct trace *t, struct trace_sink *s)
 {
     trace_wake(t);
-    if (t->source.wake) t->source.wake(t->source.ctx, s->mask);
+    if (t->source.wake) t->source.wake(t->source.ctx, sources_of(t, s->mask));
     if (t->filter) deliver_until(t, t->done_ns); /* it sees levels that have moved without a step */
+    if (t->standing && !t->filter) t->standing->start(t->standing->ctx);
     struct trace_sink **end = &t->sinks;
     while (*end) {
         assert(*end != s);

@@ -53,7 +53,8 @@ struct trace_sink {
 struct trace_filter {
     /* All steps up to and including until_ns, real changes from the levels `before`; hands on what trace_emit() is given. */
     void (*steps)(void *ctx, uint64_t before, const struct trace_step *s, unsigned n, int64_t until_ns);
-    uint64_t level; /* as the sinks know them */
+    void (*start)(void *ctx); /* of a standing one: puts itself in */
+    uint64_t level;           /* as the sinks know them */
     void *ctx;
 };
 
@@ -70,9 +71,12 @@ struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
     uint64_t level;   /* as delivered, bit per signal */
-    uint64_t watched; /* union of the sinks' masks */
+    uint64_t watched; /* union of the sinks' masks, and what these follow from */
+    uint64_t wires;   /* signals that the filter makes ... */
+    uint64_t wired;   /* ... of these: line_fault.h */
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
+    struct trace_filter *standing;                /* starts before the first sink is attached; or NULL */
     struct trace_source source;                   /* set by the board; wake may stay NULL */
     struct trace_group *group;                    /* group.h; or NULL: its owner advances it */
     struct trace *next_awake;                     /* of the group */

@@ -31,6 +31,7 @@ static const struct board_controller_fault controller_faults[] = {
     {NULL, 0},
 };
 static const char *const port_lines[] = {"TICK", "Int", "Data", "CLK", NULL};
+static const char *const pair_port_lines[] = {"TICK", "Int", "Data", "CLK", "Int_B", "Data_B", "CLK_B", NULL};
 static const char *const capabilities[] = {"adc_chain", "temp_adc_offset_v", "temp_adc_gain_error", "temp_noise_scale",
                                            NULL};
 
@@ -193,6 +194,9 @@ const struct board_type bins_board = {
     .lines = bins_lines,
     .line_count = BINS_LINES,
     .port_lines = port_lines,
+    .pairs = psa2_pairs,
+    .pair_count = PSA2_PAIRS,
+    .pair_port_lines = pair_port_lines,
     .events = bins_events,
     .event_count = BINS_EVENTS,
     .parts = parts,

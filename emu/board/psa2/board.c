@@ -163,6 +163,7 @@ static void digest(const struct board *board, struct sha256 *s)
 }
 
 static const char *const port_lines[] = {"Int", "Data", "CLK", NULL};
+static const char *const pair_port_lines[] = {"Int", "Data", "CLK", "Int_B", "Data_B", "CLK_B", NULL};
 
 static const struct board_controller_fault controller_faults[] = {
     {"controller.skip_sync_t", PSA2_FAULT_SKIP_SYNC_T},
@@ -181,6 +182,9 @@ const struct board_type psa2_board = {
     .node = 5,
     .frame_forms = 4,
     .period_ns = psa2_profile_period_ns,
+    .pairs = psa2_pairs,
+    .pair_count = PSA2_PAIRS,
+    .pair_port_lines = pair_port_lines,
     .frame_line = PSA2_LINE_INT,
     .pulse_line = PSA2_LINE_CLK,
     .pulses = pulses,

@@ -315,6 +315,17 @@ void psa2_init(struct psa2 *b, const struct psa2_profile *p, const struct board_
     psa2_init_inside(b, p, psa2_lines, PSA2_LINES, cfg, io, s);
 }
 
+static void add_pairs(struct psa2 *b)
+{
+    const struct psa2_profile *p = &b->profile;
+    for (unsigned i = 0; i < PSA2_PAIRS; i++) {
+        const struct pair_cfg cfg = {.line = psa2_pairs[i].line,
+                                     .rise_ns = (int64_t)p->line_delay_ns[i],
+                                     .fall_ns = (int64_t)(p->line_delay_ns[i] + p->line_skew_ns[i])};
+        line_pair_add(&b->base.line, &cfg, psa2_pairs[i].a, psa2_pairs[i].b);
+    }
+}
+
 void psa2_init_inside(struct psa2 *b, const struct psa2_profile *p, const struct board_line *lines, unsigned count,
                       const struct board_cfg *cfg, const struct board_io *io, struct sched *s)
 {
@@ -322,6 +333,7 @@ void psa2_init_inside(struct psa2 *b, const struct psa2_profile *p, const struct
     board_clear(&b->base, sizeof *b);
     b->profile = *p;
     board_init(&b->base, lines, count, cfg, io, s);
+    add_pairs(b);
     b->idle = serve_port;
     b->board_degc = io->temp_degc(io->ctx, 3, s->now_ns);
     init_trace(b);

@@ -90,6 +90,12 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
 #define NAME(...) FIELD_NAME(struct psa2_profile, __VA_ARGS__)
 #define ROW(...)  FIELD_ROW(struct psa2_profile, __VA_ARGS__)
 
+#define DELAYS(member, lo, hi, words)                                                                                  \
+    {                                                                                                                  \
+        .key = #member, .type = FIELD_EACH, .offset = offsetof(struct psa2_profile, member), .min = (lo), .max = (hi), \
+        .what = (words), .count = PSA2_DELAYS                                                                          \
+    }
+
 // clang-format off
 static const struct field rows[] = {
     NAME("article", "Name of the profile."),
@@ -104,6 +110,8 @@ static const struct field rows[] = {
      .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text,
      .standard_of = (const char *const[]){"X", "Y", "Z", "T", NULL}},
     ROW(code_bits, U32, 24, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
+    DELAYS(line_delay_ns, 0, 500, "Delay of the pairs Int, Data, CLK from the driver's input to the receiver's output, for rises."),
+    DELAYS(line_skew_ns, -100, 100, "By which falls of Int, Data, CLK come later there than rises; half a period of CLK at most."),
     ROW(read_bits, U32, 24, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
     ROW(gate_sclk, BOOL, true, 0, 1, "SClk reaches only the group addressed."),
     ROW(temp_channels, U32, 4, 0, 8, "Temperature inputs scanned in turn; 0: none."),
@@ -267,10 +275,26 @@ static bool check_times(const struct psa2_profile *p, char *why, size_t cap)
                     1e-3 * (double)low_ns, 1e-3 * (double)(read_ns + low_ns));
 }
 
+/* No delay is negative, no pulse of CLK is lost. */
+static bool check_delays(const struct psa2_profile *p, char *why, size_t cap)
+{
+    const double half_ns = 0.5e3 / line_mhz(p);
+    for (unsigned i = 0; i < PSA2_DELAYS; i++) {
+        const double fall_ns = p->line_delay_ns[i] + p->line_skew_ns[i];
+        if (fall_ns < 0.0)
+            return why_fail(why, cap, "line_skew_ns: expected -line_delay_ns = %g or more, got %g",
+                            0.0 - p->line_delay_ns[i], p->line_skew_ns[i]);
+        if (p->line_skew_ns[i] >= half_ns || p->line_skew_ns[i] <= -half_ns)
+            return why_fail(why, cap, "line_skew_ns: expected less than half a period of CLK = %g ns, got %g", half_ns,
+                            p->line_skew_ns[i]);
+    }
+    return true;
+}
+
 bool psa2_profile_check(const void *profile, char *why, size_t cap)
 {
     const struct psa2_profile *p = profile;
     return fields_check(&psa2_fields, p, why, cap) && check_words(p, why, cap) && check_setup(p, why, cap) &&
            check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
-           check_int_low(p, why, cap) && check_times(p, why, cap);
+           check_int_low(p, why, cap) && check_times(p, why, cap) && check_delays(p, why, cap);
 }

@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #define PSA2_WORDS          4u
+#define PSA2_DELAYS         3u /* of Int, Data, CLK */
 #define PSA2_SETUP_MAX      16u
 #define PSA2_INT_LOW_MIN_NS 74000  /* article, protocol of exchange: "not less than 74 us" */
 #define PSA2_CLOCK_PPM      100    /* E0: by which a clock may be fast; 74.000 us are nominal */
@@ -41,6 +42,9 @@ struct psa2_profile {
     unsigned lead_in_clk;            /* CLK periods from INT fall to the first bit */
     enum psa2_word word[PSA2_WORDS]; /* order of sending, lowest address first */
     unsigned code_bits;              /* significant bits of a code in its word: 16, 24 or 32 */
+    /* end elements of the line: from the driver's input to the receiver's output */
+    double line_delay_ns[PSA2_DELAYS];
+    double line_skew_ns[PSA2_DELAYS]; /* by which falls are later than rises */
     /* reading */
     unsigned read_bits;     /* SClk pulses of one accelerometer read: 24 (article) or 32 */
     bool gate_sclk;         /* SClk reaches only the group addressed; false shows the hazard of a part without CS */

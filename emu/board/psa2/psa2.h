@@ -44,6 +44,9 @@ enum psa2_line {
 
 extern const struct board_line psa2_lines[PSA2_LINES];
 
+enum { PSA2_PAIRS = 3 }; /* to the navigation computer: Int, Data, CLK, in the order of the profile's delays */
+extern const struct board_pair psa2_pairs[PSA2_PAIRS];
+
 /* Bits of psa2_frame.status, and of the T word above channel and code. */
 enum psa2_status {
     PSA2_ST_SETTLED = 1, /* the converters had settled */

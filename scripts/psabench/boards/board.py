@@ -81,6 +81,7 @@ class Board:
     profile: str = ""  # where none is named; "": the one of the board's name
     lines: tuple[str, ...]  # as psa-emu --vcd names them: docs/waveforms.md and the boards' pages
     port_lines: tuple[str, ...]  # lines of the line port, bit 0 first (docs/lineport.md)
+    wires: tuple[str, ...] = ()  # of its differential pairs, as psa-emu --pairs names them
     bus: Bus | None = None  # parallel bus
     beat: Beat | None = None  # None: no regular period that is known
     setting: Setting | None = None  # None, and a bus: object 2051h, its strobe

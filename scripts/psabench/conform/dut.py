@@ -112,14 +112,15 @@ class Dut:
 
     @property
     def probes(self) -> frozenset[str]:
-        """What can be seen: can, line (INT, DATA, CLK, or what the line port has), pins (all lines), bus, supply, port.
+        """What can be seen: can, line (INT, DATA, CLK, or what the line port has), pins (all lines), wires (of
+        differential pairs, too), bus, supply, port.
 
         exact: all probes tell the time that the board's own clock would, were it not off.
         Of the link to the bus: fd and rtr, frames that it carries; stamps, its times are the bus's.
         """
         seen = {"can"}
         if self.probe is not None:
-            seen |= {"line", "pins"} if isinstance(self.probe, PinProbe) else {"line"}
+            seen |= {"line", "pins", "wires"} if isinstance(self.probe, PinProbe) else {"line"}
         if self.line_port is not None:
             seen.add("port")
         if self.port is not None:

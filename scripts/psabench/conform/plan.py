@@ -38,7 +38,8 @@ Prepare = Callable[[Any], None]
 StimulusOf = Callable[["Dut"], Capture]
 
 WAYS = frozenset(
-    "can line pins bus supply chamber head table lockstep exact inputs fd rtr stamps errors slow port stream".split()
+    "can line pins wires bus supply chamber head table lockstep exact inputs fd rtr stamps errors slow port"
+    " stream".split()
 )
 
 # Parts of a recording: all of it; a Res or boot-up and what follows; the readings after the set-up; "": none of it.

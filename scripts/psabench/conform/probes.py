@@ -41,11 +41,12 @@ class PinProbe:
 
     def __init__(self, bench: Bench, unit: str) -> None:
         self._bench, self._unit = bench, unit
+        self.pairs = False  # the next look has the wires A and B of differential lines, too
         self._dir = tempfile.TemporaryDirectory(prefix="psabench-")
         self._path = Path(self._dir.name) / "pins.vcd"
 
     def start(self) -> None:
-        self._bench.probe.start(self._path, self._unit)
+        self._bench.probe.start(self._path, self._unit, pairs=self.pairs)
 
     def stop(self) -> LineLog:
         self._bench.probe.stop()

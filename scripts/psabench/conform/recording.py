@@ -83,6 +83,7 @@ class Bench:
             seen |= {"errors"} if any(f.error for f in frames) else set()
         if self.recording.lines is not None:
             seen |= {"line", "pins"} if self.recording.lines.resolution_ns <= PINS_NS else {"line"}
+            seen |= {"wires"} if _has_wires(self.recording.lines) else set()
         return frozenset(seen | ({"inputs"} if self.inputs_v else set()))
 
     # ---- clocks
@@ -349,6 +350,12 @@ UNRECORDED = {
     "head": "the suite turns a dividing head; a recording has none",
     "table": "the suite turns a rate table; a recording has none",
 }
+
+
+def _has_wires(lines: LineLog) -> bool:
+    """Whether both wires of a pair were recorded, and the line behind them: Int, Int_A, Int_B."""
+    names = lines.recording.wires
+    return any(f"{name}_A" in names and f"{name}_B" in names for name in names)
 
 
 def _missing(bench: Bench, way: str) -> str:

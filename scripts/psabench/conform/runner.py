@@ -24,6 +24,7 @@ MISSING = {
     "can": "no CAN bus was connected",
     "line": "no line port or adapter was connected (--lines)",
     "pins": "requires a logic analyser on all pins; INT, DATA and CLK alone do not show it",
+    "wires": "requires a logic analyser on both wires of each differential pair and behind its receiver",
     "bus": "no bus port was connected (--bus-port)",
     "supply": "no power supply was connected (--scpi supply=...)",
     "chamber": "no thermal chamber was connected (--scpi chamber=...)",

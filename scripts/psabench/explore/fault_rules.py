@@ -58,6 +58,7 @@ RULES: Mapping[str, Rule] = {
     "controller.stuck_key": Rule(READINGS, {}),
     "line.stuck": Rule(LINES, {"level": LEVELS}),
     "line.swapped": Rule(LINES, {}),
+    "line.open": Rule(LINES, {}),
     "line.glitch": Rule(LINES, {"width_ns": (100, 10_000)}, is_once=True),
     "line.missing_pulse": Rule(LINES, {"pulse": (1, 40)}),
     "line.extra_pulse": Rule(LINES, {"pulse": (1, 40), "width_ns": (100,)}),

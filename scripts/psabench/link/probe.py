@@ -20,10 +20,17 @@ class Probe:
         levels = self._bench.control.call("lines", **_unit(unit)).result["lines"]
         return {str(name): int(level) for name, level in levels.items()}
 
-    def start(self, path: str | Path, unit: str | None = None, limit_mb: float | None = None) -> None:
-        """Record the lines of a unit (the first) into a VCD file from now on, up to limit_mb (1000)."""
-        limit = {} if limit_mb is None else {"limit_mb": limit_mb}
-        self._bench.control.call("vcd.start", path=os.path.abspath(path), **_unit(unit), **limit)
+    def start(
+        self, path: str | Path, unit: str | None = None, limit_mb: float | None = None, *, pairs: bool = False
+    ) -> None:
+        """Record the lines of a unit (the first) into a VCD file from now on, up to limit_mb (1000).
+
+        pairs: with the wires A and B of its differential lines.
+        """
+        more: dict[str, Any] = {} if limit_mb is None else {"limit_mb": limit_mb}
+        if pairs:
+            more["pairs"] = True
+        self._bench.control.call("vcd.start", path=os.path.abspath(path), **_unit(unit), **more)
 
     def stop(self) -> None:
         """End the recording; the file gets its closing time. ControlError: it has ended before, and what it holds."""

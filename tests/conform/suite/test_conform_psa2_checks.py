@@ -26,7 +26,7 @@ from psabench.conform.verdict import Failed, Inconclusive
 suite.load()
 
 MODULES = ("psa2_setup", "psa2_serial", "psa2_parts", "psa2_stream", "psa2_words", "psa2_forms", "psa2_registers",
-           "psa2_objects", "psa2_temps", "psa2_trouble", "psa2_analog", "psa2_frame")  # fmt: skip
+           "psa2_objects", "psa2_temps", "psa2_trouble", "psa2_analog", "psa2_frame", "psa2_pairs")  # fmt: skip
 CHECKS = {
     p.test.__name__: p.test
     for p in suite_tests()

@@ -74,6 +74,9 @@ WRONG_PINS: Mapping[str, Sequence[Bad]] = {
         pulse("DOutZ", lambda e: int(e.wires.falls("CST")[3]) + 3000, 400)
     ],
     "clk_is_a_division_of_the_crystal": [slower_clk],
+    # pairs
+    "wire_b_is_the_inverse_of_a": [inverted("CLK_B"), moved("Data_B", 50), still("Int_B", 0), less("CLK_B", 30, 1)],
+    "receivers_give_what_is_on_the_pairs": [inverted("Int"), moved("CLK", -30), moved("Int", 1000), still("Data", 1)],
     # reading
     "every_conversion_is_read": [pulse("DRD_A", lambda e: int(e.wires.falls("DRD_A")[9]) + 500_000)],
     "a_read_has_its_bits": [pulse("SClk", lambda e: int(port_traffic(e).reads[7].fall_ns[-1]) + 488, 488)],

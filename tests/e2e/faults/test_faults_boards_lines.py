@@ -71,6 +71,10 @@ def line_swapped(unit: str, names: list[str]) -> None:
         assert differ(right, wrong, name)[1].all(), name
 
 
+def line_open(unit: str, names: list[str]) -> None:
+    raise AssertionError(f"{names} of {unit} are no differential pairs")
+
+
 def line_glitch(unit: str, names: list[str]) -> None:
     right, wrong = line_case("line.glitch", unit, names, width_ns=150)
     for name in names:
@@ -109,6 +113,7 @@ def line_extra_pulse(unit: str, names: list[str]) -> None:
 DETECT_LINE: dict[str, Callable[[str, list[str]], None]] = {
     "line.stuck": line_stuck,
     "line.swapped": line_swapped,
+    "line.open": line_open,
     "line.glitch": line_glitch,
     "line.noise": line_noise,
     "line.missing_pulse": line_missing_pulse,

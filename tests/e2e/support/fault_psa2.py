@@ -399,6 +399,13 @@ def line_swapped(c: Case) -> None:
     assert recorded(c)[line_of(c)] & {"restless", "misread"}
 
 
+@DETECT.look("line.open")
+def line_open(c: Case) -> None:
+    line = line_of(c)
+    assert "still" in recorded(c)[line]
+    assert c.host.call("lines", unit=c.point[0])["lines"][line] == 1  # fail-safe
+
+
 @DETECT.look("line.glitch")
 def line_glitch(c: Case) -> None:
     assert "narrow" in recorded(c, late=True, width_ns=100)[line_of(c)]
@@ -429,6 +436,7 @@ ACCEPTED = {
     "chip.drdy_stuck": r"[ab]\.(adc\.x|tadc)",
     "chip": r"[ab]\.(adc\.[xyz]|tadc)",
     "controller": r"[ab]\.kpsa",
+    "line.open": r"[ab]\.line\.(Int|Data|CLK)",
     "line.missing_pulse": r"[ab]\.line\.CLK",
     "line.extra_pulse": r"[ab]\.line\.CLK",
     "line": r"[ab]\.line\..*",

@@ -255,13 +255,25 @@ static void the_lines_are_those_of_the_table(void **state)
     for (const struct board_type *const *t = board_types; *t; t++) {
         live(*t, 0);
         const struct trace *trace = unit_trace(&w.u);
-        assert_int_equal(trace->count, (*t)->line_count);
-        for (unsigned i = 0; i < trace->count; i++) assert_string_equal(trace->name[i], (*t)->lines[i].name);
+        const unsigned lines = (*t)->line_count;
+        assert_int_equal(trace->count, lines + 2 * (*t)->pair_count);
+        for (unsigned i = 0; i < lines; i++) assert_string_equal(trace->name[i], (*t)->lines[i].name);
+        for (unsigned i = 0; i < (*t)->pair_count; i++) {
+            assert_string_equal(trace->name[lines + 2 * i], (*t)->pairs[i].a);
+            assert_string_equal(trace->name[lines + 2 * i + 1], (*t)->pairs[i].b);
+            assert_true(line_has_pair(&w.u.board->line, (*t)->pairs[i].line));
+        }
         const struct clk clock = {.hz = SAMPLER_HZ, .div = 1};
         static uint8_t ring[SAMPLER_RING];
         const struct sampler_cfg cfg = sampler_line_port(&clock, (*t)->port_lines, ring);
         assert_true(sampler_start(&w.sampler, unit_trace(&w.u), &cfg));
         sampler_stop(&w.sampler);
+        assert_int_equal((*t)->pairs != NULL, (*t)->pair_port_lines != NULL);
+        if ((*t)->pairs) {
+            const struct sampler_cfg wires = sampler_line_port(&clock, (*t)->pair_port_lines, ring);
+            assert_true(sampler_start(&w.sampler, unit_trace(&w.u), &wires));
+            sampler_stop(&w.sampler);
+        }
         assert_ptr_equal(w.u.board->line.trace, trace);
     }
 }

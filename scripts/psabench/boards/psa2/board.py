@@ -94,6 +94,7 @@ BOARD = Board(
     profile="article",
     lines=tuple("SYNC_A SClk DRD_A DIn DOutX DOutY DOutZ SYNC_T CST DRD_T DInT DOutT Res Data CLK Int".split()),
     port_lines=("Int", "Data", "CLK"),
+    wires=("Int_A", "Int_B", "Data_A", "Data_B", "CLK_A", "CLK_B"),
     beat=Beat(
         rows={"PSA2-READ-06": "period_us"},
         line="Int",

@@ -11,7 +11,7 @@ from psabench.conform.verdict import conclusive
 from psabench.errors import BadInput, expected
 from psabench.link.vcd import Vcd, Wire
 
-LINES: Mapping[str, Sequence[str]] = {name: board.lines for name, board in BOARDS.items()}
+LINES: Mapping[str, Sequence[str]] = {name: board.lines + board.wires for name, board in BOARDS.items()}
 
 
 class Recorded(LineLog):

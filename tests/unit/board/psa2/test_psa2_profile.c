@@ -127,6 +127,29 @@ static void words_of_32_bits_fit_at_half_the_crystal(void **state)
                         "CLK / 2.048 MHz = 72.265 us");
 }
 
+/* A fall is later than its rise by the skew, at least at once, and less than half a period of CLK: 250 ns at 2 MHz. */
+static void delays_of_the_pairs_lose_no_pulse(void **state)
+{
+    (void)state;
+    struct psa2_profile p;
+    char why[300] = "";
+    fields_default(&psa2_fields, &p);
+    for (unsigned i = 0; i < PSA2_DELAYS; i++) assert_true(p.line_delay_ns[i] == 0.0 && p.line_skew_ns[i] == 0.0);
+    p.line_skew_ns[2] = -5.0;
+    assert_false(psa2_profile_check(&p, why, sizeof why));
+    assert_string_equal(why, "line_skew_ns: expected -line_delay_ns = 0 or more, got -5");
+    p.line_delay_ns[2] = 5.0;
+    if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
+    p.line_hz = 50000000;
+    p.line_div = 10; /* 5 MHz */
+    p.lead_in_clk = 255;
+    p.line_skew_ns[1] = 99.9;
+    if (!psa2_profile_check(&p, why, sizeof why)) fail_msg("%s", why);
+    p.line_skew_ns[1] = 100.0;
+    assert_false(psa2_profile_check(&p, why, sizeof why));
+    assert_string_equal(why, "line_skew_ns: expected less than half a period of CLK = 100 ns, got 100");
+}
+
 static void texts_that_are_no_values_leave_the_profile_alone(void **state)
 {
     (void)state;
@@ -137,8 +160,8 @@ static void texts_that_are_no_values_leave_the_profile_alone(void **state)
     } rows[] = {
         {"colour", 0, "red",
          "colour: unknown key; expected one of name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
-         "lead_in_clk, word, code_bits, read_bits, gate_sclk, temp_channels, adc_is_1281, adc_vref_v, adc_pga, "
-         "temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
+         "lead_in_clk, word, code_bits, line_delay_ns, line_skew_ns, read_bits, gate_sclk, temp_channels, "
+         "adc_is_1281, adc_vref_v, adc_pga, temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
         {"fclk_hz", 0, "4100001", "fclk_hz: expected an integer from 1000000 to 4100000, got \"4100001\""},
         {"word_bits", 0, "thirty", "word_bits: expected an integer from 16 to 32, got \"thirty\""},
         {"word_bits", 0, "-24", "word_bits: expected an integer from 16 to 32, got \"-24\""},
@@ -206,6 +229,7 @@ int main(void)
         cmocka_unit_test(what_a_board_cannot_run_is_refused_in_words),
         cmocka_unit_test(clocks_may_be_fast_by_a_crystals_tolerance),
         cmocka_unit_test(words_of_32_bits_fit_at_half_the_crystal),
+        cmocka_unit_test(delays_of_the_pairs_lose_no_pulse),
         cmocka_unit_test(texts_that_are_no_values_leave_the_profile_alone),
         cmocka_unit_test(the_data_period_follows_config0),
     };

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from psabench.conform.dut import Dut, Take
+from psabench.conform.probes import PinProbe
 from psabench.conform.stimulus.streamed import recorded
 
 SETUP_S = 0.22  # Res to the first frames takes 0.19 s
 STREAM_S = 0.4
+PAIRS_S = 0.04
 PERIOD_S, FRAME_TO_CAN_S, IN_FRAME_S, ON_BUS_S = 1e-3, 298e-6, 40e-6, 65e-6
 
 
@@ -48,3 +53,20 @@ def power_cycle(s: Dut, take: Take) -> None:
 def stream(s: Dut, take: Take) -> None:
     """Some hundred frames, on the lines and on CAN."""
     s.run_for(STREAM_S)
+
+
+@contextmanager
+def _with_wires(s: Dut) -> Iterator[None]:
+    """The probe has the wires of the pairs, too."""
+    assert isinstance(s.probe, PinProbe)
+    s.probe.pairs = True
+    try:
+        yield
+    finally:
+        s.probe.pairs = False
+
+
+@recorded("pairs", boards=("psa2",), before=Dut.wait_ready, around=_with_wires, streaming=True)
+def stream_with_wires(s: Dut, take: Take) -> None:
+    """Some frames, with the wires of the pairs."""
+    s.run_for(PAIRS_S)
