@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.bench import Bench
-from psabench.boards.psd1.device import FULL_SCALE_V, OFFSET_BINARY
 from psabench.climate.soak import soak_units
 from psabench.errors import expected
 from psabench.link.signals import Floats
 from psabench.procedures.compare_converters import GENERATIONS, SETTLE_S, Track, tracks_of, units_of
+from psabench.procedures.comparison import PSD1_CODE_V, PSD1_FULL_SCALE_V, PSD1_NOISE_V
 from psabench.procedures.head_bench import Progress
 
 SCENARIO = "converters_chamber"
@@ -30,9 +30,11 @@ COVERAGE_K = 2.0
 BLOCKS = 10  # parts of a recording, whose scatter says how much its mean scatters
 REST_S = 0.5  # after a turn: filters settle
 
+# Noise of the words of which one calibrates the unit at power-up.
+SELF_CALIBRATION_V: Mapping[str, float] = {"psd1": PSD1_NOISE_V}
 # Words that are cut off and whose noise is below a code: the mean of an input at rest is off by up to a code, however
 # long it is taken.
-ROUNDING_V: Mapping[str, float] = {"psd1": FULL_SCALE_V / OFFSET_BINARY / math.sqrt(12.0)}
+ROUNDING_V: Mapping[str, float] = {"psd1": PSD1_CODE_V / math.sqrt(12.0)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +173,7 @@ def estimate_drifts(soaks: Sequence[Soak]) -> tuple[Drift, ...]:
     return tuple(_drift_of(name, soaks) for name in soaks[0].positions)
 
 
-def mean_u_v(name: str, positions: Sequence[Position]) -> float:
+def mean_u_v(positions: Sequence[Position]) -> float:
     """Standard uncertainty of the mean of one position, V: noise, pooled over all, and the rounding of its ends."""
     noise, ends = [], []
     for p in positions:
@@ -179,15 +181,13 @@ def mean_u_v(name: str, positions: Sequence[Position]) -> float:
         noise.append(float(p.block_var_v2.mean()) - rounded_v2)
         ends.append((p.quantum_vs / p.span_s) ** 2 / 6.0)
     noise_v2 = max(0.0, float(np.mean(noise))) / BLOCKS
-    own_v2 = float(np.mean([p.zero_u_v**2 for p in positions]))
-    return math.sqrt(noise_v2 + float(np.mean(ends)) + ROUNDING_V.get(name, 0.0) ** 2 + own_v2)
+    return math.sqrt(noise_v2 + float(np.mean(ends)))
 
 
 def _drift_of(name: str, soaks: Sequence[Soak]) -> Drift:
     ma, degc = GENERATIONS[name].ma_v_per_g, np.array([s.degc for s in soaks])
     every = [p for s in soaks for p in s.positions[name]]
-    u_v = mean_u_v(name, every)
-    gain_u = math.sqrt(float(np.mean([p.gain_u**2 for p in every])))
+    u_v, own = mean_u_v(every), _own_u(name, every)
     zeros, scales, zero_u, scale_u = [], [], [], []
     for s in soaks:
         design = inputs_g(s.angle_deg)
@@ -195,13 +195,32 @@ def _drift_of(name: str, soaks: Sequence[Soak]) -> Drift:
         fits = [_fit_axis(design[:, i], means_v[:, i]) for i in range(3)]
         zeros.append([f.zero_v for f in fits])
         scales.append([fits[i].slope_v_per_g / ma for i in SCALED])
-        zero_u.append([f.zero_factor * u_v for f in fits])
-        scale_u.append([math.hypot(fits[i].slope_factor * u_v / ma, gain_u) for i in SCALED])
-    lines = [
-        [_line(degc, np.array(v)[:, i], float(np.array(u)[:, i].mean())) for i in range(n)]
-        for v, u, n in ((zeros, zero_u, 3), (scales, scale_u, len(SCALED)))
-    ]
-    return Drift(name=name, quantum_vs=every[0].quantum_vs, zero_v=tuple(lines[0]), scale=tuple(lines[1]))
+        zero_u.append([math.hypot(f.zero_factor * u_v, own.zero_v) for f in fits])
+        scale_u.append([math.hypot(fits[i].slope_factor * u_v / ma, own.scale) for i in SCALED])
+    of_zeros = _lines(degc, zeros, zero_u, second_order=False)
+    of_scales = _lines(degc, scales, scale_u, second_order=True)
+    return Drift(name=name, quantum_vs=every[0].quantum_vs, zero_v=of_zeros, scale=of_scales)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _OwnU:
+    """Standard uncertainties that are the same at all positions of a temperature."""
+
+    zero_v: float
+    scale: float
+
+
+def _own_u(name: str, positions: Sequence[Position]) -> _OwnU:
+    """From the unit's calibrations and the rounding of an input at rest, which repeats with the input."""
+    zero_v2, gain2 = (
+        float(np.mean([x**2 for x in each])) for each in zip(*((p.zero_u_v, p.gain_u) for p in positions), strict=True)
+    )
+    rounding_v, calibration_v = ROUNDING_V.get(name, 0.0), SELF_CALIBRATION_V.get(name, 0.0)
+    ma = GENERATIONS[name].ma_v_per_g
+    return _OwnU(
+        zero_v=math.sqrt(zero_v2 + rounding_v**2 + calibration_v**2),
+        scale=math.sqrt(gain2 + (rounding_v / ma) ** 2 / 2.0 + 2.0 * (calibration_v / PSD1_FULL_SCALE_V) ** 2),
+    )
 
 
 def inputs_g(angle_deg: Sequence[float]) -> Floats:
@@ -237,7 +256,18 @@ def _fit_axis(input_g: Floats, mean_v: Floats) -> _AxisFit:
     )
 
 
-def _line(degc: Floats, values: Floats, u: float) -> Line:
+def _lines(
+    degc: Floats, values: Sequence[Sequence[float]], u: Sequence[Sequence[float]], *, second_order: bool
+) -> tuple[Line, ...]:
+    """Of each axis; values and u have a row for each temperature."""
+    of_axes = zip(np.array(values).T, np.array(u).mean(axis=0), strict=True)
+    return tuple(_line(degc, v, float(u_axis), second_order=second_order) for v, u_axis in of_axes)
+
+
+def _line(degc: Floats, values: Floats, u: float, *, second_order: bool) -> Line:
+    """second_order: of a ratio of parts that drift, whose square the straight line leaves."""
+    if second_order:
+        u = math.hypot(u, float(np.max(np.abs(values - values[0]))) ** 2)
     off_k = degc - degc.mean()
     spread_k2 = float(off_k @ off_k)
     return Line(values=values, u=u, per_k=float(off_k @ values) / spread_k2, per_k_u=u / math.sqrt(spread_k2))
