@@ -136,3 +136,20 @@ def test_a_recording_beside_the_chamber_is_refused(tmp_path: Path, capsys: pytes
 def test_points_are_three_or_more() -> None:
     with pytest.raises(ValueError, match="expected three or more different temperatures"):
         measured.ChamberParams(points_degc=(25.0, 85.0))
+
+
+def test_x_points_up_at_90_deg() -> None:
+    """As psabench.procedures.compare_converters: an axis that points down reads +g."""
+    assert measured.inputs_g((0.0, 90.0)) == pytest.approx(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]), abs=1e-12)
+
+
+def test_what_a_straight_line_leaves_of_a_ratio_is_in_u() -> None:
+    assert of(soaks()).scale[0].u == pytest.approx((85.0 * SCALE_PER_K[0]) ** 2, rel=1e-3)
+
+
+def test_rounding_of_blocks_is_no_noise() -> None:
+    """A staircase of pulses: its mean is good to a pulse over the whole recording, not to that of a tenth of it."""
+    t_s = np.linspace(0.0, 30.0, 3001)
+    pulses = np.floor(np.outer(t_s, [30.3, 17.7, 23.1])) * 5.75e-3
+    p = measured.position_of(Track(name="pik", quantum_vs=5.75e-3, t_s=t_s, s_vs=pulses))
+    assert measured.mean_u_v([p]) < 1.5 * 5.75e-3 / 30.0 / 6.0**0.5
