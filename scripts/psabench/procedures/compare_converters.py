@@ -7,7 +7,7 @@ the scale Ma of its accelerometer. What the motion was this file does not know: 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -217,16 +217,31 @@ def record(bench: Bench, p: CompareParams, progress: Progress) -> tuple[Track, .
 
     Raises BadInput for a bench without the units, LinkError where one of them lost something.
     """
-    missing = [name for name, gen in GENERATIONS.items() if not isinstance(bench.units.get(name), gen.board)]
-    if missing:
-        raise BadInput(expected(f"units {', '.join(missing)} as in {SCENARIO}.yaml", "none", "--scenario"))
-    units = {name: bench.units[name] for name in GENERATIONS}
+    units = units_of(bench)
     bench.wait(max(0.0, SETTLE_S - bench.time_s))
     slices = max(1, round(p.seconds / p.slice_s))
-    with progress.step("one motion to all converters", slices) as done, _streaming(units):
+
+    def pass_motion() -> None:
         for _ in range(slices):
             bench.wait(p.seconds / slices)
             done()
+
+    with progress.step("one motion to all converters", slices) as done:
+        return tracks_of(units, pass_motion)
+
+
+def units_of(bench: Bench) -> dict[str, Unit]:
+    """One of each generation, in the order of GENERATIONS. Raises BadInput for a bench without them."""
+    missing = [name for name, gen in GENERATIONS.items() if not isinstance(bench.units.get(name), gen.board)]
+    if missing:
+        raise BadInput(expected(f"units {', '.join(missing)} as in {SCENARIO}.yaml", "none", "--scenario"))
+    return {name: bench.units[name] for name in GENERATIONS}
+
+
+def tracks_of(units: Mapping[str, Unit], pass_time: Callable[[], object]) -> tuple[Track, ...]:
+    """What every unit tells while pass_time() lets time pass. Raises LinkError where one of them lost something."""
+    with _streaming(units):
+        pass_time()
     return tuple(_track(unit, name) for name, unit in units.items())
 
 

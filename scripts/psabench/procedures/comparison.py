@@ -47,7 +47,8 @@ class Article:
 
     printed: texts of the article (E1), "": nothing. gain_u: of the coefficient, relative, zero_u_v: of the zero at the
     load; k_source says whence the first, zero_source whence the second. error: of the coefficient as printed, "":
-    nothing. why: what its figures come from, where the board's page has to be known to understand them.
+    nothing. why: what its figures come from, where the board's page has to be known to understand them. drift, size:
+    what the article says of either; coefficients: the source of those that the model drifts by.
     """
 
     printed: str
@@ -58,6 +59,9 @@ class Article:
     zero_source: str = "E0"
     error: str = ""
     why: str = ""
+    drift: str = ""
+    size: str = ""
+    coefficients: str = "resistors, reference and zero E0"
 
     @property
     def pulse_mps(self) -> float | None:
@@ -105,6 +109,7 @@ ARTICLE: Mapping[str, Article] = {
         zero_u_v=5e-5,
         k_source="E1",
         error="0.05 %",
+        drift="much better than PIK in general",
     ),
     "pmka": Article(
         printed="16-bit converter, Ts = 4.8 ms",
@@ -112,6 +117,9 @@ ARTICLE: Mapping[str, Article] = {
         gain_u=ROM_U,
         zero_u_v=0.0,
         zero_source="from the scatter of its calibrations",
+        drift="taken out by ROM and thermometer",
+        size="hard limits on it",
+        coefficients="parts E0; correction E1, its points -40 to 80 degC E0",
     ),
     "psd1": Article(
         printed="16-bit words of a delta-sigma converter",
@@ -121,12 +129,18 @@ ARTICLE: Mapping[str, Article] = {
         zero_source="E0 + E3",
         why=f"its drift is a zero: words are cut off, not rounded, up to a code ({PSD1_CODE_V * 1e6:.0f} µV) low, and "
         f"self-calibration takes the zero from one word, which has {PSD1_NOISE_V * 1e6:.0f} µV rms of noise",
+        drift="it calibrates itself",
+        size="better: demanded",
+        coefficients="reference E0, none of the converter",
     ),
     **{
         name: Article(
             printed="resolution finer by more than an order",
             gain_u=PSA.chain_gain_ppm * 1e-6,
             zero_u_v=PSA.chain_zero_uv * 1e-6,
+            drift="of the zero less than before",
+            size="much smaller than before",
+            coefficients="chain E0; its zero below the others by the article's words",
         )
         for name in ("psa1", "psa2")
     },

@@ -199,7 +199,7 @@ def test_it_takes_no_addresses_and_no_parameters_of_others(
 ) -> None:
     assert cli.main(["run", "compare-converters", *option]) == 2
     assert (
-        f"compare-converters: expected --scenario, --seed, --record, --replay, --out, --verbose, got {option[0]}"
+        f"compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, got {option[0]}"
         in capsys.readouterr().err
     )
 

@@ -62,7 +62,7 @@ MISTAKES: list[tuple[str, str]] = [
     ("run heading-hold --average 16", "heading-hold: expected an option that --help lists, got --average"),
     (
         "run compare-converters --real-time",
-        "compare-converters: expected --scenario, --seed, --record, --replay, --out, --verbose, got --real-time",
+        "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, got --real-time",
     ),
     ("run gyrocompass --window-s 0", "gyrocompass: window_s, repeat: expected at least 0.1 s and 1, got 0.0 s and 1"),
     (
@@ -225,7 +225,7 @@ def test_help_of_a_procedure_is_of_its_own_options_with_unit_and_default(
     told = help_of(f"run {name}", capsys, monkeypatch)
     shown = re.findall(r"^  (?:-v, )?(--[a-z0-9-]+)", told, re.MULTILINE)
     own = [f"--{f.replace('_', '-')}" for f in command.parameters.fields]
-    assert shown == [*own, *command.common]
+    assert shown == [*own, *command.own, *command.common]
     assert command.summary[1:] in told
     for option, f in zip(own, command.parameters.fields.values(), strict=True):
         text = " ".join(re.findall(rf"^  {option} .*\n(?:    +.*\n)*", told, re.MULTILINE)[0].split())

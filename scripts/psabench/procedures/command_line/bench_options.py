@@ -106,6 +106,11 @@ IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
+# Of compare-converters alone: its chamber is in its scenario.
+CONVERTERS_ALONE: Mapping[str, Mapping[str, Any]] = {
+    "--chamber": {"action": "store_true", "help": "compare them at temperatures of a chamber: drift of zero and scale"},
+}
+
 # Of flights alone.
 IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
     "--store": {"type": Path, "default": STORE, "metavar": "FILE", "help": "store of passports (%(default)s)"},

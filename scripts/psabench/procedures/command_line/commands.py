@@ -10,7 +10,7 @@ from typing import Any
 
 from psabench.options import KEPT
 from psabench.procedures.command_line import handlers
-from psabench.procedures.command_line.bench_options import COMMON, FROM_OUTPUTS, ON_THE_TABLE
+from psabench.procedures.command_line.bench_options import COMMON, CONVERTERS_ALONE, FROM_OUTPUTS, ON_THE_TABLE
 from psabench.procedures.command_line.offered import (
     ALL,
     COMPARE,
@@ -69,6 +69,7 @@ class Command:
     summary: str
     handler: Callable[[argparse.Namespace], int]
     common: Sequence[str]  # of COMMON
+    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # of this one alone, whatever others call so
     load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
     examples: str
     notes: str = ""
@@ -113,6 +114,7 @@ _EXAMPLES: Mapping[str, str] = {
 """,
     COMPARE[0]: """\
   psabench run compare-converters --out build/run/converters
+  psabench run compare-converters --chamber --out build/run/converters   drift of zero and scale, -60 to +85 degC
 """,
     "gyrocompass": """\
   psabench run gyrocompass                                   the article's way and a better one
@@ -299,7 +301,7 @@ COMMANDS: Mapping[str, Command] = {
     c.name: c
     for c in (
         *_on_the_head(),
-        _command(COMPARE, handlers.compare_units, common=_STARTED),
+        _command(COMPARE, handlers.compare_units, common=_STARTED, own=CONVERTERS_ALONE),
         *_SINS,
         *_KOI,
         _THERMAL,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from psabench.errors import BadInput, expected
 from psabench.options import of_fields
 from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
@@ -81,6 +82,8 @@ def compare_units(args: argparse.Namespace) -> int:
     from psabench.procedures import compare_converters, comparison
     from psabench.report import comparison_page
 
+    if args.chamber:
+        return _compare_in_chamber(args)
     p = compare_converters.CompareParams()
     if args.replay:
         refuse_beside_replay({"--record": args.record, "--scenario": args.scenario, "--seed": args.seed})
@@ -91,6 +94,22 @@ def compare_units(args: argparse.Namespace) -> int:
     if args.verbose:
         print(comparison.console_table(c))
     print(comparison.verdict(c))
+    print(f"report: {page}")
+    return 0 if c.within else 1
+
+
+def _compare_in_chamber(args: argparse.Namespace) -> int:
+    from psabench.climate import converters_page, converters_result
+    from psabench.climate.converters import ChamberParams
+
+    for option, given in (("--record", args.record), ("--replay", args.replay)):
+        if given:  # table, chamber and supply are not in a recording
+            raise BadInput(expected(f"no {option} beside --chamber", given, "compare-converters"))
+    c = converters_result.compare(args.out, ChamberParams(), Bar(), scenario=args.scenario, seed=args.seed)
+    page = converters_page.write(args.out, c)
+    if args.verbose:
+        print(converters_result.console_table(c))
+    print(converters_result.verdict(c))
     print(f"report: {page}")
     return 0 if c.within else 1
 

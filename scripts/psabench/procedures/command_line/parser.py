@@ -89,6 +89,8 @@ def _parser_of(command: Command) -> Parser:
             others = {label: changed.get(name, f.default) for label, changed in taken.defaults.items()}
             _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
+    for option, how in command.own.items():
+        group.add_argument(option, **how)
     for option in command.common:
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **EVERY[option])
     return p

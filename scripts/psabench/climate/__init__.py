@@ -1,0 +1,1 @@
+"""The procedures of the bench repeated at temperatures of a chamber: converters compared, sensors calibrated."""
