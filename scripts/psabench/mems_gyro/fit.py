@@ -22,7 +22,8 @@ from psabench.mems_gyro.params import BLOCK_S, NAME, MemsGyroParams
 from psabench.mems_gyro.plan import Dwell, Floats
 
 NEWTON_ROUNDS = 4
-SHORT_BLOCKS, LONG_BLOCKS = 60, 10  # of the recording at rest: first so many single ones, then means of so many
+MEANS = ((1, 150), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times
+KNOWN_SD = 2.0  # a power below so many of its sd may be none
 OUTLIER_SD = 5.0  # a dwell that is farther from the others' prediction is a doubt
 
 
@@ -147,8 +148,10 @@ def _observed(dwells: Sequence[Dwell], p: MemsGyroParams) -> _Observations:
 
 def _sizes(blocks: int) -> list[int]:
     """Of the means of a recording: short ones show white noise, long ones the slow terms."""
-    short = min(SHORT_BLOCKS, blocks // 2)
-    return [1] * short + [LONG_BLOCKS] * ((blocks - short) // LONG_BLOCKS)
+    found: list[int] = []
+    for size, most in MEANS:
+        found += [size] * min(most, (blocks - sum(found)) // size)
+    return found
 
 
 def _least_squares(o: _Observations, weight: Floats) -> Floats:
@@ -242,17 +245,12 @@ def _budget(o: _Observations, theta: Floats, gain: Floats, p: MemsGyroParams) ->
 
 def _noise_estimates(noise: NoiseFit, scale_v_per_dps: float) -> Iterator[Estimate]:
     for q, v, sd_v in zip(NOISE, noise.v, noise.sd, strict=True):
-        root = math.sqrt(v) / scale_v_per_dps
-        sd = sd_v / (2.0 * math.sqrt(v)) / scale_v_per_dps if v > 0.0 else 0.0
-        e = Estimate(
-            name=q.name,
-            symbol=q.symbol,
-            unit=q.unit,
-            value=root * q.per_si,
-            sd=sd * q.per_si,
-            ci_half=2.0 * sd * q.per_si,
-        )
-        yield e if root > 4.0 * sd > 0.0 else not_identifiable(e, "the recording is too short to tell it from the others")
+        per = q.per_si / scale_v_per_dps
+        value, most = math.sqrt(v) * per, math.sqrt(v + 2.0 * sd_v) * per
+        known = v > KNOWN_SD * sd_v
+        sd = sd_v / (2.0 * math.sqrt(v)) * per if known else (most - value) / 2.0
+        e = Estimate(name=q.name, symbol=q.symbol, unit=q.unit, value=value, sd=sd, ci_half=2.0 * sd)
+        yield e if known else not_identifiable(e, f"the recording says no more than: below {most:.3g} {q.unit}")
 
 
 def _doubts(

@@ -74,10 +74,10 @@ def kernels(t_s: Floats, duration_s: Floats) -> list[Floats]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseFit:
-    """Powers of the terms, and how well they are known."""
+    """Powers of the terms, and how well they are known; of one that was not found, how much could hide."""
 
     v: Floats  # (3,)
-    cov: Floats  # (3, 3); of a term that is none 0
+    cov: Floats  # (3, 3)
 
     @property
     def sd(self) -> Floats:
@@ -103,9 +103,7 @@ def fit_noise(y: Floats, design: Floats, parts: list[Floats]) -> NoiseFit:
         if done:
             break
     _, info = _scoring(z, h, v)
-    cov = np.zeros_like(info)
-    cov[np.ix_(active, active)] = np.linalg.inv(info[np.ix_(active, active)])
-    return NoiseFit(v=v, cov=cov)
+    return NoiseFit(v=v, cov=np.linalg.inv(info))
 
 
 def _pinned(v: Floats, scale: Floats, active: npt.NDArray[np.bool_]) -> tuple[Floats, npt.NDArray[np.bool_]]:

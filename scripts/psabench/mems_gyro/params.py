@@ -24,7 +24,7 @@ class MemsGyroParams:
     range_dps: float = option(150.0, "deg/s", "range of the gyro, the highest rate of the table")
     series: int = option(2, "", "repetitions of all attitudes and rates")
     dwell_s: int = option(10, "s", "duration of each rate")
-    rest_s: int = option(1200, "s", "recording at rest before the series, for the noise")
+    rest_s: int = option(3600, "s", "recording at rest before the series, for the noise")
     latitude_deg: float = option(50.45, "deg", "latitude of the table")
     azimuth_deg: float = option(0.0, "deg", "azimuth of the table's x at angles of zero, from north")
     chain_gain_ppm: float = option(50.0, "ppm", "gain of the measuring chain at 25 °C: divider and reference")

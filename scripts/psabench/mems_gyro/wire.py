@@ -19,6 +19,7 @@ AXES = 3
 SPIN_LIMIT_S = 60.0  # for the table to reach a rate
 RATE_TOL = 1e-4  # of the rate: it is reached
 LINK_S = 5.0  # more than the samples take
+BLOCKS_AT_ONCE = 20  # of the recording: Ctrl-C is heard between them
 
 
 class TableBench(Protocol):
@@ -94,10 +95,8 @@ class WireTable:
         self._bench.wait(SETTLE_PERIODS / self._hz)
 
     def dwell(self, blocks: int, *, recording: bool = False) -> Dwell:
-        count = round(BLOCK_S * self._hz)
         t0_s, heading_deg = self._stamped()
-        self._look(None)
-        means = [self._block_v(count) for _ in range(blocks)]
+        means = self._recorded(blocks) if recording else self._followed(blocks)
         t1_s, end_deg = self._stamped()
         d = Dwell(
             middle_deg=self._inner[0],
@@ -112,10 +111,25 @@ class WireTable:
         self._look(d)
         return d
 
-    def _block_v(self, count: int) -> float:
-        v = self._unit.stream(count, count / self._hz + LINK_S).axis(self._axis)
+    def _followed(self, blocks: int) -> list[float]:
         self._look(None)
-        return float(v.mean()) / self._filter_gain
+        means: list[float] = []
+        for _ in range(blocks):
+            means += self._blocks_v(1)
+            self._look(None)
+        return means
+
+    def _recorded(self, blocks: int) -> list[float]:
+        means: list[float] = []
+        while len(means) < blocks:
+            means += self._blocks_v(min(BLOCKS_AT_ONCE, blocks - len(means)))
+        return means
+
+    def _blocks_v(self, blocks: int) -> list[float]:
+        each = round(BLOCK_S * self._hz)
+        v = self._unit.stream(blocks * each, blocks * BLOCK_S + LINK_S).axis(self._axis)
+        means: list[float] = (v.reshape(blocks, each).mean(axis=1) / self._filter_gain).tolist()
+        return means
 
     def _stamped(self) -> tuple[float, float]:
         t_s, angle_deg = self._bench.table.stamped()
