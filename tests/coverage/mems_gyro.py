@@ -62,9 +62,11 @@ MOVE_S, RAMP_S = 6.0, 1.5  # of the inner axes to an attitude, of the outer one 
 class ModelBench:
     """A `TableBench` without a board: the sensor's and the table's model, and a chain with a drawn gain and zero."""
 
-    def __init__(self, lib: ctypes.CDLL, p: MemsGyroParams, seed: int) -> None:
+    def __init__(self, lib: ctypes.CDLL, p: MemsGyroParams, seed: int, changed: Mapping[str, float] = {}) -> None:
+        """changed: fields of the gyro that are not drawn."""
         rng = np.random.default_rng(seed)
         self.truth = {name: mean + sd * rng.standard_normal() for name, (mean, sd) in GYRO.items()}
+        self.truth.update(changed)
         tc_k = p.chain_off_k * rng.standard_normal(2)
         self._gain = 1.0 + 1e-6 * (p.chain_gain_ppm * rng.standard_normal() + p.chain_gain_tc_ppm_per_k * tc_k[0])
         self._zero_v = 1e-6 * (p.chain_zero_uv * rng.standard_normal() + p.chain_zero_tc_uv_per_k * tc_k[1])
@@ -123,7 +125,7 @@ Run = dict[str, tuple[float, float]]  # by estimate: error in U, error in standa
 
 def through_the_model(seed: int, p: MemsGyroParams, folder: str) -> Run:
     """One drawn gyro; the library is in the folder."""
-    bench = ModelBench(_library(folder), p, seed)
+    bench = ModelBench(library(folder), p, seed)
     dwells: list[Dwell] = []
     measure(bench, p, Silent(), dwells.append)
     right = expected_values(bench.truth)
@@ -131,14 +133,14 @@ def through_the_model(seed: int, p: MemsGyroParams, folder: str) -> Run:
     return errors_of(estimate_gyro(dwells, p), right)
 
 
-_libraries: dict[str, ctypes.CDLL] = {}
+libraries: dict[str, ctypes.CDLL] = {}
 
 
-def _library(folder: str) -> ctypes.CDLL:
+def library(folder: str) -> ctypes.CDLL:
     """Compiled once in a process, into a folder of its own: a process does not see another's half-written file."""
-    if folder not in _libraries:
-        _libraries[folder] = physics.build(Path(tempfile.mkdtemp(dir=folder)))
-    return _libraries[folder]
+    if folder not in libraries:
+        libraries[folder] = physics.build(Path(tempfile.mkdtemp(dir=folder)))
+    return libraries[folder]
 
 
 def through_the_wire(seed: int, p: MemsGyroParams, folder: str) -> Run:

@@ -24,6 +24,7 @@ from psabench.mems_gyro.plan import Dwell, Floats
 NEWTON_ROUNDS = 4
 MEANS = ((1, 150), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times
 KNOWN_SD = 2.0  # a power below so many of its sd may be none
+FOLLOWS = 0.5  # of the variance of the readings is the rate's, at the least
 OUTLIER_SD = 5.0  # a dwell that is farther from the others' prediction is a doubt
 
 
@@ -165,10 +166,11 @@ def _least_squares(o: _Observations, weight: Floats) -> Floats:
 
 
 def _first_scale(o: _Observations) -> float:
-    x = o.rows[:, 0] - o.rows[:, 0].mean()
-    slope = float(x @ o.y) / float(x @ x)
-    if slope == 0.0:
-        raise BenchError(expected("an output that follows the table's rate", "the same at every rate", NAME))
+    """Raises BenchError for an output that is not a gyro's on this table."""
+    x, y = (a - a.mean() for a in (o.rows[:, 0], o.y))
+    slope = float(x @ y) / float(x @ x)
+    if slope * float(x @ y) <= FOLLOWS * float(y @ y):
+        raise BenchError(expected("an output that follows the table's rate", "one that does not", NAME))
     return slope
 
 

@@ -77,28 +77,27 @@ def run_gyro(options: MemsGyroOptions, progress: Progress) -> MemsGyroRun:
     with options.open_bench(SCENARIO, "wall" if options.real_time else "step") as bench:
         if not any(isinstance(u, Psa2) for u in bench.units.values()):
             raise BadInput(expected(f"a scenario with a PSA-2 on a table, as {SCENARIO}", "none", "--scenario"))
+        right = _truth_of(bench, p) if bench.truth_path else None
         watch = TruthWatch(bench, p.channel)
         table = WireTable(bench, p, watch)
         try:
             measure(table, p, progress, dwells.append)
         finally:  # Ctrl-C, too: what was measured is kept
             write_dwells(options, dwells)
-        truth = _truth_of(bench, p, watch) if bench.truth_path else None
     result = estimate_gyro(dwells, p)
+    truth = right and right | {"zero_v": right["zero_v"] + watch.mean_v}
     where = str(options.can or options.control or options.scenario or SCENARIO)
     recorded = f"{sum(d.duration_s for d in dwells):.0f} s"
     return MemsGyroRun(params=p, result=result, facts={"bench": where, "recorded": recorded}, truth=truth)
 
 
-def _truth_of(bench: Bench, p: MemsGyroParams, watch: TruthWatch) -> Mapping[str, float] | None:
-    """None: the channel has no gyro."""
+def _truth_of(bench: Bench, p: MemsGyroParams) -> dict[str, float]:
+    """Before an hour is measured: of a channel that has a gyro."""
     unit = next(iter(bench.truth()["units"].values()))
     gyro = unit["axes"][p.axis].get("gyro")
     if gyro is None:
         raise BadInput(expected(f"a mems_gyro on channel {p.axis}", unit["axes"][p.axis]["sensor"], NAME))
-    right = expected_values(gyro)
-    right["zero_v"] += watch.mean_v
-    return right
+    return expected_values(gyro)
 
 
 def write_dwells(options: MemsGyroOptions, dwells: Sequence[Dwell]) -> None:
