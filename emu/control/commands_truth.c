@@ -30,11 +30,13 @@ static void add_noise(const struct unit *u, cJSON *to)
 static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
 {
     static const char *const names[] = {
-        [UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", [UNIT_RECORDED] = "recorded"};
+        [UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", [UNIT_RECORDED] = "recorded", [UNIT_CVG] = "mems_gyro"};
     const enum unit_sensor sensor = u->cfg.axis[i].sensor;
     cJSON_AddStringToObject(to, "sensor", names[sensor]);
     if (sensor == UNIT_MEMS) yaml_dump(&scenario_mems_fields, &u->cfg.axis[i].mems, to);
     if (sensor == UNIT_MEMS) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
+    if (sensor == UNIT_CVG) add_section(&scenario_cvg_fields, &u->cfg.axis[i].cvg, "gyro", to);
+    if (sensor == UNIT_CVG) add_real(to, "sensor_v", unit_sensor_out(u, i, t_ns));
     if (sensor == UNIT_QUARTZ) add_section(&scenario_quartz_fields, &u->quartz[i].cfg, "quartz", to);
     if (sensor == UNIT_QUARTZ) cJSON_AddStringToObject(to, "group", quartz_group_name(quartz_group(&u->quartz[i].cfg)));
     if (sensor == UNIT_QUARTZ) add_real(to, "sensor_a", unit_sensor_out(u, i, t_ns));

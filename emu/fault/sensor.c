@@ -115,6 +115,14 @@ static double output_now(const struct fault *f, int64_t t_ns)
     return out;
 }
 
+/* Its output without motion; of others than MEMS about 0. */
+static double still_v(const struct unit *u, unsigned axis)
+{
+    const enum unit_sensor sensor = u->cfg.axis[axis].sensor;
+    if (sensor == UNIT_CVG) return u->cvg[axis].cfg.u0_v;
+    return sensor == UNIT_MEMS ? u->mems[axis].cfg.u0_v : 0.0;
+}
+
 /* Value and upper value of each kind, by enum sensor_fault_kind. */
 static bool apply_sensor(struct fault *f, int64_t t_ns)
 {
@@ -129,11 +137,10 @@ static bool apply_sensor(struct fault *f, int64_t t_ns)
         [SENSOR_SATURATION] = {value_or(f, FAULT_LOW_V, -infinite), value_or(f, FAULT_HIGH_V, infinite)},
     };
     const unsigned k = f->kind->variant;
-    const bool mems = u->cfg.axis[f->point.index].sensor == UNIT_MEMS; /* others are about 0 without acceleration */
     f->as.sensor = (struct sensor_fault){.kind = (enum sensor_fault_kind)k,
                                          .value = values[k][0],
                                          .value_high = values[k][1],
-                                         .zero = mems ? u->mems[f->point.index].cfg.u0_v : 0.0,
+                                         .zero = still_v(u, f->point.index),
                                          .from_ns = t_ns,
                                          .noise = draws_of(f->engine->seed, f->id, "fault")};
     sensor_fault_add(&u->sensor_faults[f->point.index], &f->as.sensor);

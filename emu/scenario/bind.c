@@ -39,9 +39,11 @@ static void draw_quartz(const struct scenario *s, uint32_t serial, unsigned axis
 static void draw_unit(const struct scenario *s, struct scenario_unit *u)
 {
     static const char *const sensor[] = {"x", "y", "z"}, *const chain[] = {"x.afe", "y.afe", "z.afe"};
+    static const char *const gyro[] = {"x.gyro", "y.gyro", "z.gyro"};
     for (unsigned i = 0; i < UNIT_AXES; i++) {
         const uint32_t serial = u->cfg.board.serial;
         draw_parameters(&scenario_mems_fields, &s->spread.mems, &u->cfg.axis[i].mems, s, serial, sensor[i]);
+        draw_parameters(&scenario_cvg_fields, &s->spread.cvg, &u->cfg.axis[i].cvg, s, serial, gyro[i]);
         draw_parameters(&scenario_afe_numbers, &s->spread.afe, &u->cfg.board.afe[i], s, serial, chain[i]);
         if (s->spread.quartz_given && u->cfg.axis[i].sensor == UNIT_QUARTZ) draw_quartz(s, serial, i, &u->cfg.axis[i]);
     }

@@ -42,6 +42,33 @@ static const struct field mems_rows[] = {
 };
 const struct fields scenario_mems_fields = FIELDS(mems_rows);
 
+static const struct field cvg_rows[] = {
+#define ROW(name, lo, hi, words) REAL_ROW(struct cvg_dps, name, lo, hi, words)
+    ROW(u0_v,               -10, 10,    "output without rotation"),
+    ROW(scale_v_per_dps,    -1, 1,      "scale, V per °/s about its input axis"),
+    ROW(cross_y,            -0.2, 0.2,  "sensitivity to the rate about the second axis, part of the scale"),
+    ROW(cross_z,            -0.2, 0.2,  "sensitivity to the rate about the third axis, part of the scale"),
+    ROW(gx_dps_per_g,       -10, 10,    "sensitivity to acceleration along the input axis"),
+    ROW(gy_dps_per_g,       -10, 10,    "sensitivity to acceleration along the second axis"),
+    ROW(gz_dps_per_g,       -10, 10,    "sensitivity to acceleration along the third axis"),
+    ROW(square_per_dps,     -1e-3, 1e-3, "nonlinearity, square of the rate"),
+    ROW(cube_per_dps2,      -1e-5, 1e-5, "nonlinearity, cube of the rate"),
+    ROW(quadrature_dps,     -1e4, 1e4,  "quadrature signal, as a rate"),
+    ROW(phase_deg,          -10, 10,    "phase error of the demodulator at 25 °C"),
+    ROW(u0_tc_v_per_k,      -1, 1,      "temperature coefficient of the output without rotation, from 25 °C"),
+    ROW(scale_tc_ppm_per_k, -1e4, 1e4,  "temperature coefficient of the scale"),
+    ROW(phase_tc_deg_per_k, -1, 1,      "temperature coefficient of the phase error"),
+    ROW(noise_dps_rthz,     0, 10,      "white noise, one-sided density"),
+    ROW(bias_instability_dps, 0, 10,    "flicker, B of IEEE Std 952"),
+    ROW(walk_dps_rts,       0, 10,      "rate random walk, K of IEEE Std 952"),
+    ROW(ramp_dps_per_s,     -1, 1,      "linear drift from power-on"),
+    ROW(quantum_v,          0, 1,       "resolution of the output; 0: none"),
+    ROW(low_v,              -15, 15,    "lowest output; low_v and high_v both 0: no limits"),
+    ROW(high_v,             -15, 15,    "highest output"),
+#undef ROW
+};
+const struct fields scenario_cvg_fields = FIELDS(cvg_rows);
+
 #define SERIES(m) offsetof(struct scenario_series, m)
 static const char *const betweens[] = {[SERIES_LINEAR] = "linear", [SERIES_HOLD] = "hold", NULL};
 static const char *const ends[] = {[SERIES_END_HOLD] = "hold", [SERIES_END_REPEAT] = "repeat", [SERIES_END_STOP] = "stop", NULL};

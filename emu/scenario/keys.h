@@ -31,6 +31,7 @@ extern const struct fields scenario_afe_fields;           /* of struct afe_cfg *
 extern const struct fields scenario_afe_numbers;          /* its numbers alone */
 extern const struct fields scenario_mems_fields;          /* of struct mems_g */
 extern const struct fields scenario_quartz_fields;        /* of struct quartz_g */
+extern const struct fields scenario_cvg_fields;           /* of struct cvg_dps */
 extern const struct fields scenario_pendulum_fields;      /* of struct pendulum */
 extern const struct fields scenario_series_fields;        /* of struct scenario_series */
 extern const struct fields scenario_unit_fields;          /* of struct scenario_unit */

@@ -106,6 +106,7 @@ static bool load_spread(struct yaml_file *f, const struct yaml_node *node, void 
 // clang-format off
 static const struct field spread_rows[] = {
     {.type = FIELD_INLINE, .offset = offsetof(struct scenario_spread, mems), .sub = &scenario_mems_fields},
+    {.key = "gyro", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, cvg), .sub = &scenario_cvg_fields, .what = "parameters of a mems_gyro"},
     {.key = "afe", .type = FIELD_SECTION, .offset = offsetof(struct scenario_spread, afe), .sub = &scenario_afe_numbers, .what = "parameters of the analog chain"},
     {.key = "quartz", .type = FIELD_CUSTOM, .load = scenario_load_batch, .dump = scenario_dump_batch, .what = "batch of the quartz sensors: a name of proto/batches, a path, or a mapping; their temperature, glue and position are drawn from it"},
 };

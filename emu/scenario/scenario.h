@@ -70,6 +70,7 @@ struct scenario_unit {
 /* What differs from unit to unit: standard deviations, and a batch. */
 struct scenario_spread {
     struct mems_g mems;
+    struct cvg_dps cvg;
     struct afe_cfg afe;
     bool quartz_given;
     struct quartz_batch quartz; /* of which the quartz sensors are */

@@ -101,13 +101,15 @@ static bool load_count(struct yaml_file *f, const struct yaml_node *node, void *
 
 // clang-format off
 static const char *const sensors[] = {[UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz",
-                                      [UNIT_RECORDED] = "recorded", NULL};
+                                      [UNIT_RECORDED] = "recorded", [UNIT_CVG] = "mems_gyro", NULL};
 #define AXIS(i)                                                                                                        \
     {.key = "sensor", .type = FIELD_CHOICE, .offset = UNIT(cfg.axis[i].sensor), .choices = sensors,                     \
      .what = "type of the sensor; `none`: the channel is shorted; `recorded`: its output comes from a file"},                               \
     {.type = FIELD_INLINE, .offset = UNIT(cfg.axis[i].mems), .sub = &scenario_mems_fields},                             \
     {.key = "quartz", .type = FIELD_SECTION, .offset = UNIT(cfg.axis[i].quartz), .sub = &scenario_quartz_fields,        \
      .present = UNIT(cfg.axis[i].quartz_given), .what = "parameters of a quartz sensor; its afe.input is current"},    \
+    {.key = "gyro", .type = FIELD_SECTION, .offset = UNIT(cfg.axis[i].cvg), .sub = &scenario_cvg_fields,                \
+     .present = UNIT(cfg.axis[i].cvg_given), .what = "parameters of a mems_gyro"},                                      \
     {.key = "signal", .type = FIELD_SECTION, .offset = UNIT(series[i]), .sub = &scenario_series_fields,                 \
      .present = UNIT(series[i].given), .what = "what the sensor feels, or puts out, from a file: [recorded signals](recorded.md)"}, \
     {.key = "at_m", .type = FIELD_REALS, .offset = UNIT(cfg.axis[i].at_m), .count = 3, .min = -10, .max = 10,           \
@@ -220,6 +222,10 @@ static bool check_inputs(struct yaml_file *f, const struct yaml_node *node, cons
             return yaml_file_fail(f, yaml_at(node, "axes"), "axes",
                                   "%c: expected afe: {input: current} for a quartz sensor", "xyz"[i]);
         }
+        if (u->cfg.axis[i].sensor == UNIT_CVG && u->cfg.board.afe[i].input != AFE_VOLTAGE) {
+            return yaml_file_fail(f, yaml_at(node, "axes"), "axes",
+                                  "%c: expected afe: {input: voltage} for a mems_gyro", "xyz"[i]);
+        }
     }
     return true;
 }
@@ -237,8 +243,9 @@ static bool check_signal(struct yaml_file *f, const struct yaml_node *node, cons
         return sensor != UNIT_RECORDED ||
                yaml_file_fail(f, at, "axes", "%c: expected a signal for a recorded sensor, got none", "xyz"[i]);
     }
-    if (sensor == UNIT_NO_SENSOR)
-        return yaml_file_fail(f, at, "axes", "%c.signal: expected a sensor that takes it, got none", "xyz"[i]);
+    if (sensor == UNIT_NO_SENSOR || sensor == UNIT_CVG)
+        return yaml_file_fail(f, at, "axes", "%c.signal: expected a sensor that takes it, got %s", "xyz"[i],
+                              sensors[sensor]);
     if (!s->file[0]) return yaml_file_fail(f, at, "axes", "%c.signal: expected a file, got none", "xyz"[i]);
     if (len <= n || strcmp(s->column + len - n, unit) != 0)
         return yaml_file_fail(f, at, "axes", "%c.signal: expected a column that ends in %s, got \"%s\"", "xyz"[i], unit,

@@ -25,6 +25,11 @@ static bool is_quartz(const struct unit *u, unsigned axis)
     return u->cfg.axis[axis].sensor == UNIT_QUARTZ;
 }
 
+static bool is_gyro(const struct unit *u, unsigned axis)
+{
+    return u->cfg.axis[axis].sensor == UNIT_CVG;
+}
+
 /* Without a chamber nothing changes, and not every MEMS feels it. */
 static bool feels_steps(const struct unit *u, unsigned axis)
 {
@@ -53,7 +58,7 @@ static void warm_sensor(struct unit *u, unsigned axis, int64_t t_ns)
     if (step == u->warm_step[axis]) return;
     u->warm_step[axis] = step;
     const double element_degc = temp_degc(u, axis, step * WARM_STEP_NS);
-    u->mems[axis].temp_degc = u->quartz[axis].element_degc = element_degc;
+    u->mems[axis].temp_degc = u->quartz[axis].element_degc = u->cvg[axis].temp_degc = element_degc;
     if (is_quartz(u, axis)) warm_quartz(u, axis, step * WARM_STEP_NS);
 }
 
@@ -105,6 +110,27 @@ static void sense_row(struct unit *u, unsigned axis, const double *a_mps2, unsig
     }
 }
 
+/* Inertial rate and a = -f on the axes of a channel's sensor. */
+static void feel_motion(struct unit *u, unsigned axis, int64_t t_ns, double w_radps[3], double a_mps2[3])
+{
+    struct kinematics kin;
+    lab_kinematics(u->lab, &u->cfg.mounting, u->cfg.axis[axis].at_m, t_ns, &kin);
+    for (unsigned k = 0; k < 3; k++) {
+        w_radps[k] = kin.w_radps[(k + axis) % 3];
+        a_mps2[k] = -kin.f_mps2[(k + axis) % 3];
+    }
+}
+
+static void gyro_row(struct unit *u, unsigned axis, const struct looks *at, double *out)
+{
+    double w_radps[3], a_mps2[3];
+    for (unsigned i = 0; i < at->n; i++) {
+        feel_motion(u, axis, at->t_ns[i], w_radps, a_mps2);
+        warm_sensor(u, axis, at->t_ns[i]);
+        out[i] = cvg_out_v(&u->cvg[axis], w_radps, a_mps2, at->t_ns[i], at->every_ns);
+    }
+}
+
 static void accel_row(void *ctx, unsigned axis, const struct looks *at, double *out)
 {
     struct unit *u = ctx;
@@ -113,8 +139,12 @@ static void accel_row(void *ctx, unsigned axis, const struct looks *at, double *
         for (unsigned i = 0; i < at->n; i++) out[i] = 0.0;
         return;
     }
-    const unsigned felt = feel_row_mps2(u, axis, at, a_mps2);
-    sense_row(u, axis, a_mps2[0], felt, at, out);
+    if (is_gyro(u, axis)) {
+        gyro_row(u, axis, at, out);
+    } else {
+        const unsigned felt = feel_row_mps2(u, axis, at, a_mps2);
+        sense_row(u, axis, a_mps2[0], felt, at, out);
+    }
     sensor_fault_row(u->sensor_faults[axis], at, out);
 }
 
@@ -162,6 +192,7 @@ static struct looks_range accel_range(void *ctx, unsigned axis, int64_t every_ns
     else if (is_quartz(u, axis) && quartz_past_ns(&u->quartz[axis]) < 0)
         *why = "the loop of a quartz sensor remembers long";
     else if (u->sensor_faults[axis]) *why = "a sensor has a fault";
+    else if (is_gyro(u, axis)) *why = "a sensor is a gyro";
     else if (!is_quartz(u, axis) && u->mems[axis].slow.moves) *why = "a sensor has slow noise";
     else if (!feels_gravity(u, axis)) *why = "its mount accelerates it";
     if (is_quartz(u, axis)) return quartz_range_a(&u->quartz[axis], a_max_mps2, every_ns);
@@ -267,6 +298,15 @@ static void init_quartz(struct unit *u, unsigned axis)
                 draws_of(seed, u->sensors_serial, noise[axis]), draws_of(seed, u->sensors_serial, scatter[axis]));
 }
 
+static void init_gyro(struct unit *u, unsigned axis)
+{
+    static const char *const noise[UNIT_AXES] = {"cvg.x", "cvg.y", "cvg.z"};
+    static const char *const slow_noise[UNIT_AXES] = {"cvg.slow.x", "cvg.slow.y", "cvg.slow.z"};
+    const struct board_cfg *of = &u->cfg.board;
+    cvg_init(&u->cvg[axis], &u->cfg.axis[axis].cvg, u->lab->site.g_mps2, draws_of(of->seed, of->serial, noise[axis]),
+             draws_of(of->seed, of->serial, slow_noise[axis]));
+}
+
 static void init_mems(struct unit *u, unsigned axis, const struct mems_cfg *m)
 {
     static const char *const noise[UNIT_AXES] = {"mems.x", "mems.y", "mems.z"};
@@ -304,6 +344,7 @@ void unit_init(struct unit *u, const struct unit_cfg *cfg, struct lab *lab, stru
         const struct mems_cfg m = mems_cfg_si(&cfg->axis[i].mems, lab->site.g_mps2);
         init_mems(u, i, &m);
         init_quartz(u, i);
+        init_gyro(u, i);
         const bool quartz = cfg->axis[i].sensor == UNIT_QUARTZ;
         const double alpha0_rad = quartz ? cfg->axis[i].quartz.alpha0_deg * RAD_PER_DEG : m.alpha0_rad;
         const struct det_pair alpha0 = det_sin_cos(alpha0_rad);
@@ -353,6 +394,9 @@ void unit_reseed(struct unit *u, uint64_t seed, int64_t t_ns)
         draws_reseed(&u->mems[i].noise, seed);
         draws_reseed(&u->mems[i].slow.draws, seed);
         quartz_reseed(&u->quartz[i], seed);
+        (void)noise_slow_u(&u->cvg[i].slow, t_ns);
+        draws_reseed(&u->cvg[i].noise, seed);
+        draws_reseed(&u->cvg[i].slow.draws, seed);
     }
     board_reseed(u->board, seed);
 }
@@ -409,6 +453,14 @@ struct can_node *unit_node(const struct unit *u)
     return u->can ? &unit_co(u)->stream : NULL;
 }
 
+static double gyro_true_v(struct unit *u, unsigned axis, int64_t t_ns)
+{
+    double w_radps[3], a_mps2[3];
+    feel_motion(u, axis, t_ns, w_radps, a_mps2);
+    warm_sensor(u, axis, t_ns);
+    return cvg_true_v(&u->cvg[axis], w_radps, a_mps2);
+}
+
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
 {
     const enum unit_sensor sensor = u->cfg.axis[axis].sensor;
@@ -416,6 +468,7 @@ double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
     double a_mps2[3] = {0.0, 0.0, 0.0}, value = 0.0;
     if (sensor == UNIT_NO_SENSOR || (s->sample && !series_value(s, t_ns, &value))) return 0.0;
     if (sensor == UNIT_RECORDED) return value;
+    if (is_gyro(u, axis)) return gyro_true_v(u, axis, t_ns);
     if (s->sample) a_mps2[0] = -value;
     else (void)feel_row_mps2(u, axis, &(struct looks){&t_ns, 1, 0}, &a_mps2);
     if (feels_steps(u, axis)) warm_sensor(u, axis, t_ns);
@@ -425,5 +478,6 @@ double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns)
 
 double unit_zero_moved_v(const struct unit *u, unsigned axis, int64_t t_ns)
 {
+    if (is_gyro(u, axis)) return cvg_zero_moved_v(&u->cvg[axis], t_ns);
     return u->cfg.axis[axis].sensor == UNIT_MEMS ? mems_zero_moved_v(&u->mems[axis], t_ns) : 0.0;
 }

@@ -7,6 +7,7 @@
 #define PSABENCH_UNIT_UNIT_H
 
 #include "phys/lab.h"
+#include "phys/sensor/cvg.h"
 #include "phys/sensor/fault.h"
 #include "phys/sensor/mems.h"
 #include "phys/sensor/quartz_batch.h"
@@ -17,14 +18,17 @@
 #define UNIT_TEMPS 4u /* sensors X, Y, Z, converter board */
 
 /* Without a sensor the channel is shorted: 0 V or 0 A. Quartz gives a current: afe.input has to be current. Of RECORDED the
- * series is the output itself, V or A by afe.input; a MEMS or quartz sensor with a series feels its m/s^2. */
-enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ, UNIT_RECORDED };
+ * series is the output itself, V or A by afe.input; a MEMS or quartz sensor with a series feels its m/s^2. A CVG gives volts and
+ * takes no series. */
+enum unit_sensor { UNIT_NO_SENSOR, UNIT_MEMS, UNIT_QUARTZ, UNIT_RECORDED, UNIT_CVG };
 
 struct unit_axis_cfg {
     enum unit_sensor sensor;
     struct mems_g mems;
     struct quartz_g quartz;
     bool quartz_given;    /* the scenario says something of it */
+    struct cvg_dps cvg;
+    bool cvg_given;
     double at_m[3];       /* where it is in the unit, its case's axes */
     struct series series; /* m/s^2: specific force along the input axis, in place of the lab's; RECORDED: the output */
 };
@@ -62,6 +66,7 @@ struct unit {
     char profile[32];    /* its name */
     struct mems mems[UNIT_AXES];
     struct quartz quartz[UNIT_AXES];
+    struct cvg cvg[UNIT_AXES];
     struct chamber_play play[UNIT_AXES];           /* of the quartz sensors */
     struct sensor_fault *sensor_faults[UNIT_AXES]; /* unit_sample_until() before each change */
     double cos_alpha0[UNIT_AXES], sin_alpha0[UNIT_AXES];
@@ -105,7 +110,7 @@ void unit_unsubscribe(struct unit *u, struct unit_observer *l); /* harmless with
 /* What the sensor of a channel would give without noise: volts, or amperes if it is a quartz. Truth. */
 double unit_sensor_out(struct unit *u, unsigned axis, int64_t t_ns);
 
-/* How far the zero of a MEMS has moved since t = 0, volts; 0 of other sensors. Truth. */
+/* How far the zero of a MEMS accelerometer or gyro has moved since t = 0, volts; 0 of other sensors. Truth. */
 double unit_zero_moved_v(const struct unit *u, unsigned axis, int64_t t_ns);
 
 #endif

@@ -1,5 +1,6 @@
 /* The physics of emu/phys as flat functions of numbers, for ctypes: compiled and loaded by tests/py/support/physics.py only. */
 #include "phys/lab.h"
+#include "phys/sensor/cvg.h"
 #include "phys/sensor/mems.h"
 
 #include <stdlib.h>
@@ -134,6 +135,42 @@ EXPORT double bridge_accelerometer(struct lab *l, const double mounting[7], cons
     lab_sensor_mps2(l, &s, at_m, 1.0, 0.0, t_ns, a_mps2);
     mems_init(&m, &c, draws_of(0, 0, "mems"), draws_of(0, 0, "slow"));
     return mems_true_v(&m, a_mps2, t_ns);
+}
+
+/* of: the fields of struct cvg_dps in order. */
+EXPORT struct cvg *bridge_gyro(const struct cvg_dps *of, double g_mps2, uint64_t seed)
+{
+    struct cvg *c = malloc(sizeof *c);
+    if (c) cvg_init(c, of, g_mps2, draws_of(seed, 1, "cvg.x"), draws_of(seed, 1, "cvg.slow.x"));
+    return c;
+}
+
+EXPORT void bridge_gyro_free(struct cvg *c)
+{
+    free(c);
+}
+
+/* w, a on its axes; the element as warm. */
+EXPORT double bridge_gyro_true_v(struct cvg *c, const double w_radps[3], const double a_mps2[3], double degc)
+{
+    c->temp_degc = degc;
+    return cvg_true_v(c, w_radps, a_mps2);
+}
+
+/* Mean of n looks every_ns apart of a gyro on the table, from t_ns on, and how far its zero was moved: the mean of that. */
+EXPORT void bridge_gyro_block(struct cvg *c, struct lab *l, const double mounting[7], int64_t t_ns, int64_t every_ns,
+                              unsigned n, double out[2])
+{
+    static const double centre_m[3];
+    const struct lab_mounting s = mounting_of(mounting);
+    out[0] = out[1] = 0.0;
+    for (unsigned i = 0; i < n; i++, t_ns += every_ns) {
+        struct kinematics kin;
+        lab_kinematics(l, &s, centre_m, t_ns, &kin);
+        const double a_mps2[3] = {-kin.f_mps2[0], -kin.f_mps2[1], -kin.f_mps2[2]};
+        out[0] += cvg_out_v(c, kin.w_radps, a_mps2, t_ns, every_ns) / n;
+        out[1] += cvg_zero_moved_v(c, t_ns) / n;
+    }
 }
 
 struct oven {

@@ -18,6 +18,7 @@ from psabench.procedures.command_line.offered import (
     COVARIANCE,
     KOI_FLIGHT,
     KOI_SEASON,
+    MEMS_GYRO,
     ON_THE_HEAD,
     ON_THE_PLATFORM,
     SECONDARY,
@@ -40,6 +41,11 @@ NOTES_CHAMBER = """
 Without --head, --chamber or --control an emulator is started, with the scenario quartz_run_in, whose chain and head
 are exact. Each recording is in OUT/thermal.csv as soon as it is made. Exit status 1: a compensation is off the true
 outputs by more than its limits.
+"""
+
+NOTES_GYRO = """
+Without --can, --table or --control an emulator is started, with the scenario mems_gyro. Exit status 1: a result is off
+by more than 2 U, or is doubtful; the reason is printed.
 """
 
 NOTES_OUTPUTS = """
@@ -142,6 +148,11 @@ _EXAMPLES: Mapping[str, str] = {
   psabench run sins-calibration-secondary --first build/sins/first.csv --second build/sins/second.csv
   psabench run sins-calibration-secondary --scenario sins_secondary --latitude-deg 55.7 --longitude-deg 37.5
 """,
+    MEMS_GYRO[0]: """\
+  psabench run mems-gyro                      80 minutes of the bench, half a minute here
+  psabench run mems-gyro --series 4 --rest-s 7200 --out build/gyro
+  psabench run mems-gyro --can slcan:/dev/ttyACM0 --table TCPIP::192.0.2.8::5025::SOCKET --real-time
+""",
     SNAKE[0]: """\
   psabench run sins-snake
   psabench run sins-snake --flight my_flight.yaml --plan two_rates
@@ -199,6 +210,12 @@ def _of_the_sins() -> Parameters:
     from psabench.sins.calibration_params import CalibrationParams
 
     return Parameters(fields=CalibrationParams.__dataclass_fields__)
+
+
+def _of_the_gyro() -> Parameters:
+    from psabench.mems_gyro.params import MemsGyroParams
+
+    return Parameters(fields=MemsGyroParams.__dataclass_fields__)
 
 
 def _of_a_flight() -> Parameters:
@@ -261,6 +278,14 @@ _SINS = (
         common=_TABLE,
         load=_of_the_sins,
         kept="what was measured is in OUT",
+    ),
+    _command(
+        MEMS_GYRO,
+        handlers.calibrate_gyro,
+        common=("--scenario", "--can", "--control", "--table", "--seed", "--real-time", "--out", "--verbose"),
+        load=_of_the_gyro,
+        notes=NOTES_GYRO,
+        kept="what was measured is in OUT/dwells.csv",
     ),
     _command(COVARIANCE, handlers.predict_sins, common=("--out",), load=_of_the_covariance),
     _command(

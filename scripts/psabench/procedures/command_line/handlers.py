@@ -171,6 +171,23 @@ def calibrate_sins(args: argparse.Namespace) -> int:
     return 0 if done.within else 1
 
 
+def calibrate_gyro(args: argparse.Namespace) -> int:
+    """A gyro of volts on a rate table."""
+    from psabench.mems_gyro import page as gyro_page
+    from psabench.mems_gyro.params import MemsGyroOptions
+    from psabench.mems_gyro.run import run_gyro, verdict_words
+    from psabench.report.grading import aligned
+
+    done = run_gyro(of_fields(MemsGyroOptions, args, params=_params(args)), Bar())
+    page = gyro_page.write_page(args.out, done)
+    if args.verbose:
+        print("\n".join(aligned(gyro_page.table_rows(done))))
+    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
+    print(verdict_words(done))
+    print(f"report: {page}")
+    return 0 if done.within else 1
+
+
 def predict_sins(args: argparse.Namespace) -> int:
     """A covariance: no bench, no data."""
     from psabench.procedures.result import made_params

@@ -28,6 +28,10 @@ SINS = (
     "sins-calibration",
     "a strapdown inertial unit on a rate table, with or without the table's angles: all errors of both triads at once",
 )
+MEMS_GYRO = (
+    "mems-gyro",
+    "a micromechanical gyro on a rate table of three axes: zero, scale, cross-axis, g-sensitivity, nonlinearity, noise",
+)
 COVARIANCE = (
     "sins-covariance",
     "accuracy of a strapdown unit's calibration on a rate table, predicted from the plan of rotations; no bench",
