@@ -155,20 +155,30 @@ def _at_looks(p: ModeParams, on_grid: Floats) -> Floats:
     return np.asarray(on_grid[..., :: round(p.look_s / GRID_S)])
 
 
-def _flight_rate(p: ModeParams, alpha_rad: float, level_rad: float) -> Floats:
-    """What the platform's tilts make of the Earth's and the flight's rates, (grid,), rad/s of alpha.
+def _flight_rate(p: ModeParams, alpha_rad: float, *, knows_speed: bool) -> Floats:
+    """What tilts make of the Earth's and the flight's rates, (grid,), rad/s of alpha.
 
-    Level sensors that are off, the apparent vertical of the take-off, that of Coriolis' acceleration.
+    Levelling holds y_p across the apparent vertical, as its sensor shows it: the platform is off level by `along` there.
+    Across, x_p follows the vehicle, and the sensor shows `across` that is not there. The law believes the sensors.
     """
     t_s = _grid_s(p)
     phi = np.radians(p.latitudes_deg(t_s))
     we, wz = EARTH_RADPS * np.cos(phi), EARTH_RADPS * np.sin(phi)
-    rolls = t_s < p.speed_mps / p.accel_mps2
-    tilt = np.where(rolls, math.atan(p.accel_mps2 / G_MPS2), 0.0)
-    speed = np.minimum(p.accel_mps2 * t_s, p.speed_mps)
-    off_level = we * level_rad * (math.sin(alpha_rad) - math.cos(alpha_rad))
-    take_off = wz * (1.0 - np.cos(tilt)) - we * np.sin(tilt)
-    return np.asarray(off_level + take_off - speed**2 / EARTH_RADIUS_M * 2.0 * wz / G_MPS2)
+    east, north = _apparent(p, t_s)
+    sin_a, cos_a = math.sin(alpha_rad), math.cos(alpha_rad)
+    transport = -np.minimum(p.accel_mps2 * t_s, p.speed_mps) / EARTH_RADIUS_M  # about the east
+    along = LEVEL_RAD - east * sin_a + north * cos_a
+    across = LEVEL_RAD - east * cos_a - north * sin_a
+    believed = across * (we * sin_a + (transport * cos_a if knows_speed else 0.0))
+    return np.asarray(believed - along * (we * cos_a - transport * sin_a) + 0.5 * wz * (along**2 - across**2))
+
+
+def _apparent(p: ModeParams, t_s: Floats) -> tuple[Floats, Floats]:
+    """Where the apparent vertical leans in flight, to the east and to the north, rad: Coriolis and the take-off."""
+    wz = EARTH_RADPS * np.sin(np.radians(p.latitudes_deg(t_s)))
+    east = -2.0 * wz * np.minimum(p.accel_mps2 * t_s, p.speed_mps) / G_MPS2
+    rolls = (t_s > 0.0) & (t_s < p.speed_mps / p.accel_mps2)
+    return east, np.where(rolls, math.atan(p.accel_mps2 / G_MPS2), 0.0)
 
 
 def _by_panel(row: Row, p: ModeParams, drawn: Instruments) -> Floats:
@@ -178,11 +188,9 @@ def _by_panel(row: Row, p: ModeParams, drawn: Instruments) -> Floats:
     held_s = np.floor(t_s / p.look_s) * p.look_s
     panel = EARTH_RADPS * np.sin(np.radians(p.panel_deg(held_s)))
     asked = (panel + p.drift2_degph * DEGPH) * (1.0 + TORQUER_SCALE)
-    rate = asked - wz + _flight_rate(p, math.radians(ALPHA0_DEG), LEVEL_RAD)
+    rate = asked - wz + _flight_rate(p, math.radians(ALPHA0_DEG), knows_speed=False)
     drift = drawn.drift2_degph[:, np.newaxis] * DEGPH + _random_drift(row, p, drawn, 0.0)
-    found = _at_looks(p, _integral(rate[np.newaxis, :] - drift))
-    found[:, 1:] += _levelled_rad()
-    return found
+    return _levelled_rad() + _at_looks(p, _integral(rate[np.newaxis, :] - drift))
 
 
 def _levelled_rad() -> float:
@@ -210,7 +218,7 @@ def _self_orienting(row: Row, p: ModeParams, drawn: Instruments, seed: int, firs
     we0 = EARTH_RADPS * math.cos(math.radians(p.latitude_deg))
     level = we0 * LEVEL_RAD * float(share @ np.cos(alpha))
     wz = EARTH_RADPS * np.sin(np.radians(p.latitudes_deg(_grid_s(p))))
-    known = level + TORQUER_SCALE * (wz - wz[0]) + _flight_rate(p, float(alpha[-1]), LEVEL_RAD)
+    known = level + TORQUER_SCALE * (wz - wz[0]) + _flight_rate(p, float(alpha[-1]), knows_speed=True)
     flight = drift[:, round(before_s / GRID_S) :]
     start = compass_rad(row, seed, first_run, len(flight))[:, np.newaxis]
     return np.degrees(start + _at_looks(p, _integral(known + seen[:, np.newaxis] - flight)))
@@ -231,11 +239,8 @@ def _sensor_deg(p: ModeParams, t_s: Floats) -> Floats:
     north_deg = p.latitudes_deg(t_s) - p.latitude_deg
     d = np.radians(p.declination_deg + p.declination_slope * north_deg)
     tan_dip = np.tan(np.radians(DIP_DEG + DIP_SLOPE * north_deg))
-    wz = EARTH_RADPS * np.sin(np.radians(p.latitudes_deg(t_s)))
-    ramp_s = p.speed_mps / p.accel_mps2
-    ahead = np.where((t_s > 0.0) & (t_s < ramp_s), p.accel_mps2, 0.0)
-    across = -2.0 * wz * np.minimum(p.accel_mps2 * t_s, p.speed_mps)
-    z = np.stack([across, ahead, np.full_like(across, G_MPS2)])
+    east, north = _apparent(p, t_s)
+    z = np.stack([east, np.tan(north), np.ones_like(east)])
     z /= np.linalg.norm(z, axis=0)
     y = np.array([[0.0], [1.0], [0.0]]) - z[1] * z
     y /= np.linalg.norm(y, axis=0)

@@ -20,6 +20,7 @@ from psabench.procedures.platform_bench import Floats
 from psabench.procedures.wire_platform import WirePlatform
 
 SCENARIO = "scenarios/heading_modes.yaml"
+LEVELS_S = 2.0  # of a vehicle that tilts by 2 deg/s
 Scenario = dict[str, Any]
 
 
@@ -61,7 +62,9 @@ def _flown(b: Bench, row: Row, p: ModeParams) -> Trip:
     true_deg: list[float] = []
 
     def depart() -> None:
+        # Level before it moves: levelled in the take-off, the two tilts at once turn the platform by up to 0.1 deg.
         b.control.call("vehicle.attitude", heading_deg=0.0, pitch_deg=0.0, roll_deg=0.0)
+        b.run_for(LEVELS_S)
         b.control.call("vehicle.fly", speed_mps=p.speed_mps, track_deg=0.0)
 
     def watch() -> None:
