@@ -158,7 +158,7 @@ def _at_looks(p: ModeParams, on_grid: Floats) -> Floats:
 def _flight_rate(p: ModeParams, alpha_rad: float, *, knows_speed: bool) -> Floats:
     """What tilts make of the Earth's and the flight's rates, (grid,), rad/s of alpha.
 
-    Levelling holds y_p across the apparent vertical, as its sensor shows it: the platform is off level by `along` there.
+    Levelling holds y_p across the apparent vertical as its sensor shows it: the platform is off level by `along` there.
     Across, x_p follows the vehicle, and the sensor shows `across` that is not there. The law believes the sensors.
     """
     t_s = _grid_s(p)

@@ -55,7 +55,7 @@ class ModeParams:
         for name in ("hours", "look_s", "fix_s", "align_s", "slave_s", "accel_mps2"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(expected("a number above 0", getattr(self, name), name))
-        if not (-80.0 <= self.latitude_deg and self.farthest_deg <= 80.0):
+        if not (self.latitude_deg >= -80.0 and self.farthest_deg <= 80.0):
             raise ValueError(expected("a flight within -80 to 80 deg of latitude", f"{self.farthest_deg:.1f}", NAME))
 
     @property
