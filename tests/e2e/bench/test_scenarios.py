@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from psabench import Bench
+from psabench.boards.gyro.device import Gyro
 from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
+from psabench.errors import BadInput
 from psabench.link.can_host import CanHost, Message, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.vcd import read_vcd
@@ -396,5 +398,7 @@ def test_heading_modes_has_an_induction_sensor_beside_the_platform() -> None:
 def test_an_induction_sensor_needs_a_vehicle(tmp_path: Path) -> None:
     path = tmp_path / "alone.yaml"
     path.write_text("magnetic: {}\nunits: [{name: a}]\n", encoding="utf-8")
-    with pytest.raises(BadInput, match="magnetic: expected a section platform, whose vehicle carries the sensor, got none"):
+    with pytest.raises(
+        BadInput, match="magnetic: expected a section platform, whose vehicle carries the sensor, got none"
+    ):
         Bench.start(path)
