@@ -16,6 +16,8 @@ struct board_platform_io {
     void (*reposition)(void *ctx, int64_t t_ns);                               /* a new setting */
     double (*servo_rad)(void *ctx, int64_t t_ns);   /* its angle sensor, as the servo has it */
     double (*encoder_rad)(void *ctx, int64_t t_ns); /* and as the encoder has it */
+    /* Heading by the induction sensor, in (-pi, pi]. False: none is fitted. */
+    bool (*magnetic_rad)(void *ctx, int64_t t_ns, double *heading_rad);
 };
 
 /* What a board can reach of the world. */

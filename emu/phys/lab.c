@@ -11,6 +11,7 @@ struct lab_cfg lab_default(void)
         .chamber = chamber_default(),
         .supply = supply_default(),
         .platform = platform_default(),
+        .magnetic = magnetic_default(),
         .vehicle = vehicle_default(),
         .flight = flight_default(),
     };
@@ -51,6 +52,7 @@ void lab_init(struct lab *l, const struct lab_cfg *cfg, uint64_t seed)
     pose_start(&l->bench, &cfg->site);
     set_tilt(&l->tilt, (const double[3]){0.0, 0.0, 0.0});
     platform_init(&l->platform, &cfg->platform, &cfg->vehicle, &cfg->site, seed);
+    magnetic_init(&l->magnetic, &cfg->magnetic, seed);
     init_flight(l, cfg);
 }
 
@@ -59,6 +61,7 @@ void lab_reseed(struct lab *l, uint64_t seed, int64_t t_ns)
     rng_reseed(&l->head.error, seed);
     l->table.seed = seed;
     if (l->platform.cfg.present) platform_reseed(&l->platform, seed, t_ns);
+    magnetic_reseed(&l->magnetic, seed);
 }
 
 static bool is_zero(const double v[3])

@@ -15,6 +15,7 @@
 #include "phys/motion/head.h"
 #include "phys/motion/platform.h"
 #include "phys/motion/table.h"
+#include "phys/sensor/magnetic.h"
 #include "phys/supply.h"
 
 enum lab_mount { LAB_HEAD, LAB_TABLE, LAB_FIXED, LAB_PLATFORM, LAB_FLIGHT };
@@ -26,8 +27,9 @@ struct lab_cfg {
     struct chamber_cfg chamber;
     struct supply_cfg supply;
     struct platform_cfg platform;
-    struct vehicle_cfg vehicle; /* under the platform */
-    struct flight_cfg flight;   /* can be flown: flight_init() */
+    struct vehicle_cfg vehicle;   /* under the platform */
+    struct magnetic_cfg magnetic; /* on the vehicle */
+    struct flight_cfg flight;     /* can be flown: flight_init() */
 };
 
 #define LAB_ROW 32u /* instants of a row that are kept */
@@ -61,6 +63,7 @@ struct lab {
     struct supply supply;
     struct pose bench;
     struct platform platform; /* if cfg.present */
+    struct magnetic magnetic; /* if cfg.present */
     struct flight flight;     /* if cfg.present */
     struct lab_aircraft aircraft;
     struct lab_row row;

@@ -22,6 +22,7 @@ extern const struct fields scenario_supply_fields;        /* of struct supply_cf
 extern const struct fields scenario_platform_fields;      /* of struct platform_cfg */
 extern const struct fields scenario_vehicle_fields;       /* of struct vehicle_cfg */
 extern const struct fields scenario_sway_fields;          /* of struct vehicle_sway */
+extern const struct fields scenario_magnetic_fields;      /* of struct magnetic_cfg */
 extern const struct fields scenario_flight_fields;        /* of struct flight_cfg */
 extern const struct fields scenario_leg_fields;           /* of struct flight_leg: every key of every kind */
 extern const struct fields scenario_baro_fields;          /* of struct baro_cfg */

@@ -6,6 +6,7 @@
 #define PLATFORM(m) offsetof(struct platform_cfg, m)
 #define VEHICLE(m)  offsetof(struct vehicle_cfg, m)
 #define SWAY(m)     offsetof(struct vehicle_sway, m)
+#define MAGNETIC(m) offsetof(struct magnetic_cfg, m)
 
 // clang-format off
 static const struct field platform_rows[] = {
@@ -13,6 +14,8 @@ static const struct field platform_rows[] = {
     {.key = "alpha0_deg",      .type = FIELD_REAL, .offset = PLATFORM(alpha0_deg), .min = -360, .max = 360, .what = "platform azimuth angle alpha at power-on, counter-clockwise from above; the azimuth of its y axis is -alpha"},
     {.key = "beta0_deg",       .type = FIELD_REAL, .offset = PLATFORM(beta0_deg), .min = -10, .max = 10, .what = "beta at power-on, before it is levelled"},
     {.key = "drift_degph",     .type = FIELD_REALS, .offset = PLATFORM(drift_degph), .count = PLATFORM_AXES, .min = -1000, .max = 1000, .what = "systematic drift about x and about z (25: E1 about x, E0 about z)"},
+    {.key = "unbalance_degph_per_g", .type = FIELD_REALS, .offset = PLATFORM(unbalance_degph_per_g), .count = PLATFORM_AXES, .min = -100, .max = 100, .what = "mass unbalance: drift about x by the specific force along x, about z by that along z (E0)"},
+    {.key = "quadrature_degph_per_g", .type = FIELD_REALS, .offset = PLATFORM(quadrature_degph_per_g), .count = PLATFORM_AXES, .min = -100, .max = 100, .what = "drift about x by the specific force along z, about z by that along x (E0)"},
     {.key = "gm_sigma_degph",  .type = FIELD_REAL, .offset = PLATFORM(gm_sigma_degph), .max = 100, .what = "random drift of each axis, Gauss-Markov, standard deviation (E1); 0: none"},
     {.key = "gm_tau_s",        .type = FIELD_REAL, .offset = PLATFORM(gm_tau_s), .min = 0.1, .max = 1e7, .what = "correlation time of the random drift (E1: mu = 0.001 1/s)"},
     {.key = "gm_from_zero",    .type = FIELD_BOOL, .offset = PLATFORM(gm_from_zero), .what = "random drift starts at 0 instead of a draw from its distribution"},
@@ -49,6 +52,19 @@ static const struct field vehicle_rows[] = {
     {.key = "accel_mps2",  .type = FIELD_REAL, .offset = VEHICLE(accel_mps2), .min = 0.01, .max = 30, .what = "acceleration of a change of speed (E0)"},
 };
 const struct fields scenario_vehicle_fields = FIELDS(vehicle_rows);
+
+static const struct field magnetic_rows[] = {
+    {.key = "declination_deg",   .type = FIELD_REAL, .offset = MAGNETIC(declination_deg), .min = -180, .max = 180, .what = "magnetic declination at the site, positive to the east"},
+    {.key = "declination_slope", .type = FIELD_REAL, .offset = MAGNETIC(declination_slope), .min = -10, .max = 10, .what = "its change, degrees per degree of latitude"},
+    {.key = "dip_deg",           .type = FIELD_REAL, .offset = MAGNETIC(dip_deg), .min = -85, .max = 85, .what = "dip of the field at the site, positive below the horizon"},
+    {.key = "dip_slope",         .type = FIELD_REAL, .offset = MAGNETIC(dip_slope), .min = -2, .max = 2, .what = "its change, degrees per degree of latitude"},
+    {.key = "horizontal_ut",     .type = FIELD_REAL, .offset = MAGNETIC(horizontal_ut), .min = 1, .max = 100, .what = "horizontal field, microtesla"},
+    {.key = "pendulous",         .type = FIELD_BOOL, .offset = MAGNETIC(pendulous), .what = "the sensor hangs along the apparent vertical; false: fixed to the vehicle"},
+    {.key = "tilt_arcmin",       .type = FIELD_REALS, .offset = MAGNETIC(tilt_arcmin), .count = 2, .min = -600, .max = 600, .what = "constant tilt of its plane: nose up, right side down"},
+    {.key = "deviation_deg",     .type = FIELD_REALS, .offset = MAGNETIC(deviation_deg), .count = MAGNETIC_DEVIATIONS, .min = -30, .max = 30, .what = "deviation A, B, C, D, E: A + B sin m + C cos m + D sin 2m + E cos 2m"},
+    {.key = "noise_ut",          .type = FIELD_REAL, .offset = MAGNETIC(noise_ut), .max = 10, .what = "noise of each component of a reading, microtesla, standard deviation"},
+};
+const struct fields scenario_magnetic_fields = FIELDS(magnetic_rows);
 // clang-format on
 
 bool scenario_load_vehicle(struct yaml_file *f, const struct yaml_node *node, void *section)
@@ -90,6 +106,9 @@ bool scenario_check_platform(struct yaml_file *f, const struct yaml_node *root, 
     const struct yaml_node *units = yaml_get(root, "units"), *platform = yaml_get(root, "platform");
     const struct scenario_unit *gyro = NULL;
     const bool present = s->lab.platform.present;
+    if (!present && s->lab.magnetic.present)
+        return yaml_file_fail(f, yaml_get(root, "magnetic"), "magnetic",
+                              "expected a section platform, whose vehicle carries the sensor, got none");
     if (present && !s->site.placed)
         return yaml_file_fail(f, platform, "platform", "expected site.latitude_deg, which defines north, got none");
     for (unsigned i = 0; i < s->unit_count; i++) {

@@ -29,6 +29,7 @@ static const struct chapter chapters[] = {
     {"platform", "The gyro-stabilised platform of [the gyro unit](boards/gyro.md); `platform: {}` has the article's figures and ours.", &scenario_platform_fields, IN(lab.platform)},
     {"vehicle", "What the platform is on.", &scenario_vehicle_fields, IN(lab.vehicle)},
     {"vehicle.sway", "Its pitch and roll about their means.", &scenario_sway_fields, IN(lab.vehicle.sway)},
+    {"magnetic", "The Earth's magnetic field and the induction sensor on the vehicle: [magnetic heading](instruments.md#magnetic-heading). All E0.", &scenario_magnetic_fields, IN(lab.magnetic)},
     {"flight", "An aircraft over the ellipsoid, from the site on: [a flight](procedures/flight.md).", &scenario_flight_fields, IN(lab.flight)},
     {"flight.legs[]", "A leg: one of the first ten keys, and keys that go with it.", &scenario_leg_fields, NO_DEFAULTS},
     {"flight.baro", "Its barometric altimeter.", &scenario_baro_fields, IN(lab.flight.baro)},

@@ -226,6 +226,7 @@ static const struct field scenario_rows[] = {
     {.key = "supply", .type = FIELD_SECTION, .offset = SCENARIO(lab.supply), .sub = &scenario_supply_fields, .present = SCENARIO(lab.supply.present), .what = "the power supply; without it the boards are always powered"},
     {.key = "platform", .type = FIELD_SECTION, .offset = SCENARIO(lab.platform), .sub = &scenario_platform_fields, .present = SCENARIO(lab.platform.present), .what = "the gyro-stabilised platform; without it there is none"},
     {.key = "vehicle", .type = FIELD_SECTION, .offset = SCENARIO(lab.vehicle), .sub = &scenario_vehicle_fields, .present = SCENARIO(lab.platform.present), .load = scenario_load_vehicle, .what = "the vehicle that carries the platform"},
+    {.key = "magnetic", .type = FIELD_SECTION, .offset = SCENARIO(lab.magnetic), .sub = &scenario_magnetic_fields, .present = SCENARIO(lab.magnetic.present), .what = "the Earth's magnetic field and the induction sensor on the vehicle; without it there is none"},
     {.key = "flight", .type = FIELD_SECTION, .offset = SCENARIO(lab.flight), .sub = &scenario_flight_fields, .present = SCENARIO(lab.flight.present), .what = "an aircraft that flies a list of legs; without it there is none"},
     {.key = "spread", .type = FIELD_SECTION, .offset = SCENARIO(spread), .sub = &scenario_spread_fields, .load = load_spread, .what = "production spread: standard deviations from unit to unit"},
     {.key = "units", .type = FIELD_CUSTOM, .load = scenario_load_units, .dump = dump_units, .what = "a sequence of up to 1000 units"},

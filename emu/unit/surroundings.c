@@ -83,8 +83,16 @@ static double read_encoder_rad(void *ctx, int64_t t_ns)
     return platform_encoder_rad(&u->lab->platform, t_ns);
 }
 
+static bool read_magnetic_rad(void *ctx, int64_t t_ns, double *heading_rad)
+{
+    const struct lab *l = ((const struct unit *)ctx)->lab;
+    if (!l->magnetic.cfg.present) return false;
+    *heading_rad = magnetic_heading_rad(&l->magnetic, &l->platform.vehicle, t_ns);
+    return true;
+}
+
 static const struct board_platform_io platform_io = {torque_platform, reposition_platform, read_servo_rad,
-                                                     read_encoder_rad};
+                                                     read_encoder_rad, read_magnetic_rad};
 
 void unit_put_surroundings(const struct unit *u, struct board_io *io)
 {

@@ -193,6 +193,14 @@ static double read_clock(const struct board_node *n, const struct co_entry *e)
     return value[e->sub];
 }
 
+static double read_magnetic(const struct board_node *n, const struct co_entry *e)
+{
+    const struct gyro_reading *r = &gyro_of(n)->latest;
+    const double deg = r->magnetic_rad / RAD_PER_DEG;
+    const double value[] = {0.0, r->magnetic, deg < 0.0 ? deg + 360.0 : deg};
+    return value[e->sub];
+}
+
 static double read_past(const struct board_node *n, const struct co_entry *e)
 {
     const struct gyro_past *past = gyro_of(n)->past;
@@ -225,6 +233,7 @@ static const struct board_object objects[] = {
     {GYRO_OD_CLOCK, .value = read_clock},
     {GYRO_OD_PAST, .value = read_past},
     {GYRO_OD_SELF_TEST, .value = read_self_test, .write = begin_self_test},
+    {GYRO_OD_MAGNETIC, .value = read_magnetic},
     {GYRO_OD_LATEST, .value = read_latest},
 };
 

@@ -136,6 +136,9 @@ static void put_lines(struct gyro *b, int64_t t_ns)
 
 static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
 {
+    const struct board_platform_io *platform = b->base.io.platform;
+    double magnetic_rad = 0.0;
+    const bool magnetic = platform && platform->magnetic_rad(b->base.io.ctx, t_ns, &magnetic_rad);
     return (struct gyro_reading){
         .mode = b->run.mode,
         .phase = b->run.phase,
@@ -143,10 +146,12 @@ static struct gyro_reading make_reading(const struct gyro *b, int64_t t_ns)
         .flags = b->flags | (b->standing & (GYRO_ENCODER_FAULT | GYRO_NOT_SETTLED)),
         .u1_radps = b->u_radps[0],
         .u2_radps = b->u_radps[1],
-        .encoder_rad = b->base.io.platform ? b->base.io.platform->encoder_rad(b->base.io.ctx, t_ns) : 0.0,
+        .encoder_rad = platform ? platform->encoder_rad(b->base.io.ctx, t_ns) : 0.0,
         .beta_rad = b->level.beta_rad,
         .gamma_rad = b->level.gamma_rad,
         .level_seq = b->inlet.seq,
+        .magnetic = magnetic,
+        .magnetic_rad = magnetic_rad,
     };
 }
 

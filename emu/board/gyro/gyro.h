@@ -78,6 +78,8 @@ struct gyro_reading {
     double u1_radps, u2_radps;
     double encoder_rad, beta_rad, gamma_rad;
     uint16_t level_seq;
+    bool magnetic; /* an induction sensor is fitted */
+    double magnetic_rad;
 };
 
 struct gyro_counters {

@@ -9,6 +9,7 @@
 
 #define RADPS_PER_DEGPH (RAD_PER_DEG / 3600.0)
 #define STOP_RAD        (PLATFORM_STOP_DEG * RAD_PER_DEG)
+#define STANDARD_G_MPS2 (1e3 * VEHICLE_MG_MPS2)
 #define AFRESH_EVERY    64 /* steps: sines and cosines are then computed again, in between turned on */
 
 struct platform_cfg platform_default(void)
@@ -66,7 +67,8 @@ static struct ground ground_at(struct platform *p, int64_t t_ns)
 
 static double drift_radps(const struct platform *p, const struct platform_node *n, unsigned axis)
 {
-    return p->cfg.drift_degph[axis] * RADPS_PER_DEGPH + n->drift_step_radps[axis] + n->gm_radps[axis];
+    return p->cfg.drift_degph[axis] * RADPS_PER_DEGPH + n->drift_step_radps[axis] + n->gm_radps[axis] +
+           n->by_force_radps[axis];
 }
 
 /* Rates about x_p and z_p that the gyroscope keeps: (7) of the article with a torquer's scale error. */
@@ -93,6 +95,37 @@ static void drift_on(const struct platform *p, struct platform_node *n)
     if (p->gm_kick_radps == 0.0) return;
     for (unsigned i = 0; i < PLATFORM_AXES; i++) {
         n->gm_radps[i] = p->gm_keep * n->gm_radps[i] + p->gm_kick_radps * rng_gauss(&n->gm[i]);
+    }
+}
+
+/* Columns of the platform's axes at an instant, on the vehicle then. */
+static void axes_at(const struct trig *t, const struct vehicle_state *v, double C_lp[3][3])
+{
+    const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
+    const struct tilt g = tilt_of(t, z_c);
+    platform_axes(t, &g, C_lp);
+}
+
+static void force_at(const struct platform *p, const struct trig *t, const struct vehicle_state *v, double f_p_mps2[3])
+{
+    const double f_l_mps2[3] = {v->accel_l_mps2[0], v->accel_l_mps2[1], v->accel_l_mps2[2] + p->vehicle.site.g_mps2};
+    double C_lp[3][3];
+    axes_at(t, v, C_lp);
+    into_p((const double(*)[3])C_lp, f_l_mps2, f_p_mps2);
+}
+
+/* A centre of mass off the rotor's centre along its axis, y_p, makes a moment y x f: about each of the two axes it drifts by the
+ * force along that axis, by the same rate. A spring that is not the same all round crosses the two. */
+static void drift_by_force(struct platform *p, struct platform_node *n, int64_t t_ns)
+{
+    if (!p->feels_force) return;
+    const struct trig t = {n->sin_a, n->cos_a, n->sin_b, n->cos_b};
+    double f_p_mps2[3];
+    force_at(p, &t, vehicle_state_at(p, t_ns), f_p_mps2);
+    const double f_g[PLATFORM_AXES] = {f_p_mps2[0] / STANDARD_G_MPS2, f_p_mps2[2] / STANDARD_G_MPS2};
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        n->by_force_radps[i] = RADPS_PER_DEGPH * (p->cfg.unbalance_degph_per_g[i] * f_g[i] +
+                                                  p->cfg.quadrature_degph_per_g[i] * f_g[PLATFORM_AXES - 1 - i]);
     }
 }
 
@@ -136,6 +169,7 @@ static void advance_step(struct platform *p)
         invalidate_node(to);
     }
     drift_on(p, to);
+    drift_by_force(p, to, t_ns + p->cfg.step_ns);
 }
 
 static void advance_to(struct platform *p, int64_t k)
@@ -201,6 +235,9 @@ void platform_init(struct platform *p, const struct platform_cfg *cfg, const str
     n->torquer_gain[PLATFORM_LEVEL] = n->torquer_gain[PLATFORM_AZIMUTH] = 1.0;
     invalidate_node(n);
     start_drift(p, n, seed);
+    for (unsigned i = 0; i < PLATFORM_AXES; i++)
+        p->feels_force |= cfg->unbalance_degph_per_g[i] != 0.0 || cfg->quadrature_degph_per_g[i] != 0.0;
+    drift_by_force(p, n, 0);
 }
 
 bool platform_torque(struct platform *p, double u1_radps, double u2_radps, int64_t t_ns)
@@ -291,14 +328,6 @@ static struct look look_at(struct platform *p, int64_t t_ns)
     return l;
 }
 
-/* Columns of the platform's axes at an instant, on the vehicle then. */
-static void axes_at(const struct look *l, const struct vehicle_state *v, double C_lp[3][3])
-{
-    const double z_c[3] = {v->C_lc[0][2], v->C_lc[1][2], v->C_lc[2][2]};
-    const struct tilt g = tilt_of(&l->trig, z_c);
-    platform_axes(&l->trig, &g, C_lp);
-}
-
 void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
 {
     const struct look l = look_at(p, t_ns);
@@ -340,7 +369,7 @@ static double q_rad(struct platform *p, int64_t t_ns)
     const struct look l = look_at(p, t_ns);
     const struct vehicle_state *v = vehicle_state_at(p, t_ns);
     double C_lp[3][3];
-    axes_at(&l, v, C_lp);
+    axes_at(&l.trig, v, C_lp);
     return gimbal_rad(v, (const double(*)[3])C_lp);
 }
 
@@ -375,12 +404,7 @@ void platform_force_mps2(struct platform *p, int64_t t_ns, double f_mps2[3])
 {
     if (p->force_ns != t_ns) {
         const struct look l = look_at(p, t_ns);
-        const struct vehicle_state *v = vehicle_state_at(p, t_ns);
-        const double f_l_mps2[3] = {v->accel_l_mps2[0], v->accel_l_mps2[1],
-                                    v->accel_l_mps2[2] + p->vehicle.site.g_mps2};
-        double C_lp[3][3];
-        axes_at(&l, v, C_lp);
-        into_p((const double(*)[3])C_lp, f_l_mps2, p->force_mps2);
+        force_at(p, &l.trig, vehicle_state_at(p, t_ns), p->force_mps2);
         p->force_ns = t_ns;
     }
     memcpy(f_mps2, p->force_mps2, sizeof p->force_mps2);

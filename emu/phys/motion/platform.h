@@ -25,10 +25,13 @@ struct platform_cfg {
     bool present;
     uint32_t step_ns; /* 1 to 20 ms; below 5 ms less than half a second back is known */
     double alpha0_deg, beta0_deg;
-    double drift_degph[PLATFORM_AXES];   /* systematic, about x_p (the article's first) and z_p */
-    double gm_sigma_degph, gm_tau_s;     /* Gauss-Markov drift of each axis, independent; sigma 0: none */
-    bool gm_from_zero;                   /* else it starts with a draw of its stationary distribution */
-    double torquer_scale[PLATFORM_AXES]; /* relative error */
+    double drift_degph[PLATFORM_AXES]; /* systematic, about x_p (the article's first) and z_p */
+    double unbalance_degph_per_g
+        [PLATFORM_AXES]; /* of the rotor's mass along its axis: by the force along the drift's axis */
+    double quadrature_degph_per_g[PLATFORM_AXES]; /* by the force along the other of the two axes */
+    double gm_sigma_degph, gm_tau_s;              /* Gauss-Markov drift of each axis, independent; sigma 0: none */
+    bool gm_from_zero;                            /* else it starts with a draw of its stationary distribution */
+    double torquer_scale[PLATFORM_AXES];          /* relative error */
     double torquer_limit_dps;
     double level_tilt_arcmin[2]; /* of the level sensors: they show so much more beta, and gamma */
     double level_repeat_arcmin;  /* the same, drawn for each setting */
@@ -46,6 +49,7 @@ struct platform_node {
     double torque_radps[PLATFORM_AXES];      /* asked, within the limit */
     double torquer_gain[PLATFORM_AXES];      /* 1; a fault makes it 0 */
     double drift_step_radps[PLATFORM_AXES];  /* a fault's */
+    double by_force_radps[PLATFORM_AXES];    /* of the specific force here */
     double gm_radps[PLATFORM_AXES];
     struct rng gm[PLATFORM_AXES];
 };
@@ -64,7 +68,8 @@ struct platform {
     struct platform_setting setting, setting_before;
     double gm_keep, gm_kick_radps; /* of a step */
     double step_s;
-    bool stuck; /* the angle sensor */
+    bool feels_force; /* its drift depends on it */
+    bool stuck;       /* the angle sensor */
     double stuck_rad;
     struct vehicle_state ground;
     int64_t ground_from_ns, ground_to_ns; /* while it holds */

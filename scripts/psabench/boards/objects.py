@@ -117,6 +117,7 @@ class GyroObjects(Common):
     LEVEL = 0x2109
     CLOCK = 0x210A
     SELF_TEST = 0x210B
+    MAGNETIC = 0x210C
     LATEST = 0x2200
 
 

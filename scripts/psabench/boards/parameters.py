@@ -342,6 +342,8 @@ PARAMETERS: Mapping[str, Mapping[str, tuple[int, int]]] = {
         "CLOCK_STEPS": (0x210A, 2),
         "SELF_TEST_START": (0x210B, 1),
         "SELF_TEST_RESULT": (0x210B, 2),
+        "MAGNETIC_FITTED": (0x210C, 1),
+        "210C_2_MAGNETIC": (0x210C, 2),
         "LATEST_U1": (0x2200, 1),
         "LATEST_U2": (0x2200, 2),
         "LATEST_ENCODER": (0x2200, 3),

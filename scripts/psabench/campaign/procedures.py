@@ -11,6 +11,10 @@ from psabench.options import Parser
 # Module and help line of each campaign; `parse` of the module takes what follows the name.
 CAMPAIGNS: Mapping[str, tuple[str, str]] = {
     "gyrocompass": ("campaign.command", "gyrocompassing with thousands of platforms, each with its own errors"),
+    "heading-modes": (
+        "campaign.heading_modes_command",
+        "a heading indicator for hours: slaved to an induction sensor, free, and self-orienting",
+    ),
     "quartz-deformation": (
         "quartz.deformation_command",
         "deformation of a quartz accelerometer's sensing element over temperature, with tolerances",

@@ -15,7 +15,7 @@ import numpy as np
 from psabench.estimate.angles import wrapped
 from psabench.estimate.uncertainty import Component, within_limit
 from psabench.native import nav
-from psabench.native.nav import ARCMIN
+from psabench.native.nav import ARCMIN, DEGPH
 from psabench.procedures.gyrocompass_params import METHODS, GyrocompassParams, noise_of
 from psabench.procedures.gyrocompass_windows import s_of, s_sd, trusted
 from psabench.procedures.platform_bench import Floats, Window
@@ -193,7 +193,7 @@ def _positions(
     bias = 0.0 if p.simplified else attitude.gamma_bias_rad
     return [
         nav.Position(
-            s_radps=s_of(w, slope=p.slope, frozen=p.freeze),
+            s_radps=s_of(w, slope=p.slope, frozen=p.freeze) - p.unbalance1_degph_per_g * DEGPH * across_g(w),
             delta_rad=float(d),
             beta_rad=w.mean_beta_rad,
             gamma_rad=w.mean_gamma_rad - bias,
@@ -202,6 +202,11 @@ def _positions(
         )
         for w, d in zip(windows, delta, strict=True)
     ]
+
+
+def across_g(w: Window) -> float:
+    """Specific force along x in a window, g: of a vehicle at rest."""
+    return -math.sin(w.mean_gamma_rad) * math.cos(w.mean_beta_rad)
 
 
 def _residual(r: nav.Position, c: nav.Compass, p: GyrocompassParams) -> float:
@@ -244,6 +249,12 @@ class WindowMean:
     length_s: Floats  # (n,)
     share: Floats  # (n,) of each in the mean, 1 in all
     constant: tuple[Component, ...] = ()  # errors that no window sees, rad/s: beside sd_radps
+    by_force_radps: float = 0.0  # of radps: what the passport says of the specific force in these windows
+
+    @property
+    def level_radps(self) -> float:
+        """Of a level vehicle without acceleration."""
+        return self.radps - self.by_force_radps
 
 
 def drift1_of(f: Fit, s: Sensitivity) -> WindowMean:
@@ -258,8 +269,10 @@ def drift1_of(f: Fit, s: Sensitivity) -> WindowMean:
     other = by_rate - share
     variance = float(other @ drift_covariance(f) @ other + by_rate @ error_covariance(f) @ by_rate)
     p, torque_radps = f.params, float(by_rate @ [w.u1_radps.mean() for w in f.windows])
+    by_force_radps = p.unbalance1_degph_per_g * DEGPH * float(share @ [across_g(w) for w in f.windows])
     return WindowMean(
-        radps=f.compass.drift1_radps + missed,
+        radps=f.compass.drift1_radps + missed + by_force_radps,
+        by_force_radps=by_force_radps,
         sd_radps=math.sqrt(variance),
         t_mid_s=np.array([r.position.t_mid_s for r in f.rows]),
         length_s=np.array([r.position.window_s for r in f.rows]),
@@ -308,6 +321,7 @@ def drift2_of(f: Fit, calibration: Sequence[Window]) -> WindowMean:
     torque_radps = float(share @ [w.u2_radps.mean() for w in windows])
     return WindowMean(
         radps=float(share @ found),
+        by_force_radps=p.quadrature2_degph_per_g * DEGPH * float(share @ [across_g(w) for w in windows]),
         sd_radps=sd_radps,
         t_mid_s=np.array([w.t_mid_s for w in windows]),
         length_s=length_s,

@@ -26,7 +26,8 @@ METHODS: Mapping[str, Method] = {
 }
 ANGLES = ("set", "encoder")
 SIGNALS = ("frames", "readings")
-SIGNED = ("latitude_deg", "drift2_degph")
+PASSPORT = ("drift2_degph", "unbalance1_degph_per_g", "quadrature2_degph_per_g")
+SIGNED = ("latitude_deg", *PASSPORT)
 SETTLED = 7.0  # time constants of a loop: e^-7 of what a turn leaves is less than noise and drift make of a heading
 WINDOW_LEAST_S = 0.1  # object 2102h
 TAU_LEAST_S = 0.01  # 0 is a drift without memory
@@ -66,6 +67,12 @@ class GyrocompassParams:
         0.0, "deg/h", "drift of the azimuth axis, from the passport; used to check the latitude"
     )
     drift2_limit_degph: float = option(0.0, "deg/h", "limit of the error of drift2_degph; 0: no passport")
+    unbalance1_degph_per_g: float = option(
+        0.0, "deg/h/g", "drift about x by the specific force along x, from the passport; taken out of S"
+    )
+    quadrature2_degph_per_g: float = option(
+        0.0, "deg/h/g", "drift about z by the specific force along x, from the passport; not in the drift of the hold"
+    )
 
     def __post_init__(self) -> None:
         for name, known in (("method", tuple(METHODS)), ("angles", ANGLES), ("signals", SIGNALS)):
@@ -75,8 +82,9 @@ class GyrocompassParams:
             value = getattr(self, f.name)
             if isinstance(value, float) and f.name not in SIGNED and not 0.0 <= value < math.inf:
                 raise ValueError(expected("0 or more", value, f.name))
-        if not math.isfinite(self.drift2_degph):
-            raise ValueError(expected("a finite number", self.drift2_degph, "drift2_degph"))
+        for name in PASSPORT:
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(expected("a finite number", getattr(self, name), name))
         if self.window_s < WINDOW_LEAST_S or self.repeat < 1:
             raise ValueError(
                 expected(

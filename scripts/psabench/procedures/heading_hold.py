@@ -149,8 +149,8 @@ def hold(
     if first.faults:
         raise LinkError(f"{NAME}: navigation did not begin: {'; '.join(first.faults)}")
     azimuth_rad = _alpha(start, first)
-    drift1_radps, latitude_rad = start.drift1.radps, start.params.latitude_rad
-    drift2_radps = {"torquer": start.drift2.radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]
+    drift1_radps, latitude_rad = start.drift1.level_radps, start.params.latitude_rad
+    drift2_radps = {"torquer": start.drift2.level_radps, "axis1": drift1_radps, "none": 0.0}[p.compensate]
     _tell(bench, p, latitude_rad)
     bench.navigate(Compensation(azimuth_rad=azimuth_rad, drift1_radps=drift1_radps, drift2_radps=drift2_radps))
     begun_s = bench.t_s

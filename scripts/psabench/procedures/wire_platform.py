@@ -164,6 +164,18 @@ class WirePlatform:
             faults = self._in_words(self.gyro.flags)
         return Look(t_s=t_s, encoder_rad=encoder_rad, heading_rad=heading_rad, faults=faults)
 
+    # ---- beside the platform, for `heading_modes`
+
+    def encoder_rad(self) -> float:
+        """Of the outer gimbal, now."""
+        return math.radians(self.gyro.encoder_deg)
+
+    def magnetic_rad(self) -> float:
+        """Heading by the induction sensor, now. Raises LinkError where none is fitted."""
+        if not self.gyro.has_magnetic:
+            raise LinkError(expected("an induction sensor (section magnetic of the scenario)", "none", "gyro unit"))
+        return math.radians(self.gyro.magnetic_deg)
+
     def _self_test(self) -> None:
         """What it finds is among the flags. A unit that has left navigation has none."""
         if self.gyro.mode is not Mode.NAVIGATE:

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from psabench import Bench
+from psabench.boards.gyro.device import Gyro
 from psabench.boards.psa2.device import Psa2
 from psabench.emulator import Emulator
+from psabench.errors import BadInput
 from psabench.link.can_host import CanHost, Message, StepClock, WallClock, open_bus
 from psabench.link.control import Control
 from psabench.link.vcd import read_vcd
@@ -373,3 +375,30 @@ def test_gyrocompass_ideal_has_none_but_the_drift() -> None:
     assert s["servo_deg"] == s["encoder_deg"] == s["q_deg"]
     assert abs(60.0 * s["beta_deg"]) < 1.0  # the levelling rate over m1
     assert s["drift_degph"] == [25.0, 25.0]
+
+
+def test_heading_modes_has_an_induction_sensor_beside_the_platform() -> None:
+    """Lined up to the north, 8 degrees of declination: magnetic heading 352, 0.1 uT of 20 are 0.3 degrees of noise."""
+    with Bench.start("heading_modes") as b:
+        b.run_for(1.0)
+        gyro = b.board(Gyro)
+        shown = []
+        for _ in range(50):
+            b.run_for(0.02)
+            shown.append(gyro.magnetic_deg)
+        assert gyro.has_magnetic
+        assert np.mean(shown) == pytest.approx(352.0, abs=0.2)
+        assert 0.15 < np.std(shown) < 0.5
+        assert b.truth_state()["vehicle"]["heading_deg"] == 0.0
+    with Bench.start("gyrocompass") as b:
+        b.run_for(0.5)
+        assert not b.board(Gyro).has_magnetic
+
+
+def test_an_induction_sensor_needs_a_vehicle(tmp_path: Path) -> None:
+    path = tmp_path / "alone.yaml"
+    path.write_text("magnetic: {}\nunits: [{name: a}]\n", encoding="utf-8")
+    with pytest.raises(
+        BadInput, match="magnetic: expected a section platform, whose vehicle carries the sensor, got none"
+    ):
+        Bench.start(path)

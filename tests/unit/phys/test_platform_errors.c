@@ -70,6 +70,48 @@ static void drifts_move_it(void **state)
     near(look(&p, 120.0).drift_radps[PLATFORM_LEVEL], 30.0 * DEGPH, 1e-18);
 }
 
+/* A force along an axis of the gyroscope: mass unbalance turns it about that axis, quadrature about the other. On a vehicle of
+ * 30 degrees of roll the platform, level in beta, has f = g (-sin 30, 0, cos 30). */
+static void drift_by_force_is_that_of_the_force_on_the_platform(void **state)
+{
+    (void)state;
+    static const struct {
+        double unbalance[2], quadrature[2], drift_degph[2];
+    } rows[] = {
+        {{2.0, 0.0}, {0.0, 0.0}, {2.0 * -0.5, 0.0}},
+        {{0.0, 2.0}, {0.0, 0.0}, {0.0, 2.0 * 0.86602540378443865}},
+        {{0.0, 0.0}, {2.0, 0.0}, {2.0 * 0.86602540378443865, 0.0}},
+        {{0.0, 0.0}, {0.0, 2.0}, {0.0, 2.0 * -0.5}},
+    };
+    const struct site g = {.g_mps2 = 9.80665};
+    const struct vehicle_cfg v = parked(0.0, 0.0, 30.0);
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        struct platform_cfg c = ideal();
+        struct platform p;
+        memcpy(c.unbalance_degph_per_g, rows[i].unbalance, sizeof c.unbalance_degph_per_g);
+        memcpy(c.quadrature_degph_per_g, rows[i].quadrature, sizeof c.quadrature_degph_per_g);
+        platform_init(&p, &c, &v, &g, 1);
+        for (unsigned axis = 0; axis < PLATFORM_AXES; axis++) {
+            near(look(&p, 0.0).drift_radps[axis], rows[i].drift_degph[axis] * DEGPH, 1e-12);
+            near(look(&p, 10.0).drift_radps[axis], rows[i].drift_degph[axis] * DEGPH,
+                 3e-10); /* it has turned a little */
+        }
+    }
+}
+
+/* It follows an acceleration within a step: 2 m/s^2 to the east along x_p. */
+static void drift_by_force_follows_the_vehicle(void **state)
+{
+    (void)state;
+    struct platform_cfg c = ideal();
+    c.unbalance_degph_per_g[PLATFORM_LEVEL] = 10.0;
+    struct platform p = up(&c, 1);
+    vehicle_fly(platform_vehicle(&p, ns(1.0)), 100.0, 90.0, ns(1.0));
+    near(look(&p, 0.995).drift_radps[0], 0.0, 1e-12);
+    near(look(&p, 40.0).drift_radps[0], 10.0 * 2.0 / 9.80665 * DEGPH, 1e-9);
+    near(look(&p, 60.0).drift_radps[0], 0.0, 1e-9);
+}
+
 /* The random drift of an axis at an instant, deg/h. */
 static double random_degph(struct platform *p, unsigned axis, double t_s)
 {
@@ -245,6 +287,8 @@ int main(void)
         cmocka_unit_test(the_default_is_the_articles),
         cmocka_unit_test(torquers_saturate_and_have_a_scale),
         cmocka_unit_test(drifts_move_it),
+        cmocka_unit_test(drift_by_force_is_that_of_the_force_on_the_platform),
+        cmocka_unit_test(drift_by_force_follows_the_vehicle),
         cmocka_unit_test(gauss_markov_drift_is_stationary),
         cmocka_unit_test(gauss_markov_drift_from_zero_grows),
         cmocka_unit_test(gauss_markov_law_does_not_depend_on_the_step),

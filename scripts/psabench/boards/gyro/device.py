@@ -115,6 +115,8 @@ class Gyro(BusUnit):
     encoder_deg = _Latest(OD.LATEST, 3, lambda code: int(code) * ENCODER_DEG)  # of the outer gimbal
     beta_deg = _Latest(OD.LATEST, 6, lambda code: int(code) * LEVEL_DEG)  # level angle about the axis of suspension
     heading_deg = _Latest(OD.HEADING, 2, float)  # as the unit itself has it in mode 6, of a level vehicle, 0 to 360
+    has_magnetic = _Latest(OD.MAGNETIC, 1, bool)  # an induction sensor is fitted
+    magnetic_deg = _Latest(OD.MAGNETIC, 2, float)  # heading by it, 0 to 360
     step_s = _Latest(OD.CLOCK, 1, lambda ns: int(ns) * 1e-9)  # period of the controller's steps, and of the readings
     steps = _Latest(OD.CLOCK, 2, int)  # of the controller since its last reset
     level_node = _Latest(OD.LEVEL, 1, int)  # CANopen node of the unit that reads the level sensors; 0: none is fitted

@@ -29,6 +29,8 @@ struct rig {
     uint16_t seq;
     bool mute;     /* the level unit sends nothing */
     unsigned lose; /* frames that are lost */
+    bool magnetic; /* an induction sensor is fitted, and shows this */
+    double magnetic_rad;
     double torque_radps[2];
     unsigned repositions;
     struct gyro_reading reading[RIG_READINGS];
@@ -112,7 +114,15 @@ static inline struct platform_cfg rig_platform(void)
     return c;
 }
 
-static const struct board_platform_io rig_platform_io = {rig_torque, rig_reposition, rig_servo, rig_encoder};
+static bool rig_magnetic(void *ctx, int64_t t_ns, double *heading_rad)
+{
+    (void)t_ns;
+    *heading_rad = ((struct rig *)ctx)->magnetic_rad;
+    return ((struct rig *)ctx)->magnetic;
+}
+
+static const struct board_platform_io rig_platform_io = {rig_torque, rig_reposition, rig_servo, rig_encoder,
+                                                         rig_magnetic};
 
 /* The check case: latitude 50, heading 40, pitch 5, roll -4. */
 static inline void rig_up(struct rig *r, const struct platform_cfg *platform, double latitude_deg)

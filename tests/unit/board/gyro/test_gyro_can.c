@@ -215,6 +215,42 @@ static void the_clock_tells_the_period_and_all_steps_since_reset(void **state)
     assert_in_range(read_raw(GYRO_OD_CLOCK, 2), 70, 100);
 }
 
+static void no_torque(void *ctx, double u1_radps, double u2_radps, int64_t t_ns)
+{
+    (void)ctx;
+    (void)u1_radps;
+    (void)u2_radps;
+    (void)t_ns;
+}
+
+static double no_angle_rad(void *ctx, int64_t t_ns)
+{
+    (void)ctx;
+    (void)t_ns;
+    return 0.0;
+}
+
+static const struct board_platform_io sensor_alone = {
+    .torque = no_torque, .servo_rad = no_angle_rad, .encoder_rad = no_angle_rad, .magnetic_rad = rig_magnetic};
+
+/* As the latest step has it, 0 to 360. */
+static void the_magnetic_heading_is_that_of_the_sensor_if_one_is_fitted(void **state)
+{
+    (void)state;
+    r.b.base.io.platform = &sensor_alone;
+    rig_run(&r, 1.0);
+    assert_int_equal(read_raw(GYRO_OD_MAGNETIC, 1), 0);
+    assert_int_equal(read_raw(GYRO_OD_MAGNETIC, 2), 0);
+    r.magnetic = true;
+    r.magnetic_rad = -30.0 * RAD_PER_DEG;
+    rig_run(&r, 0.1);
+    assert_int_equal(read_raw(GYRO_OD_MAGNETIC, 1), 1);
+    assert_true(fabs(read_real(GYRO_OD_MAGNETIC, 2) - 330.0) < 1e-4);
+    assert_int_equal(write_raw(GYRO_OD_MAGNETIC, 2, 0, 4), CO_AB_READ_ONLY);
+    r.magnetic = false;
+    r.b.base.io.platform = NULL;
+}
+
 /* ---- readings */
 
 static void a_reading_is_three_pdos_of_one_step(void **state)
@@ -338,6 +374,7 @@ int main(void)
         cmocka_unit_test_setup(settings_begin_as_the_dictionary_says_and_come_back_as_written, up),
         cmocka_unit_test_setup(what_cannot_be_written_is_refused_in_words, up),
         cmocka_unit_test_setup(the_clock_tells_the_period_and_all_steps_since_reset, up),
+        cmocka_unit_test_setup(the_magnetic_heading_is_that_of_the_sensor_if_one_is_fitted, up),
         cmocka_unit_test_setup(a_reading_is_three_pdos_of_one_step, up),
         cmocka_unit_test_setup(a_silent_level_unit_is_an_emergency_once, up),
         cmocka_unit_test_setup(what_came_and_went_is_counted_and_a_self_test_is_begun, up),

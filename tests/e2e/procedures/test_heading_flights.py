@@ -1,0 +1,107 @@
+"""The modes of the heading indicator on an emulated bench: flights beside the algebra, drift by specific force."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from psabench.bench import Bench
+from psabench.campaign import heading_modes as algebra
+from psabench.campaign.emulated import resolved
+from psabench.campaign.heading_modes import ROWS, errors_deg
+from psabench.campaign.heading_modes_emulated import Scenario, Trip, scenario, trip
+from psabench.errors import LinkError
+from psabench.native.nav import DEGPH
+from psabench.procedures import gyrocompass
+from psabench.procedures.gyrocompass import GyrocompassResult
+from psabench.procedures.gyrocompass_params import params_of
+from psabench.procedures.head_bench import Silent
+from psabench.procedures.heading_modes import ModeParams
+from psabench.procedures.wire_platform import WirePlatform
+from rig import HOST, ROOT
+
+pytestmark = HOST
+
+SHORT = ModeParams(hours=0.5)
+EXACT = {"level_repeat_arcmin": 0.0, "angle_set_arcmin": 0.0, "angle_read_arcmin": 0.0}
+
+
+def without_chance(name: str, p: ModeParams, run: int) -> tuple[Trip, np.ndarray[Any, Any]]:
+    """An emulated flight and the algebra's, of the same instrument, with all that is drawn in flight taken away."""
+    row = replace(ROWS[name], gm_sigma_degph=0.0)
+    s: Scenario = scenario(row, 1, run)
+    s["platform"] |= EXACT
+    s["magnetic"]["noise_ut"] = 0.0
+    flown = trip(row, p, 1, run, s)
+    at = np.searchsorted(p.looks_s, flown.flown.t_s)
+    return flown, errors_deg(row, p, 1, 1, run)[0][at]
+
+
+@pytest.mark.parametrize("name", ["magnetic", "half-compass"])
+def test_the_prototype_flies_as_the_algebra_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sensor, dip, setter, panel, take-off, tilts: within 0.03 deg at each look, of 0.15 and more."""
+    monkeypatch.setattr(algebra, "NOISE_UT", 0.0)
+    flown, want_deg = without_chance(name, SHORT, 1)
+    assert flown.error_deg == pytest.approx(want_deg, abs=0.03)
+    assert np.ptp(want_deg) > 0.15
+    assert flown.flown.ready_s < 20.0
+
+
+def test_the_article_s_hold_flies_as_the_algebra_says() -> None:
+    """Since the beginning of the flight; its readiness is the prototype's and two minutes, one of them optional."""
+    flown, want_deg = without_chance("literal", SHORT, 1)
+    moved_deg = flown.error_deg - flown.error_deg[0]
+    assert moved_deg == pytest.approx(want_deg - want_deg[0], abs=0.015)
+    assert abs(flown.error_deg[0]) < 0.2
+    assert 140.0 < flown.flown.ready_s < 180.0
+    assert flown.flown.doubts == ()
+
+
+def test_magnetic_modes_need_the_sensor() -> None:
+    row = ROWS["magnetic"]
+    s: Scenario = json.loads(resolved(str(ROOT / "proto/scenarios/gyrocompass.yaml")))
+    with pytest.raises(LinkError, match="expected an induction sensor"):
+        trip(row, SHORT, 1, 0, s)
+
+
+def compass(
+    folder: Path, reading: str, *, passport: bool, unbalance: float = 0.0, quadrature: float = 0.0
+) -> GyrocompassResult:
+    """The ideal platform on a vehicle of 5 deg of pitch and roll; on a level one it drifts by 25 deg/h in all."""
+    s: Scenario = json.loads(resolved(str(ROOT / "proto/scenarios/gyrocompass_ideal.yaml")))
+    s["platform"] |= {
+        "unbalance_degph_per_g": [unbalance] * 2,
+        "quadrature_degph_per_g": [quadrature] * 2,
+        "drift_degph": [25.0 - quadrature, 25.0 - unbalance],
+    }
+    s["vehicle"] |= {"heading_deg": 40.0, "pitch_deg": 5.0, "roll_deg": -5.0}
+    path = folder / "tilted.yaml"
+    path.write_text(json.dumps(s), encoding="utf-8")
+    known = {"unbalance1_degph_per_g": unbalance, "quadrature2_degph_per_g": quadrature} if passport else {}
+    p = params_of(reading, {"latitude_deg": 50.0, **known})
+    with Bench.start(path) as b:
+        return gyrocompass.estimate(gyrocompass.measure(WirePlatform(b), p, Silent()), p)
+
+
+def test_mass_unbalance_turns_the_heading_of_a_tilted_vehicle(tmp_path: Path) -> None:
+    """1 deg/h/g times the sine of 5 deg twice over, by the Earth's 9.67 deg/h: 0.73 deg; with its passport nothing."""
+    want_deg = -math.degrees(math.sin(math.radians(5.0)) * math.sqrt(2.0) / 9.67)
+    off_deg = [
+        math.degrees(compass(tmp_path, "article", unbalance=1.0, passport=known).heading_rad) - 40.0
+        for known in (False, True)
+    ]
+    assert off_deg[0] == pytest.approx(want_deg, abs=0.03)
+    assert abs(off_deg[1]) < 0.01
+
+
+def test_quadrature_turns_the_drift_of_a_level_flight(tmp_path: Path) -> None:
+    """What the windows find about z has the force of a parked vehicle in it; a hold is level."""
+    without, known = (compass(tmp_path, "article", quadrature=1.0, passport=k).drift2 for k in (False, True))
+    assert abs(without.level_radps / DEGPH - 25.0) > 0.04
+    assert known.level_radps / DEGPH == pytest.approx(25.0, abs=0.004)
+    assert known.radps == pytest.approx(without.radps, abs=1e-4 * DEGPH)
