@@ -347,6 +347,7 @@ static const struct row rows[] = {
     {"--unit", " NAME", set_path, IN(unit), "unit whose lines --vcd, --line and --logic show (default: the first)"},
     {"--vcd", " FILE", set_path, IN(vcd), "record the lines as VCD"},
     {"--vcd-unit", " NS", set_vcd_unit, 0, "time unit of the VCD (default 10)"},
+    {"--vcd-analog", NULL, set_flag, IN(vcd_analog), "with the real-valued channels of the board: voltages of the integrators (PMKA)"},
     {"--line", " LINK", set_path, IN(line), "line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
      "                           pseudo-terminal; LINK becomes a symbolic link to it; -: no link"},
     {"--line-hz", " HZ", set_line_hz, 0, "sample rate of the line port (default 8000000)"},

@@ -98,6 +98,7 @@ struct options {
     const char *unit; /* whose lines are traced; NULL: the first */
     const char *vcd;
     uint32_t vcd_unit_ns;
+    bool vcd_analog;
     const char *line; /* line port: symbolic link, "-" without one; NULL: no line port */
     int64_t line_hz;
     const char *control, *truth; /* paths of Unix sockets */

@@ -171,7 +171,9 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t ma
     s->ports.vcd = file;
     s->vcd_why[0] = '\0';
     snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
-    return bench_record(s->bench, unit, file, s->o->vcd_unit_ns, max_bytes);
+    const struct vcd_cfg how = {
+        .out = file, .unit_ns = s->o->vcd_unit_ns, .max_bytes = max_bytes, .reals = s->o->vcd_analog};
+    return bench_record(s->bench, unit, &how);
 }
 
 static bool do_vcd_stop(void *ctx, char *why)

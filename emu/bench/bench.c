@@ -162,15 +162,13 @@ void bench_free(struct bench *b)
     b->cycle = NULL;
 }
 
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes)
+bool bench_record(struct bench *b, unsigned unit, const struct vcd_cfg *how)
 {
     struct unit *u = &b->unit[unit];
-    const struct vcd_cfg cfg = {.out = out,
-                                .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
-                                .unit_ns = unit_ns,
-                                .max_bytes = max_bytes,
-                                .mask = TRACE_FIRST(u->type->line_count),
-                                .from_ns = b->sched.now_ns};
+    struct vcd_cfg cfg = *how;
+    cfg.scope = u->type->name; /* whatever the unit's name: share/psa2.gtkw opens it */
+    cfg.mask = TRACE_FIRST(u->type->line_count);
+    cfg.from_ns = b->sched.now_ns;
     b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));
     return b->recording;
 }

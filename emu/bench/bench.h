@@ -60,9 +60,9 @@ void bench_free(struct bench *b); /* what bench_init() took; harmless after it f
 /* Index of the unit of that name, or -1. */
 int bench_find_unit(const struct scenario *s, const char *name);
 
-/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. max_bytes: as struct vcd_cfg has
- * it. False: no such time unit. */
-bool bench_record(struct bench *b, unsigned unit, FILE *out, uint32_t unit_ns, uint64_t max_bytes);
+/* Records the lines of a unit from now on; before power-up, so that the first edge is in it. how: what the caller sets are
+ * out, unit_ns, max_bytes and reals. False: no such time unit. */
+bool bench_record(struct bench *b, unsigned unit, const struct vcd_cfg *how);
 
 void bench_power_up(struct bench *b);
 
