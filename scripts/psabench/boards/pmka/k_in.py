@@ -64,7 +64,7 @@ def printed(cal: Calibration, rom: Rom) -> Calibration:
 def error_of_increments(
     p: Periods, rom: Rom, calibrations: Sequence[Calibration], inputs_v: Sequence[float], last: int
 ) -> Floats:
-    """Relative error of the increments between resets, by axis (3,): those of the `last` readings, for steady inputs.
+    """Relative error of the increments between resets, by axis (3,): those of the `last` readings, for steady inputs; NaN: none.
 
     Without a reset an increment knows its integrator's coefficient alone, so its error is that of K_IN. Those in which a
     key moved, which are of less than Ts, are left out.
@@ -75,5 +75,6 @@ def error_of_increments(
     for axis, input_v in enumerate(inputs_v):
         alone = (p.serves[:, axis] == axis + 1) & (p.serves[:, 3] != axis + 1)
         own = recent & alone & np.roll(alone, 1) & (p.reset[:, axis] == 0)
-        out[axis] = float(ds[axis][own].mean()) / (input_v * rom.ts_s) - 1.0
+        if own.any():
+            out[axis] = float(ds[axis][own].mean()) / (input_v * rom.ts_s) - 1.0
     return out
