@@ -2,8 +2,9 @@
 
 .venv/bin/python examples/pmka_k_in.py
 
-A chamber warms three units from 20 to 60 degC. The host knows what it gave them, 1.2, -0.6 and 0.3 V, reads their frames, and computes
-the same readings three times: with the reset of the printed parts, with that of the first rotation, with each rotation's.
+A chamber warms three units from 20 to 60 degC. The host knows what it gave them, 1.2, -0.6 and 0.3 V, reads their
+frames, and computes the same readings three times: with the reset of the printed parts, with that of the first
+rotation, with each rotation's.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 
     tools/plots/pmka_waveform.py [docs/img/pmka_waveform.svg]
 
-From the real-valued channels of a VCD. Prints the levels at t1, t2, t3 that the article's figure marks. Same bytes each time.
+From the real-valued channels of a VCD. Prints the levels at t1, t2, t3 that the article's figure marks. Same bytes each
+time.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from psabench.report import plots as report_plots  # noqa: E402 of this tree
 T0_TS = 3  # Ts in a machine cycle: ours, E0
 BEAT_T0 = 4  # article, the text after figure 5
 TS_NS = 4_800_000
+BEAT_NS = BEAT_T0 * T0_TS * TS_NS
 SCENARIO = f"""
 seed: 4
 site: {{g_mps2: 9.8}}
@@ -83,33 +85,47 @@ def served(vcd: Vcd, channel: int, t_ns: Array) -> Array:
     return np.where(has_k, np.select(away, [1, 2, 3], 0), 0)
 
 
+def draw_row(ax: Axes, vcd: Vcd, reals: dict[str, Real], channel: int, begin_ns: int) -> None:
+    """One integrator over the five beats; dotted: T0."""
+    r = reals[NAMES[channel]]
+    inside = (r.t_ns >= begin_ns) & (r.t_ns <= begin_ns + 5 * BEAT_NS)
+    t_ns, volts = r.t_ns[inside], r.value[inside]
+    draw_voltage(ax, (t_ns - begin_ns) * 1e-6, volts, served(vcd, channel, t_ns))
+    for cycle in range(5 * BEAT_T0 + 1):
+        width = 0.8 if cycle % BEAT_T0 == 0 else 0.3
+        ax.axvline(cycle * T0_TS * TS_NS * 1e-6, color=report_plots.MUTED, lw=width, ls=":")
+    for level in (-3.5, 3.5):
+        ax.axhline(level, color=report_plots.MUTED, lw=0.5, ls="--")
+    ax.set_ylabel(f"{NAMES[channel].replace('_', ' ')}, V")
+
+
+def levels(reals: dict[str, Real], at_ns: list[int]) -> list[tuple[int, float, float]]:
+    """t1, t2, t3, ns, with the voltage of X, Y, Z and that of K."""
+    return [(t, reals[f"U_{axis}"].at(t), reals["U_K"].at(t)) for t, axis in zip(at_ns, "XYZ", strict=True)]
+
+
+def mark(ax: Axes, t_ms: float, volts: float, label: str) -> None:
+    """A level of the article's figure."""
+    ax.plot(t_ms, volts, "o", ms=3.5, color=report_plots.SERIES[3])
+    ax.annotate(label, (t_ms, volts), (3, 5), textcoords="offset points", fontsize=8)
+
+
 def figure_of(vcd: Vcd, reals: dict[str, Real]) -> tuple[Figure, list[str]]:
-    """A row an integrator; dotted: T0; t1..t3 with the levels of both integrators."""
-    begin, at = hand_overs(vcd)
-    beat_ns = BEAT_T0 * T0_TS * TS_NS
+    """A row an integrator, with t1..t3 and the levels of both integrators there, which are the text, too."""
+    begin_ns, at_ns = hand_overs(vcd)
     says = []
     with matplotlib.rc_context(report_plots.STYLE):
         figure = Figure(figsize=(7.6, 5.8), layout="constrained")
         rows = figure.subplots(4, 1, sharex=True, sharey=True)
-        for i, (ax, name) in enumerate(zip(rows, NAMES, strict=True)):
-            r = reals[name]
-            inside = (r.t_ns >= begin) & (r.t_ns <= begin + 5 * beat_ns)
-            t_ns, volts = r.t_ns[inside], r.value[inside]
-            draw_voltage(ax, (t_ns - begin) * 1e-6, volts, served(vcd, i, t_ns))
-            for cycle in range(5 * BEAT_T0 + 1):
-                heavy = cycle % BEAT_T0 == 0
-                ax.axvline(cycle * T0_TS * TS_NS * 1e-6, color=report_plots.MUTED, lw=0.8 if heavy else 0.3, ls=":")
-            for level in (-3.5, 3.5):
-                ax.axhline(level, color=report_plots.MUTED, lw=0.5, ls="--")
-            ax.set_ylabel(f"{name.replace('_', ' ')}, V")
-        for n, (t_ns, axis) in enumerate(zip(at, "XYZ", strict=True), start=1):
-            axis_v, k_v = reals[f"U_{axis}"].at(t_ns), reals["U_K"].at(t_ns)
-            for ax, volts, label in ((rows[n - 1], axis_v, f"U{axis}{n}"), (rows[3], k_v, f"UK{n}")):
-                ax.plot((t_ns - begin) * 1e-6, volts, "o", ms=3.5, color=report_plots.SERIES[3])
-                ax.annotate(f"{label} t{n}", ((t_ns - begin) * 1e-6, volts), (3, 5), textcoords="offset points", fontsize=8)
-            says.append(f"t{n} {(t_ns - begin) * 1e-6:.2f} ms: U{axis}{n} {axis_v:+.3f} V, UK{n} {k_v:+.3f} V")
+        for channel, ax in enumerate(rows):
+            draw_row(ax, vcd, reals, channel, begin_ns)
+        for n, (t_ns, axis_v, k_v) in enumerate(levels(reals, at_ns), start=1):
+            t_ms, axis = (t_ns - begin_ns) * 1e-6, "XYZ"[n - 1]
+            mark(rows[n - 1], t_ms, axis_v, f"U{axis}{n} t{n}")
+            mark(rows[3], t_ms, k_v, f"UK{n} t{n}")
+            says.append(f"t{n} {t_ms:.2f} ms: U{axis}{n} {axis_v:+.3f} V, UK{n} {k_v:+.3f} V")
         for beat in range(5):
-            rows[0].annotate(f"τ{beat + 1}", ((beat + 0.5) * beat_ns * 1e-6, 6.3), ha="center", fontsize=9)
+            rows[0].annotate(f"τ{beat + 1}", ((beat + 0.5) * BEAT_NS * 1e-6, 6.3), ha="center", fontsize=9)
         rows[0].set_ylim(-6, 8)
         for who, name in enumerate(("out of work: zero, resets", "has X", "has Y", "has Z")):
             rows[3].plot([], [], color=(report_plots.MUTED, *report_plots.SERIES[:3])[who], lw=2.0, label=name)

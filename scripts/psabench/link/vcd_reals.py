@@ -36,10 +36,10 @@ class Real:
 
 
 def read_reals(path: Path) -> dict[str, Real]:
-    """The real-valued channels of a file of the emulator, by name. Raises OSError, or ValueError for what is no such file."""
+    """The real-valued channels of a file of the emulator, by name. Raises OSError, or ValueError for another file."""
     unit_ns = read_vcd(path).unit_ns  # every other line has been looked at with it
     head, _, body = path.read_text(encoding="ascii").partition("$enddefinitions $end\n")
-    names = {code: name for code, name in _VAR.findall(head)}
+    names: dict[str, str] = dict(_VAR.findall(head))
     found: dict[str, list[tuple[int, float]]] = {name: [] for name in names.values()}
     t_ns = 0
     for line in body.splitlines():

@@ -7,7 +7,7 @@ The article names two ways to keep the drift of the capacitor out of the result:
 gives the same coefficient, for Rr/RIN is known: CT of the ROM. What comes out is K_PSA = KADC K_IN, codes per V s: the
 gain of the converter is in it, as it is in the codes.
 
-The three calibrations here differ in how old Nr is: that of the printed parts, that of the first rotation, that of each.
+The calibrations here differ in how old Nr is: that of the printed parts, that of the first rotation, that of each.
 """
 
 from __future__ import annotations
@@ -64,10 +64,10 @@ def printed(cal: Calibration, rom: Rom) -> Calibration:
 def error_of_increments(
     p: Periods, rom: Rom, calibrations: Sequence[Calibration], inputs_v: Sequence[float], last: int
 ) -> Floats:
-    """Relative error of the increments between resets, by axis (3,): those of the `last` readings, for steady inputs; NaN: none.
+    """Relative error of the increments between resets, by axis (3,), in the `last` readings of steady inputs; NaN: none.
 
-    Without a reset an increment knows its integrator's coefficient alone, so its error is that of K_IN. Those in which a
-    key moved, which are of less than Ts, are left out.
+    Without a reset an increment knows its integrator's coefficient alone, so its error is that of K_IN. Those in which
+    a key moved, which are of less than Ts, are left out.
     """
     out = np.full(len(AXES), np.nan)
     ds = [increments_vs(p, i, cal, rom) for i, cal in enumerate(calibrations)]
