@@ -381,7 +381,8 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     if (!p->vcd) return false;
     const struct unit *u = &b->unit[b->watched];
     if (o->vcd_analog && !unit_trace(u)->reals)
-        return why_fail(why, cap, "--vcd-analog: expected a board with real-valued channels (pmka), got %s", u->type->name);
+        return why_fail(why, cap, "--vcd-analog: expected a board with real-valued channels (pmka), got %s",
+                        u->type->name);
     const struct vcd_cfg how = {.out = p->vcd, .unit_ns = o->vcd_unit_ns, .reals = o->vcd_analog};
     return bench_record(b, b->watched, &how) ||
            why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);

@@ -321,9 +321,11 @@ static void real_values_stand_between_the_edges(void **state)
     vcd_close(&vcd, 4000);
     assert_false(trace_real_watched(&reals));
     const char *body = strstr(read_back(f), "$end\n#");
-    assert_non_null(strstr(text, "$var wire 1 \" CLK $end\n$var real 64 a U_X $end\n$var real 64 b U_K $end\n$upscope"));
-    assert_string_equal(body, "$end\n#0\n$dumpvars\n1!\n0\"\n$end\n#100\n0!\n#105\n1\"\n#110\nr1.25 a\n#150\n0\"\nr-3 b\n"
-                              "#200\n1!\n#250\nr1e-07 b\n#400\n");
+    assert_non_null(
+        strstr(text, "$var wire 1 \" CLK $end\n$var real 64 a U_X $end\n$var real 64 b U_K $end\n$upscope"));
+    assert_string_equal(body,
+                        "$end\n#0\n$dumpvars\n1!\n0\"\n$end\n#100\n0!\n#105\n1\"\n#110\nr1.25 a\n#150\n0\"\nr-3 b\n"
+                        "#200\n1!\n#250\nr1e-07 b\n#400\n");
     assert_int_equal(vcd_error(&vcd), 0);
     fclose(f);
 }

@@ -64,7 +64,7 @@ def printed(cal: Calibration, rom: Rom) -> Calibration:
 def error_of_increments(
     p: Periods, rom: Rom, calibrations: Sequence[Calibration], inputs_v: Sequence[float], last: int
 ) -> Floats:
-    """Relative error of the increments between resets, by axis (3,), in the `last` readings of steady inputs; NaN: none.
+    """Relative error of increments between resets, by axis (3,), in the `last` readings of steady inputs; NaN: none.
 
     Without a reset an increment knows its integrator's coefficient alone, so its error is that of K_IN. Those in which
     a key moved, which are of less than Ts, are left out.
