@@ -349,6 +349,7 @@ static const struct row rows[] = {
     {"--vcd-unit", " NS", set_vcd_unit, 0, "time unit of the VCD (default 10)"},
     {"--pairs", NULL, set_flag, IN(pairs), "add the wires A and B of differential lines to --vcd, vcd.start and probe.arm, the wires\n"
      "                           B to --line (PSA-2: INT_B, DATA_B and CLK_B in bits 3 to 5)"},
+    {"--vcd-analog", NULL, set_flag, IN(vcd_analog), "with the real-valued channels of the board: voltages of the integrators (PMKA)"},
     {"--line", " LINK", set_path, IN(line), "line port: lines of a board (PSA-2: INT, DATA and CLK) as sampled bytes on a\n"
      "                           pseudo-terminal; LINK becomes a symbolic link to it; -: no link"},
     {"--line-hz", " HZ", set_line_hz, 0, "sample rate of the line port (default 8000000)"},

@@ -383,7 +383,11 @@ static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, 
     if (!o->vcd) return true;
     p->vcd = own_file_output("--vcd ", o->vcd, &p->refused, why, cap);
     if (!p->vcd) return false;
-    const struct bench_recording what = {b->watched, o->pairs, o->vcd_unit_ns, 0};
+    const struct unit *u = &b->unit[b->watched];
+    if (o->vcd_analog && !unit_trace(u)->reals)
+        return why_fail(why, cap, "--vcd-analog: expected a board with real-valued channels (pmka), got %s",
+                        u->type->name);
+    const struct bench_recording what = {b->watched, o->pairs, o->vcd_analog, o->vcd_unit_ns, 0};
     return bench_record(b, &what, p->vcd) ||
            why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);
 }

@@ -171,7 +171,7 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, bool wires,
     s->ports.vcd = file;
     s->vcd_why[0] = '\0';
     snprintf(s->vcd_path, sizeof s->vcd_path, "%s", path);
-    const struct bench_recording what = {unit, wires || s->o->pairs, s->o->vcd_unit_ns, max_bytes};
+    const struct bench_recording what = {unit, wires || s->o->pairs, s->o->vcd_analog, s->o->vcd_unit_ns, max_bytes};
     return bench_record(s->bench, &what, file);
 }
 

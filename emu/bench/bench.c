@@ -177,6 +177,7 @@ bool bench_record(struct bench *b, const struct bench_recording *r, FILE *out)
                                 .scope = u->type->name, /* whatever the unit's name: share/psa2.gtkw opens it */
                                 .unit_ns = r->unit_ns,
                                 .max_bytes = r->max_bytes,
+                                .reals = r->reals,
                                 .mask = bench_recorded(b, r->unit, r->wires),
                                 .from_ns = b->sched.now_ns};
     b->recording = vcd_open(&b->vcd, &cfg, unit_trace(u));

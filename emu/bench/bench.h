@@ -67,6 +67,7 @@ uint64_t bench_recorded(struct bench *b, unsigned unit, bool wires);
 struct bench_recording {
     unsigned unit;
     bool wires; /* of differential pairs, too */
+    bool reals; /* real-valued channels of the board, too */
     uint32_t unit_ns;
     uint64_t max_bytes; /* as struct vcd_cfg has it */
 };

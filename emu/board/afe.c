@@ -80,9 +80,21 @@ void afe_fault_remove(struct afe *a, struct afe_fault *f)
 /* What the faults make of the chain at one instant. */
 struct faulty {
     double signal;
-    double ripple_v;
+    double ripple_v;  /* before the pole */
+    double passed_v;  /* behind it, at the load's scale */
     double reference; /* relative to what it should be */
 };
+
+static double sine(double turns)
+{
+    return det_sin(TWO_PI * (turns - floor(turns)));
+}
+
+/* A sine behind a pole that it exceeds `ratio` times, settled: the imaginary part of e^jx / (1 + j ratio). */
+static double passed_sine(double turns, double ratio)
+{
+    return (sine(turns) - ratio * sine(turns + 0.25)) / (1.0 + ratio * ratio);
+}
 
 static void apply_fault(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
 {
@@ -90,7 +102,10 @@ static void apply_fault(const struct afe *a, const struct afe_fault *f, double f
     if (f->kind == AFE_LOAD_OPEN) out->signal = out->signal < 0.0 ? -limit : limit;
     else if (f->kind == AFE_LOAD_SHORT) out->signal = 0.0;
     else if (f->kind == AFE_REFERENCE) out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
-    else out->ripple_v += f->value * det_sin(TWO_PI * (turns - floor(turns)));
+    else if (f->frequency_hz <= AFE_SLOW_HZ) out->ripple_v += f->value * sine(turns);
+    else
+        out->passed_v +=
+            f->value * passed_sine(turns, a->cfg.filter_hz > 0.0 ? f->frequency_hz / a->cfg.filter_hz : 0.0);
 }
 
 static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_ns)
@@ -232,7 +247,10 @@ void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const s
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
     if (at->n >= LANES && lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
     else pass_row(a, signal_to_v, at);
-    for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] /= apply_faults(a, 0.0, at->t_ns[i]).reference;
+    for (unsigned i = 0; a->faults && i < at->n; i++) {
+        const struct faulty f = apply_faults(a, 0.0, at->t_ns[i]);
+        signal_to_v[i] = (signal_to_v[i] + f.passed_v / a->scale.divider) / f.reference;
+    }
 }
 
 /* ---- rows left out */

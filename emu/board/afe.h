@@ -32,9 +32,13 @@ enum afe_fault_kind {
     AFE_LOAD_OPEN,
     AFE_LOAD_SHORT,
     AFE_REFERENCE, /* value: relative error; rate_per_s: its growth from from_ns on */
-    AFE_RIPPLE,    /* value: amplitude at the load, V; frequency_hz; phase 0 at from_ns */
+    AFE_RIPPLE,    /* value: amplitude at the load, V; frequency_hz; phase 0 at from_ns. See AFE_SLOW_HZ */
     AFE_FAULTS
 };
+
+/* A faster ripple passes the pole as it does in the part, V / (1 + j f / filter_hz), not as steps held from look to look: what
+ * comes near the rate of the looks, a multiple of it included, is a slow signal to them. */
+#define AFE_SLOW_HZ 100.0
 
 /* One fault, owned by its injector, linked in while it lasts. */
 struct afe_fault {

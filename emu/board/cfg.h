@@ -47,11 +47,13 @@ struct board_io {
     const struct board_platform_io *platform; /* NULL: there is none */
 };
 
+#define BOARD_CHAIN_MODULATOR 1u /* adc_chain: looks at the input at each clock of the modulator */
+
 /* One specimen: what differs between two boards of a profile. */
 struct board_cfg {
     struct afe_cfg afe[BOARD_AXES];
     double adc_noise_scale, temp_noise_scale;      /* 1 published, 0 none */
-    unsigned adc_chain;                            /* PSA-2: enum ads1282_chain */
+    unsigned adc_chain;                            /* PSA-2: enum ads1282_chain; see BOARD_CHAIN_MODULATOR */
     double temp_adc_offset_v, temp_adc_gain_error; /* PSA-2 */
     uint64_t seed;
     uint32_t serial;

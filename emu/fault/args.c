@@ -25,7 +25,7 @@ const struct control_arg fault_args[FAULT_ARGS + 1] = {
     [FAULT_REFERENCE_PPM] = {"reference_ppm", CONTROL_REAL, true, "ppm", -500000, 1e6, .what = "error of the converter's reference voltage", .least = FAULT_LEAST_PPM},
     [FAULT_DRIFT_PPM_PER_S] = {"drift_ppm_per_s", CONTROL_REAL, true, "ppm/s", FAULT_LEAST_PPM, 1e6, .what = "rate of change of that error"},
     [FAULT_AMPLITUDE_V] = {"amplitude_v", CONTROL_REAL, true, "V", FAULT_LEAST_V, 10, .what = "ripple amplitude at the load"},
-    [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 100, .what = "frequency of the ripple; a sensor's is in the pass band at 250 SPS"},
+    [FAULT_FREQUENCY_HZ] = {"frequency_hz", CONTROL_REAL, true, "Hz", 0.1, 1e7, .what = "frequency of the ripple; above 100 Hz of analog.ripple alone"},
     [FAULT_LEVEL] = {"level", CONTROL_CHOICE, true, .what = "logic level of the line or pin", .choices = levels},
     [FAULT_REGISTER] = {"register", CONTROL_COUNT, true, NULL, 0, 255, .what = "register address in the chip"},
     [FAULT_MASK] = {"mask", CONTROL_COUNT, true, NULL, 1, 255, .what = "mask of the bits to invert"},

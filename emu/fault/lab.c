@@ -135,6 +135,15 @@ static struct table *table_of(const struct fault *f)
     return &f->engine->bench->lab->table;
 }
 
+/* No servo does more. */
+static bool follows(const struct control_bench *b, const struct fault *f, char *why)
+{
+    (void)b;
+    return f->value[FAULT_FREQUENCY_HZ] <= AFE_SLOW_HZ ||
+           why_fail(why, CONTROL_WHY_MAX, "frequency_hz: expected 0.1 to %g Hz, got %.10g", AFE_SLOW_HZ,
+                    f->value[FAULT_FREQUENCY_HZ]);
+}
+
 static bool ripple_axis(struct fault *f, int64_t t_ns)
 {
     control_settle_inputs(f->engine->bench, t_ns);
@@ -175,7 +184,8 @@ static const struct fault_kind lab[] = {
      .places = FAULT_BIT(FAULT_AT_HEAD), .need = FAULT_BIT(FAULT_SLIP_DEG), .nonzero = FAULT_BIT(FAULT_SLIP_DEG),
      .unless = "no unit is on the head", .fits = turns_units, .lift = refresh_slip},
     {"table.ripple", "The servo of the axis ripples: a sine of amplitude ripple_dps in its rate.", "a spectral line at frequency_hz in the readout of the rate, and in the codes of a unit on the table",
-     .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ), .apply = ripple_axis, .lift = lift_ripple},
+     .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ),
+     .unless = "frequency_hz is above 100", .fits = follows, .apply = ripple_axis, .lift = lift_ripple},
 };
 // clang-format on
 const struct fault_table fault_lab = {lab, sizeof lab / sizeof *lab};

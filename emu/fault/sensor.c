@@ -226,9 +226,24 @@ static bool has_error(const struct control_bench *b, const struct fault *f, char
     return false;
 }
 
+/* A model that looks at its input less often than the part's modulator would show a fast ripple at a frequency of its own. */
+static bool looks_fast(const struct unit *u, const struct fault *f, char *why)
+{
+    const double hz = f->value[FAULT_FREQUENCY_HZ];
+    if (hz <= AFE_SLOW_HZ) return true;
+    if (board_has(u->type, "adc_chain") && u->cfg.board.adc_chain == BOARD_CHAIN_MODULATOR) return true;
+    return why_fail(why, CONTROL_WHY_MAX,
+                    "frequency_hz: expected 0.1 to %g Hz (above: a unit with adc_chain: modulator), got %.10g",
+                    AFE_SLOW_HZ, hz);
+}
+
+/* Behind the pole: what the converter makes of it is the host's to see. */
 static bool ripples_enough(const struct control_bench *b, const struct fault *f, char *why)
 {
-    return at_least(f, FAULT_AMPLITUDE_V, least_v(b->unit[f->point.unit]), "V", why);
+    const struct unit *u = b->unit[f->point.unit];
+    const double filter_hz = u->cfg.board.afe[f->point.index].filter_hz, hz = f->value[FAULT_FREQUENCY_HZ];
+    const double ratio = hz > AFE_SLOW_HZ && filter_hz > 0.0 ? hz / filter_hz : 0.0;
+    return looks_fast(u, f, why) && at_least(f, FAULT_AMPLITUDE_V, least_v(u) * sqrt(1.0 + ratio * ratio), "V", why);
 }
 
 static bool apply_afe(struct fault *f, int64_t t_ns)
@@ -259,8 +274,8 @@ static const struct fault_kind analog[] = {
      CHAIN(AFE_LOAD_SHORT), .unless = "the sensor has voltage output: no load resistor", .fits = has_load},
     {"analog.reference", "The converter's reference voltage is off by reference_ppm and drifts by drift_ppm_per_s.", "all codes of the axis scaled, offset included",
      CHAIN(AFE_REFERENCE), .may = FAULT_BIT(FAULT_REFERENCE_PPM) | FAULT_BIT(FAULT_DRIFT_PPM_PER_S), .unless = "neither is given; the error or total drift is less than a code of the board", .fits = has_error},
-    {"analog.ripple", "Supply ripple couples through the buffer, as a sine of amplitude_v at the load.", "a spectral line at frequency_hz in the codes of the axis",
-     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board", .fits = ripples_enough},
+    {"analog.ripple", "Supply ripple couples through the buffer, as a sine of amplitude_v at the load.", "a spectral line in the codes of the axis, at frequency_hz or where the converter's sampling puts it",
+     CHAIN(AFE_RIPPLE), .need = FAULT_BIT(FAULT_AMPLITUDE_V) | FAULT_BIT(FAULT_FREQUENCY_HZ), .unless = "it is less than a code of the board; frequency_hz is above 100 and the unit has no adc_chain: modulator", .fits = ripples_enough},
 };
 // clang-format on
 const struct fault_table fault_analog = {analog, sizeof analog / sizeof *analog};

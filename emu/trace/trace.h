@@ -79,6 +79,7 @@ struct trace {
     struct trace_filter *standing;                /* starts before the first sink is attached; or NULL */
     struct trace_source source;                   /* set by the board; wake may stay NULL */
     struct trace_group *group;                    /* group.h; or NULL: its owner advances it */
+    struct trace_reals *reals;                    /* real.h; of the board, or NULL: it has none */
     struct trace *next_awake;                     /* of the group */
     unsigned room;                                /* TRACE_PENDING_MAX; 0: asleep, it takes no steps before it wakes */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */

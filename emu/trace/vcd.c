@@ -17,6 +17,11 @@ static char code_of(unsigned sig)
     return (char)('!' + sig); /* TRACE_SIGNALS_MAX codes of the 94 printable ones */
 }
 
+static char code_of_real(unsigned channel)
+{
+    return code_of(TRACE_SIGNALS_MAX + channel);
+}
+
 static void write_out(struct vcd *v)
 {
     errno = 0;
@@ -170,9 +175,8 @@ static const struct trace_step *write_chunk(struct vcd *v, const struct trace_st
     return s;
 }
 
-static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
+static void write_steps(struct vcd *v, const struct trace_step *s, unsigned n)
 {
-    struct vcd *v = ctx;
     for (const struct trace_step *const end = s + n; s < end;) {
         if (VCD_BUF - v->len < STEP_MAX_LEN) write_out(v);
         if (!in_chunk(&v->chunk, s->t_ns)) begin_chunk(&v->chunk, s->t_ns);
@@ -181,9 +185,61 @@ static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
     }
 }
 
+/* ---- real-valued channels: some hundred values a second ---- */
+
+static void write_real(struct vcd *v, const struct vcd_real *r)
+{
+    char text[48];
+    const int64_t t_units = r->t_ns / v->chunk.unit_ns;
+    if (t_units != v->t_units) put_time(v, t_units);
+    (void)snprintf(text, sizeof text, "r%.9g %c\n", r->value, code_of_real(r->channel));
+    put_text(v, text);
+    v->changes++;
+    v->edge_units = t_units;
+}
+
+/* The oldest that waits, if it is of t_ns or before. */
+static const struct vcd_real *take_real(struct vcd *v, int64_t t_ns)
+{
+    const struct vcd_real *r = &v->real[v->real_first];
+    if (v->real_count == 0 || r->t_ns > t_ns) return NULL;
+    v->real_first = (v->real_first + 1) % VCD_REALS;
+    v->real_count--;
+    return r;
+}
+
+static void write_reals(struct vcd *v, int64_t t_ns)
+{
+    for (const struct vcd_real *r; (r = take_real(v, t_ns));) write_real(v, r);
+}
+
+/* Edges may still come for times before it: it waits. More than can wait are a loss that the file must not hide. */
+static void on_real(void *ctx, unsigned channel, double value, int64_t t_ns)
+{
+    struct vcd *v = ctx;
+    if (v->real_count == VCD_REALS) vcd_fail(v, ENOBUFS);
+    else v->real[(v->real_first + v->real_count++) % VCD_REALS] = (struct vcd_real){t_ns, channel, value};
+}
+
+static void on_steps(void *ctx, const struct trace_step *s, unsigned n)
+{
+    struct vcd *v = ctx;
+    while (v->real_count > 0 && n > 0 && v->real[v->real_first].t_ns < s[n - 1].t_ns) {
+        const int64_t t_ns = v->real[v->real_first].t_ns;
+        unsigned before = 0;
+        while (s[before].t_ns <= t_ns) before++;
+        write_steps(v, s, before);
+        write_reals(v, t_ns);
+        s += before;
+        n -= before;
+    }
+    write_steps(v, s, n);
+}
+
 static void on_advance(void *ctx, int64_t t_ns)
 {
     struct vcd *v = ctx;
+    write_reals(v, t_ns);
     v->seen_units = t_ns / v->chunk.unit_ns;
 }
 
@@ -256,20 +312,23 @@ static bool put_timescale(struct vcd *v, uint32_t unit_ns)
     return false;
 }
 
+static void put_var(struct vcd *v, const char *kind, char letter, const char *name)
+{
+    const char code[2] = {letter, '\0'};
+    const char *const words[] = {"$var ", kind, code, " ", name, " $end\n"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) put_text(v, words[i]);
+}
+
 static void put_names(struct vcd *v, const char *scope, uint64_t mask)
 {
     put_text(v, "$scope module ");
     put_text(v, scope);
     put_text(v, " $end\n");
     for (unsigned i = 0; i < v->trace->count; i++) {
-        if (!(mask >> i & 1)) continue;
-        const char code[2] = {code_of(i), '\0'};
-        put_text(v, "$var wire 1 ");
-        put_text(v, code);
-        put_text(v, " ");
-        put_text(v, v->trace->name[i]);
-        put_text(v, " $end\n");
+        if (mask >> i & 1) put_var(v, "wire 1 ", code_of(i), v->trace->name[i]);
     }
+    for (unsigned i = 0; v->reals && i < v->trace->reals->count; i++)
+        put_var(v, "real 64 ", code_of_real(i), v->trace->reals->name[i]);
     put_text(v, "$upscope $end\n$enddefinitions $end\n");
 }
 
@@ -279,6 +338,7 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->trace = t;
     v->out = cfg->out;
     v->max_bytes = cfg->max_bytes;
+    v->reals = cfg->reals && t->reals;
     if (!put_timescale(v, cfg->unit_ns)) return false;
     set_unit(&v->chunk, cfg->unit_ns);
     put_names(v, cfg->scope, cfg->mask);
@@ -286,6 +346,10 @@ bool vcd_open(struct vcd *v, const struct vcd_cfg *cfg, struct trace *t)
     v->from_ns = cfg->from_ns > t->done_ns ? cfg->from_ns : t->done_ns;
     v->sink = (struct trace_sink){.mask = cfg->mask, .steps = present_levels, .advance = advance_before, .ctx = v};
     trace_attach(t, &v->sink);
+    if (v->reals) {
+        t->reals->value = on_real;
+        t->reals->ctx = v;
+    }
     v->sink.steps = steps_before;
     v->found = trace_known(t, v->from_ns);
     v->moved = v->found ^ trace_known(t, v->from_ns - 1);
@@ -304,8 +368,10 @@ void vcd_flush(struct vcd *v)
 void vcd_close(struct vcd *v, int64_t t_ns)
 {
     trace_detach(v->trace, &v->sink);
+    if (v->reals) v->trace->reals->value = NULL;
     if (v->sink.steps != on_steps) begin_and_end(v);
     const int64_t end_units = t_ns / v->chunk.unit_ns;
+    write_reals(v, t_ns);
     v->seen_units = end_units > v->edge_units ? end_units : v->edge_units + 1;
     vcd_flush(v);
 }

@@ -1,6 +1,6 @@
 /* Writer of Value Change Dump (IEEE 1364-2005 clause 18): a trace sink that sigrok, PulseView, GTKWave and Surfer open.
  *
- * 1-bit wires only, no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
+ * 1-bit wires, and on request real-valued channels (real.h); no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
  * kept and an edge is less than one unit early. The default unit is 10 ns: a half period of CLK (250 ns)
  * is then exact and of SClk (244.14 ns) within 4 %, no datasheet's set-up time (50 ns) collapses into one sample, and
  * sigrok, which makes a sample of every unit, still loads 10 s in seconds (docs/waveforms.md has the figures).
@@ -10,6 +10,7 @@
 #ifndef PSABENCH_TRACE_VCD_H
 #define PSABENCH_TRACE_VCD_H
 
+#include "trace/real.h"
 #include "trace/trace.h"
 
 #include <stddef.h>
@@ -17,6 +18,7 @@
 
 #define VCD_UNIT_NS 10u
 #define VCD_BUF     65536u
+#define VCD_REALS   1024u /* that wait for the edges before them */
 
 struct vcd_cfg {
     FILE *out;          /* open for writing; not closed here */
@@ -25,6 +27,7 @@ struct vcd_cfg {
     uint64_t mask;      /* bit i: signal i; the signals must have been added before */
     uint64_t max_bytes; /* a longer file ends with EFBIG; 0: any length */
     int64_t from_ns;    /* the file begins here, or at the trace's done_ns when later: see vcd_open() */
+    bool reals;         /* with the real-valued channels of the trace, if it has any */
 };
 
 struct vcd { /* read-only outside vcd.c */
@@ -48,6 +51,13 @@ struct vcd { /* read-only outside vcd.c */
         unsigned prefix_len;
         char prefix[16]; /* ... have these digits and four more */
     } chunk;
+    struct vcd_real {
+        int64_t t_ns;
+        unsigned channel;
+        double value;
+    } real[VCD_REALS]; /* in order of time, a ring */
+    unsigned real_first, real_count;
+    bool reals;   /* wanted and there */
     int error;    /* errno of the first write that failed */
     bool limited; /* EFBIG, at max_bytes */
     bool reported;

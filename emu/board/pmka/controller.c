@@ -187,6 +187,7 @@ void pmka_init(struct pmka *b, const struct pmka_profile *p, const struct board_
     b->profile = *p;
     board_init(&b->base, pmka_lines, PMKA_LINES, cfg, io, s);
     init_trace(b);
+    pmka_probes_init(b);
     sched_ev_inner(&b->step, run_stage, b);
     pmka_sample_init(b);
     pmka_bus_init(b);

@@ -16,6 +16,9 @@ static inline int64_t pmka_half_ns(const struct pmka *b)
 
 /* pmka/sample.c */
 void pmka_sample_init(struct pmka *b);
+void pmka_probes_init(struct pmka *b); /* real-valued channels of the trace */
+void pmka_probe(struct pmka *b, unsigned i,
+                int64_t t_ns); /* its output voltage, at an instant up to which it is integrated */
 void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns); /* its state at t_ns, not before the last call's */
 void pmka_integrate_axis(struct pmka *b, unsigned axis, int64_t t_ns); /* of an axis that no integrator has */
 void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns);            /* hold, comparators, reset */

@@ -18,6 +18,7 @@
 #include "board/pmka/integrator.h"
 #include "board/pmka/profile.h"
 #include "board/pmka/rom.h"
+#include "trace/real.h"
 
 #include <stdbool.h>
 #include <stdint.h>

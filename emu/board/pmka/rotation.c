@@ -56,6 +56,8 @@ static void move_key(struct pmka *b, unsigned axis, unsigned from, unsigned to, 
     pmka_integrate(b, from, t_ns);
     pmka_integrate(b, to, t_ns);
     pmka_integrate_axis(b, axis, t_ns);
+    pmka_probe(b, from, t_ns);
+    pmka_probe(b, to, t_ns);
     f->axis = f->said_axis = -1;
     t->said_axis = (int)axis;
     t->axis = key_closes(b, to) ? (int)axis : -1;

@@ -54,6 +54,21 @@ void pmka_integrate(struct pmka *b, unsigned i, int64_t t_ns)
     }
 }
 
+/* ---- probes ---- */
+
+void pmka_probes_init(struct pmka *b)
+{
+    static const char *const name[PMKA_INTS] = {"U_X", "U_Y", "U_Z", "U_K"};
+    for (unsigned i = 0; i < PMKA_INTS; i++) b->reals.name[i] = name[i];
+    b->reals.count = PMKA_INTS;
+    b->base.trace.reals = &b->reals;
+}
+
+void pmka_probe(struct pmka *b, unsigned i, int64_t t_ns)
+{
+    if (trace_real_watched(&b->reals)) trace_real(&b->reals, i, pmka_int_out_v(&b->channel[i].integrator, t_ns), t_ns);
+}
+
 /* ---- resets ---- */
 
 static void put_reset_line(struct pmka *b, unsigned i, bool on, int64_t t_ns)
@@ -87,12 +102,18 @@ void pmka_cut_reset(struct pmka *b, unsigned i, int64_t t_ns)
     c->resetting = false;
 }
 
-/* Only the lines: how much flowed is known from the two instants. */
+/* Only the lines: how much flowed is known from the two instants. The end of a reset is the end of a cell, so that a probe
+ * finds what is computed later in any case. */
 static void reset_ended(void *ctx, int64_t t_ns)
 {
     struct pmka *b = ctx;
-    for (unsigned i = 0; i < PMKA_INTS; i++)
-        if (b->channel[i].resetting && b->channel[i].reset_until_ns == t_ns) put_reset_line(b, i, false, t_ns);
+    for (unsigned i = 0; i < PMKA_INTS; i++) {
+        if (!b->channel[i].resetting || b->channel[i].reset_until_ns != t_ns) continue;
+        put_reset_line(b, i, false, t_ns);
+        if (!trace_real_watched(&b->reals)) continue;
+        pmka_integrate(b, i, t_ns);
+        pmka_probe(b, i, t_ns);
+    }
 }
 
 /* Beyond Uc, or because the one out of work is being calibrated: then towards zero, which alternates the signs. */
@@ -178,6 +199,7 @@ void pmka_sample(struct pmka *b, unsigned i, int64_t t_ns)
     struct pmka_reading *r = &b->next;
     pmka_integrate(b, i, t_ns);
     const double out_v = pmka_int_out_v(&c->integrator, t_ns);
+    pmka_probe(b, i, t_ns);
     r->code[i] = to_code(b, out_v, t_ns, &r->clipped[i]);
     r->reset[i] = c->done;
     r->serves[i] = (uint8_t)c->served;

@@ -83,6 +83,7 @@ struct pmka {
     struct sched_ev step;
     struct pmka_reading next, latest; /* being taken; complete */
     bool any;                         /* a reading is there */
+    struct trace_reals reals;         /* output voltages, by integrator */
     /* converter, for the trace */
     int64_t sampled_ns; /* last */
     struct sched_ev conversion;

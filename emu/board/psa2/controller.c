@@ -272,6 +272,8 @@ static void init_trace(struct psa2 *b)
     b->idle_lines = b->base.trace.level;
 }
 
+_Static_assert((int)BOARD_CHAIN_MODULATOR == (int)ADS1282_CHAIN_MODULATOR, "one number for the same chain");
+
 static void init_accel(struct psa2 *b)
 {
     static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from psabench import Bench
 from psabench.boards.pmka import estimate as est
+from psabench.boards.pmka import k_in
 from psabench.boards.pmka.device import Pmka
 from psabench.errors import CycleRefused
 from rig import HERE
@@ -170,6 +171,35 @@ def test_the_capacitor_is_seen_and_does_not_matter(recordings: dict[str, Recordi
         assert growth == pytest.approx([0.2 * span_s / 3600.0] * 2, rel=0.05)
     steady = recordings["usual"].calibrations[0].nr
     assert np.abs(steady[-1] / steady[0] - 1.0).max() < 5e-5
+
+
+def test_k_in_from_frames_is_that_of_the_parts(recordings: dict[str, Recording], bench: Bench) -> None:
+    """The parts by the truth port: 1/(RIN C), with the gain of the converter, which is in every code."""
+    r, truth = recordings["usual"], bench.truth()["units"]["usual"]["specimen"]
+    for i, name in enumerate("xyzk"):
+        parts = truth["adc_gain"] / (truth[f"integrator_{name}_r_in_ohm"] * truth[f"integrator_{name}_cap_f"])
+        found = k_in.k_in_per_s(r.calibrations[i], r.rom, i, r.periods.degc, r.calibrations[i].nr_at)
+        assert found == pytest.approx(np.full(len(found), parts), rel=3e-5)
+        assert abs(found[0] / k_in.K_IN_PRINTED - 1.0) > 5e-4
+
+
+def test_an_old_k_in_is_an_error_of_each_increment(recordings: dict[str, Recording]) -> None:
+    """20 % an hour, from the first rotation to the last ten seconds."""
+    r, last = recordings["drift"], 2000
+    at_work = k_in.error_of_increments(r.periods, r.rom, r.calibrations, INPUT_V.tolist(), last)
+    old = k_in.error_of_increments(r.periods, r.rom, [k_in.held(c) for c in r.calibrations], INPUT_V.tolist(), last)
+    span_s = [(len(r.periods) - last / 2 - c.nr_at[0]) * TS_S for c in r.calibrations[:2]]
+    assert np.abs(at_work[:2]).max() < 1e-4  # 24 mV on Z are 40 codes: too little for it
+    assert old[:2] == pytest.approx([0.2 * s / 3600.0 for s in span_s], rel=0.03)
+
+
+def test_a_known_input_for_k_in_is_refused(bench: Bench) -> None:
+    """The article's first way: no calibration 3, by a known input, which it does not describe."""
+    unit = bench.board(Pmka, "ideal")
+    unit.autonomous(False)
+    with pytest.raises(CycleRefused, match="calibration 0 to 2"):
+        unit.command(1, cal=3)
+    unit.autonomous(True)
 
 
 def test_the_rom_tells_who_it_is(recordings: dict[str, Recording]) -> None:

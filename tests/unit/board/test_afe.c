@@ -238,6 +238,30 @@ static void each_fault_changes_the_chain_as_it_says(void **state)
     }
 }
 
+/* Ten times the corner, and 70 Hz above the rate of the looks: what is left is the pole's 1/(1 + jf/fc), seen at 100 kHz and
+ * at 70 Hz. A ripple up to AFE_SLOW_HZ goes through the pole of the looks. */
+static void a_fast_ripple_passes_the_pole_as_in_the_part(void **state)
+{
+    (void)state;
+    static const double hz[] = {100e3, 1024070.0};
+    for (unsigned k = 0; k < COUNT(hz); k++) {
+        struct afe_fault f = {.kind = AFE_RIPPLE, .value = 0.8, .frequency_hz = hz[k]};
+        const struct afe_cfg cfg = afe_nominal(AFE_VOLTAGE);
+        struct afe a;
+        afe_init(&a, &cfg, draws_of(1, 1, "afe.x"));
+        afe_fault_add(&a, &f);
+        const double ratio = hz[k] / 10e3, gain = 1.0 / sqrt(1.0 + ratio * ratio), lag = atan(ratio);
+        double largest_v = 0.0;
+        for (int n = 1; n < 40000; n++) {
+            const int64_t t_ns = (int64_t)(n * 976.5625);
+            const double v = out_v(&a, 1.0, 25, t_ns);
+            near(v, 0.125 + 0.1 * gain * sin(6.283185307179586 * hz[k] * 1e-9 * (double)t_ns - lag), 1e-9);
+            largest_v = fmax(largest_v, v - 0.125);
+        }
+        assert_true(largest_v > 0.999 * 0.1 * gain);
+    }
+}
+
 static void faults_of_a_chain_add_up(void **state)
 {
     (void)state;
@@ -262,7 +286,7 @@ int main(void)
         cmocka_unit_test(one_pole_is_exact_at_any_pace), cmocka_unit_test(without_a_filter_the_chain_has_no_memory),
         cmocka_unit_test(noise_has_its_density),         cmocka_unit_test(a_row_is_its_samples_one_by_one),
         cmocka_unit_test(two_pasts_become_one),          cmocka_unit_test(each_fault_changes_the_chain_as_it_says),
-        cmocka_unit_test(faults_of_a_chain_add_up),
+        cmocka_unit_test(faults_of_a_chain_add_up),      cmocka_unit_test(a_fast_ripple_passes_the_pole_as_in_the_part),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

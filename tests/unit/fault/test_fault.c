@@ -218,6 +218,8 @@ static void what_does_not_fit_is_refused_with_the_reason(void **state)
         {"{'kind':'analog.reference','point':'a.afe.x','drift_ppm_per_s':5,'for_s':0.1}",
          "in 0.1 s it comes to 0.5 ppm, less than 1 ppm"},
         {"{'kind':'analog.ripple','point':'a.afe.x','amplitude_v':1e-6,'frequency_hz':1}", "expected 2e-06 to 10 V"},
+        {"{'kind':'analog.ripple','point':'a.afe.x','amplitude_v':1,'frequency_hz':101}",
+         "frequency_hz: expected 0.1 to 100 Hz (above: a unit with adc_chain: modulator), got 101"},
         {"{'kind':'sensor.bias','point':'a.sensor.x','bias_v':1,'for_s':1e-10}",
          "for_s: expected 0 or at least 1e-9 s, got 1e-10"},
         {"{'kind':'link.delay','point':'bus.can0','hold_s':1e-10}", "hold_s: expected 0 or at least 1e-9 s, got 1e-10"},

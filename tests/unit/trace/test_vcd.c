@@ -289,6 +289,71 @@ static void long_recordings_survive_the_buffer(void **state)
     fclose(f);
 }
 
+/* ---- real-valued channels ---- */
+
+static struct trace_reals reals = {.name = {"U_X", "U_K"}, .count = 2};
+
+static FILE *open_with_reals(bool wanted)
+{
+    FILE *f = tmpfile();
+    assert_non_null(f);
+    trace.reals = &reals;
+    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = 10, .mask = 3, .reals = wanted};
+    assert_true(vcd_open(&vcd, &cfg, &trace));
+    assert_true(trace_real_watched(&reals) == wanted);
+    return f;
+}
+
+/* Edges of before, reported after it, stand before it. */
+static void real_values_stand_between_the_edges(void **state)
+{
+    (void)state;
+    FILE *f = open_with_reals(true);
+    trace_set(&trace, 0, false, 1000);
+    trace_real(&reals, 0, 1.25, 1100);
+    trace_real(&reals, 1, -3.0, 1500);
+    trace_set(&trace, 1, true, 1050);
+    trace_set(&trace, 1, false, 1500);
+    trace_set(&trace, 0, true, 2000);
+    trace_advance(&trace, 1800);
+    trace_real(&reals, 1, 1e-7, 2500);
+    trace_advance(&trace, 3000);
+    vcd_close(&vcd, 4000);
+    assert_false(trace_real_watched(&reals));
+    const char *body = strstr(read_back(f), "$end\n#");
+    assert_non_null(
+        strstr(text, "$var wire 1 \" CLK $end\n$var real 64 a U_X $end\n$var real 64 b U_K $end\n$upscope"));
+    assert_string_equal(body,
+                        "$end\n#0\n$dumpvars\n1!\n0\"\n$end\n#100\n0!\n#105\n1\"\n#110\nr1.25 a\n#150\n0\"\nr-3 b\n"
+                        "#200\n1!\n#250\nr1e-07 b\n#400\n");
+    assert_int_equal(vcd_error(&vcd), 0);
+    fclose(f);
+}
+
+static void real_values_come_on_request_alone(void **state)
+{
+    (void)state;
+    FILE *f = open_with_reals(false);
+    trace_real(&reals, 0, 1.25, 1100);
+    trace_advance(&trace, 3000);
+    vcd_close(&vcd, 4000);
+    assert_null(strstr(read_back(f), "U_X"));
+    assert_null(strstr(text, "r1.25"));
+    fclose(f);
+}
+
+static void more_real_values_than_can_wait_are_an_error(void **state)
+{
+    (void)state;
+    FILE *f = open_with_reals(true);
+    for (unsigned i = 0; i < VCD_REALS; i++) trace_real(&reals, 0, i, 1000 + i);
+    assert_int_equal(vcd_error(&vcd), 0);
+    trace_real(&reals, 0, 1.0, 9000);
+    assert_int_equal(vcd_error(&vcd), ENOBUFS);
+    vcd_close(&vcd, 10000);
+    fclose(f);
+}
+
 static void a_full_disk_is_told_once_and_stops_nothing(void **state)
 {
     (void)state;
@@ -323,6 +388,9 @@ int main(void)
         cmocka_unit_test_setup(a_recording_that_ends_before_its_start_is_delivered_has_its_levels, fresh),
         cmocka_unit_test_setup(a_flushed_file_can_be_looked_at_while_it_grows, fresh),
         cmocka_unit_test_setup(long_recordings_survive_the_buffer, fresh),
+        cmocka_unit_test_setup(real_values_stand_between_the_edges, fresh),
+        cmocka_unit_test_setup(real_values_come_on_request_alone, fresh),
+        cmocka_unit_test_setup(more_real_values_than_can_wait_are_an_error, fresh),
         cmocka_unit_test_setup(a_full_disk_is_told_once_and_stops_nothing, fresh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
