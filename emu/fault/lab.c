@@ -2,6 +2,8 @@
  * the drift of an axis, and the gimbal's angle sensor. */
 #include "fault/internal.h"
 
+#include "base/why.h"
+
 #include <math.h>
 #include <stdio.h>
 
