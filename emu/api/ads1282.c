@@ -166,7 +166,7 @@ static const struct api_counter counters[] = {
     L(sync_width),     API_COUNTER("limit_sync_keepout", part_ads1282, chip.limit.sync_keepout),
     L(reset_width),    API_VIOLATION("bad_access", part_ads1282, chip.regs.bad_access),
     R(ro_write),       R(unimp_access),
-    N(bits_missing),
+    N(bits_missing),   N(range_exceeded),
 };
 #undef N
 #undef V

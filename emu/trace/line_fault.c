@@ -196,7 +196,7 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
 
 /* ---- for the owner ---- */
 
-static void install(void *ctx)
+static void install_filter(void *ctx)
 {
     struct line_faults *l = ctx;
     if (l->trace->filter) return;
@@ -211,7 +211,7 @@ void line_faults_init(struct line_faults *l, struct trace *t)
 {
     memset(l, 0, sizeof *l);
     l->trace = t;
-    l->filter = (struct trace_filter){.steps = on_steps, .start = install, .ctx = l};
+    l->filter = (struct trace_filter){.steps = on_steps, .start = install_filter, .ctx = l};
 }
 
 void line_pair_add(struct line_faults *l, const struct pair_cfg *cfg, const char *name_a, const char *name_b)
@@ -233,7 +233,7 @@ void line_pairs_show(struct line_faults *l)
 {
     if (l->pairs == 0) return;
     l->trace->standing = &l->filter;
-    if (l->trace->sinks) install(l);
+    if (l->trace->sinks) install_filter(l);
 }
 
 bool line_has_pair(const struct line_faults *l, unsigned line)
@@ -258,7 +258,7 @@ uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f)
     assert(f->kind != LINE_NOISE || (f->rate_hz > 0.0 && f->rate_hz < 1e9));
     if (!s) return 0;
     trace_wake(l->trace);
-    install(l);
+    install_filter(l);
     *s = (struct line_fault_slot){.f = *f, .id = ++l->last_id, .next_ns = NEVER};
     return s->id;
 }

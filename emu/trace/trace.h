@@ -70,10 +70,9 @@ struct trace_source {
 struct trace {
     const char *name[TRACE_SIGNALS_MAX];
     unsigned count;
-    uint64_t level;   /* as delivered, bit per signal */
-    uint64_t watched; /* union of the sinks' masks, and what these follow from */
-    uint64_t wires;   /* signals that the filter makes ... */
-    uint64_t wired;   /* ... of these: line_fault.h */
+    uint64_t level;        /* as delivered, bit per signal */
+    uint64_t watched;      /* union of the sinks' masks, and what these follow from */
+    uint64_t wires, wired; /* signals that the filter makes, of these: line_fault.h */
     struct trace_sink *sinks;
     struct trace_filter *filter;                  /* or NULL */
     struct trace_filter *standing;                /* starts before the first sink is attached; or NULL */

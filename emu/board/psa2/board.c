@@ -31,7 +31,7 @@ const struct board_counter psa2_kpsa_counters[PSA2_KPSA_COUNTERS] = {
 };
 const struct board_counter psa2_adc_counters[PSA2_ADC_COUNTERS] = {
     ADC(conversions), ADC(overruns), ADC(torn_reads), ADC(late_reads), ADC(bad_opcodes), ADC(refused), ADC(gap_violations),
-    ADC(restarts), ADC(clipped), ADC(realigned), ADC(calibrations),
+    ADC(restarts), ADC(clipped), ADC(range_exceeded), ADC(realigned), ADC(calibrations),
     OF(ads1282, bad_register, regs.bad_access), OF(ads1282, unmodelled_bit, regs.unimp_access), OF(ads1282, read_only_write, regs.ro_write),
 };
 const struct board_counter psa2_temp_counters[PSA2_TEMP_COUNTERS] = {

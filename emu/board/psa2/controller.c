@@ -255,6 +255,7 @@ static void accel_vin_row_v(void *ctx, unsigned mux, const struct looks *at, dou
     }
     b->base.io.accel(b->base.io.ctx, port->axis, at, vin_v);
     afe_out_row_v(&b->base.afe[port->axis], vin_v, b->board_degc, at);
+    if (psa2_uref_moves(b)) psa2_uref_row(b, vin_v, at);
 }
 
 /* ---- life ---- */
@@ -277,12 +278,15 @@ _Static_assert((int)BOARD_CHAIN_MODULATOR == (int)ADS1282_CHAIN_MODULATOR, "one 
 static void init_accel(struct psa2 *b)
 {
     static const char *const adc_noise[] = {"adc.x", "adc.y", "adc.z"};
-    const struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
-                                    .clk_hz = b->profile.fclk_hz,
-                                    .vref_v = b->profile.adc_vref_v,
-                                    .noise_scale = b->base.cfg.adc_noise_scale,
-                                    .chain = (enum ads1282_chain)b->base.cfg.adc_chain};
+    struct ads1282_cfg cfg = {.part = b->profile.adc_is_1281 ? ADS1282_PART_1281 : ADS1282_PART_1282,
+                              .clk_hz = b->profile.fclk_hz,
+                              .vref_v = b->profile.adc_vref_v,
+                              .noise_scale = b->base.cfg.adc_noise_scale,
+                              .avss_v = b->profile.adc_avss_v,
+                              .avdd_v = b->profile.adc_avdd_v,
+                              .chain = (enum ads1282_chain)b->base.cfg.adc_chain};
     for (unsigned i = 0; i < 3; i++) {
+        cfg.common_mode_v = b->profile.common_mode_v[i];
         b->port[i] = (struct psa2_port){b, i};
         const struct ads1282_io io = {.ctx = &b->port[i], .vin_row_v = accel_vin_row_v, .drdy = accel_drdy};
         ads1282_init(&b->adc[i], &cfg, &io, b->base.sched, board_draws(&b->base, adc_noise[i]));

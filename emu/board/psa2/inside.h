@@ -16,7 +16,7 @@
 
 /* ---- parts: rows of board_type.parts, offsets from the beginning of the board */
 
-enum { PSA2_KPSA_COUNTERS = 6, PSA2_ADC_COUNTERS = 14, PSA2_TEMP_COUNTERS = 20 };
+enum { PSA2_KPSA_COUNTERS = 6, PSA2_ADC_COUNTERS = 15, PSA2_TEMP_COUNTERS = 20 };
 extern const struct board_counter psa2_kpsa_counters[PSA2_KPSA_COUNTERS], psa2_adc_counters[PSA2_ADC_COUNTERS],
     psa2_temp_counters[PSA2_TEMP_COUNTERS];
 void psa2_adc_fault(struct board *board, unsigned part, const struct chip_fault *f, int64_t t_ns);

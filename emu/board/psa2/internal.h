@@ -88,4 +88,12 @@ void psa2_out_stop(struct psa2 *b, int64_t t_ns);
 void psa2_out_wake(struct psa2 *b, int64_t t_ns);  /* an observer subscribes during a frame */
 void psa2_out_start(struct psa2 *b, int64_t t_ns); /* sends b->latest; dropped and counted if INT is low */
 
+/* ---- UREF: psa2/uref.c ---- */
+
+#define PSA2_UREF_LEAST 0.01 /* of UREF, where the supply fails altogether: codes are at their limit then */
+
+bool psa2_uref_moves(const struct psa2 *b);
+double psa2_uref_ratio(const struct psa2_profile *p, double supply_ratio); /* UREF to its nominal value */
+void psa2_uref_row(const struct psa2 *b, double *vin_v, const struct looks *at);
+
 #endif

@@ -67,6 +67,7 @@ const char *psa2_why_eager(struct psa2 *b, int64_t t_ns)
     if (!b->base.io.accel_range) return "nothing is known of its sensors";
     if (!b->profile.gate_sclk) return "bursts for the temperature converter reach the others";
     if (b->base.faults) return "its controller has a fault";
+    if (psa2_uref_moves(b)) return "its reference follows the supply";
     for (unsigned i = 0; !why && i < 3; i++) {
         const struct afe *afe = &b->base.afe[i];
         const struct looks_range out = b->base.io.accel_range(b->base.io.ctx, i, every_ns, t_ns + BOUND_NS, &why);

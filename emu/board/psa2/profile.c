@@ -90,10 +90,10 @@ static bool step_text(const void *profile, unsigned i, char *out, size_t cap)
 #define NAME(...) FIELD_NAME(struct psa2_profile, __VA_ARGS__)
 #define ROW(...)  FIELD_ROW(struct psa2_profile, __VA_ARGS__)
 
-#define DELAYS(member, lo, hi, words)                                                                                  \
+#define THREE(member, lo, hi, words)                                                                                   \
     {                                                                                                                  \
         .key = #member, .type = FIELD_EACH, .offset = offsetof(struct psa2_profile, member), .min = (lo), .max = (hi), \
-        .what = (words), .count = PSA2_DELAYS                                                                          \
+        .what = (words), .count = 3                                                                                    \
     }
 
 // clang-format off
@@ -110,13 +110,18 @@ static const struct field rows[] = {
      .count = PSA2_WORDS, .like = "one of X, Y, Z, T", .parse = parse_word, .text = word_text,
      .standard_of = (const char *const[]){"X", "Y", "Z", "T", NULL}},
     ROW(code_bits, U32, 24, 16, 32, "Significant bits of a code in its word: 16, 24 or 32."),
-    DELAYS(line_delay_ns, 0, 500, "Delay of the pairs Int, Data, CLK from the driver's input to the receiver's output, for rises."),
-    DELAYS(line_skew_ns, -100, 100, "By which falls of Int, Data, CLK come later there than rises; half a period of CLK at most."),
+    THREE(line_delay_ns, 0, 500, "Delay of the pairs Int, Data, CLK from the driver's input to the receiver's output, for rises."),
+    THREE(line_skew_ns, -100, 100, "By which falls of Int, Data, CLK come later there than rises; half a period of CLK at most."),
     ROW(read_bits, U32, 24, 24, 32, "SClk pulses of one accelerometer read: 24 or 32."),
     ROW(gate_sclk, BOOL, true, 0, 1, "SClk reaches only the group addressed."),
     ROW(temp_channels, U32, 4, 0, 8, "Temperature inputs scanned in turn; 0: none."),
     ROW(adc_is_1281, BOOL, false, 0, 1, "ADS1281 (no gain stage) instead of ADS1282."),
     ROW(adc_vref_v, REAL, 5.0, 0.5, 5.5, "Reference of the accelerometer converters."),
+    THREE(common_mode_v, -2.5, 2.5, "Middle of the inputs of converter X, Y, Z over ground; 0: their range is not looked at."),
+    ROW(adc_avss_v, REAL, -2.5, -2.625, 0, "Negative analog supply of the accelerometer converters."),
+    ROW(adc_avdd_v, REAL, 2.5, 2.375, 5.25, "Their positive one, at most 5.25 V above it."),
+    ROW(uref_ppm_per_pct, REAL, 0, -10000, 10000, "By how many ppm UREF of the accelerometer converters rises for each percent that the unit's supply is above its nominal voltage."),
+    ROW(uref_dropout_ratio, REAL, 0, 0, 1, "Below this part of the nominal supply UREF falls in proportion to it; 0: never."),
     ROW(adc_pga, U32, 2, 1, 64, "Gain written to CONFIG1 after the article's set-up; 1: not written."),
     ROW(temp_vref_v, REAL, 2.5, 0.5, 5.5, "Reference of the temperature converter."),
     ROW(temp_sensor_a_per_k, REAL, 1e-6, 0, 1e-3, "Current of a temperature sensor per kelvin of absolute temperature."),
@@ -233,6 +238,13 @@ static bool check_gain(const struct psa2_profile *p, char *why, size_t cap)
     return true;
 }
 
+static bool check_supplies(const struct psa2_profile *p, char *why, size_t cap)
+{
+    return p->adc_avdd_v - p->adc_avss_v <= PSA2_ANALOG_MAX_V ||
+           why_fail(why, cap, "adc_avdd_v: expected up to %g V above adc_avss_v = %g, got %g", PSA2_ANALOG_MAX_V,
+                    p->adc_avss_v, p->adc_avdd_v);
+}
+
 static double line_mhz(const struct psa2_profile *p)
 {
     return 1e-6 * (double)p->line_hz / (double)p->line_div;
@@ -296,5 +308,6 @@ bool psa2_profile_check(const void *profile, char *why, size_t cap)
     const struct psa2_profile *p = profile;
     return fields_check(&psa2_fields, p, why, cap) && check_words(p, why, cap) && check_setup(p, why, cap) &&
            check_mode(p, why, cap) && check_sclk(p, why, cap) && check_gain(p, why, cap) &&
-           check_int_low(p, why, cap) && check_times(p, why, cap) && check_delays(p, why, cap);
+           check_supplies(p, why, cap) && check_int_low(p, why, cap) && check_times(p, why, cap) &&
+           check_delays(p, why, cap);
 }

@@ -12,6 +12,8 @@
 
 #define PSA2_WORDS          4u
 #define PSA2_DELAYS         3u /* of Int, Data, CLK */
+#define PSA2_AXES           3u
+#define PSA2_ANALOG_MAX_V   5.25 /* AVDD - AVSS */
 #define PSA2_SETUP_MAX      16u
 #define PSA2_INT_LOW_MIN_NS 74000  /* article, protocol of exchange: "not less than 74 us" */
 #define PSA2_CLOCK_PPM      100    /* E0: by which a clock may be fast; 74.000 us are nominal */
@@ -52,6 +54,9 @@ struct psa2_profile {
     /* converters */
     bool adc_is_1281;
     double adc_vref_v;
+    double common_mode_v[PSA2_AXES]; /* of the inputs X, Y, Z over ground; 0: their range is not looked at */
+    double adc_avss_v, adc_avdd_v;   /* analog supplies of the converters, by the secondary supply IVN */
+    double uref_ppm_per_pct, uref_dropout_ratio; /* what the unit's supply does to UREF, which IVN makes */
     unsigned adc_pga; /* 1..64: written to CONFIG1 of an ADS1282 after the article's set-up; 1: not written */
     double temp_vref_v;
     /* temperature sensors: a current proportional to absolute temperature on a load RTD */

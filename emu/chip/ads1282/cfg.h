@@ -45,6 +45,8 @@ struct ads1282_cfg {
     uint32_t clk_hz;    /* 1 MHz .. 4.096 MHz; its edge 0 is at simulated time 0, so that chips with one clock agree */
     double vref_v;      /* VREFP - VREFN */
     double noise_scale; /* 1: published noise, 0: noiseless converter, nothing drawn */
+    /* Middle of both inputs over ground, the signal half on each. 0: their range is not looked at, else avss_v and avdd_v limit it. */
+    double common_mode_v, avss_v, avdd_v;
 
     /* Where sources disagree or practice is kinder than the data sheet. All false: the kind reading. */
     bool strict_sdatac; /* in RDATAC obey only WAKEUP, SDATAC and RESET (sources 1.3) */
@@ -84,6 +86,7 @@ struct ads1282_counters {
     uint32_t gap_violations; /* less than 24 tCLK between command bytes */
     uint32_t restarts;       /* SYNC, and writes that change CONFIG0 */
     uint32_t clipped;        /* words at the limit of the format */
+    uint32_t range_exceeded; /* samples of which one input was outside its range over the supplies */
     uint32_t realigned;      /* SCLK rested for 64 data periods inside a byte or command: interface time-out */
     uint32_t calibrations;   /* OFSCAL and GANCAL carried to their end */
     uint32_t bits_missing;   /* clocks of the modulator past the end of a recording */

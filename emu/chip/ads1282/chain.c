@@ -55,17 +55,37 @@ static int64_t saturate_input(struct ads1282 *a, double x)
     return a->last_lsb = ads1282_saturate_lsb(x);
 }
 
-static void input_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
+/* From the supplies to the limits of an input: those of the gain stage (M85), and of the ADS1281 without it (M80). */
+static const struct ads1282_range input_range[] = {
+    [ADS1282_PART_1281] = {-0.1, 0.1}, [ADS1282_PART_1282] = {0.7, -1.25}};
+
+struct ads1282_range ads1282_input_range(const struct ads1282 *a)
 {
-    const bool shorted = a->mux == 2 || a->mux > 4;
-    if (a->io.vin_row_v && !shorted) {
+    const struct ads1282_range *r = &input_range[a->cfg.part];
+    return (struct ads1282_range){a->cfg.avss_v + r->min_v, a->cfg.avdd_v + r->max_v};
+}
+
+static void pins_row_v(const struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    if (a->io.vin_row_v) {
         a->io.vin_row_v(a->io.ctx, a->mux, &(struct looks){t_ns, n, a->step.ns}, vin_v);
         return;
     }
-    for (unsigned i = 0; i < n; i++) vin_v[i] = shorted ? 0.0 : a->io.vin_v(a->io.ctx, a->mux, t_ns[i]);
+    for (unsigned i = 0; i < n; i++) vin_v[i] = a->io.vin_v(a->io.ctx, a->mux, t_ns[i]);
 }
 
-static double input_v(const struct ads1282 *a)
+static void input_row_v(struct ads1282 *a, const int64_t *t_ns, unsigned n, double *vin_v)
+{
+    if (a->mux == 2 || a->mux > 4) { /* shorted inside */
+        for (unsigned i = 0; i < n; i++) vin_v[i] = 0.0;
+        return;
+    }
+    pins_row_v(a, t_ns, n, vin_v);
+    if (a->cfg.common_mode_v != 0.0)
+        a->count.range_exceeded += ads1282_limit_row(ads1282_input_range(a), a->cfg.common_mode_v, vin_v, n);
+}
+
+static double input_v(struct ads1282 *a)
 {
     double v;
     input_row_v(a, &a->next.t_ns, 1, &v);

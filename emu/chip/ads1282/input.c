@@ -62,3 +62,21 @@ void ads1282_input_row(struct ads1282_scale scale, const double *vin_v, const ui
     if (lanes_avx2()) input_row_avx2(scale, vin_v, u, n, lsb);
     else input_row(scale, vin_v, u, n, lsb);
 }
+
+static double limit_v(struct ads1282_range range, double v)
+{
+    return v < range.min_v ? range.min_v : v > range.max_v ? range.max_v : v;
+}
+
+unsigned ads1282_limit_row(struct ads1282_range range, double common_mode_v, double *vin_v, unsigned n)
+{
+    unsigned beyond = 0;
+    for (unsigned i = 0; i < n; i++) {
+        const double p_v = common_mode_v + 0.5 * vin_v[i], n_v = common_mode_v - 0.5 * vin_v[i];
+        const double highest_v = p_v > n_v ? p_v : n_v, lowest_v = p_v > n_v ? n_v : p_v;
+        if (lowest_v >= range.min_v && highest_v <= range.max_v) continue;
+        vin_v[i] = limit_v(range, p_v) - limit_v(range, n_v);
+        beyond++;
+    }
+    return beyond;
+}

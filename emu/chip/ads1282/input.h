@@ -1,5 +1,5 @@
 /* Volts to the modulator's input: scale, noise of the converter, saturation. Pure; the same words by vectors and one by one. Private
- * to ads1282/chain.c and its tests. */
+ * to ads1282/chain.c, ads1282/skip.c and their tests. */
 #ifndef PSABENCH_CHIP_ADS1282_INPUT_H
 #define PSABENCH_CHIP_ADS1282_INPUT_H
 
@@ -30,6 +30,14 @@ static inline int64_t ads1282_saturate_lsb(double x)
     if (x < -ADS1282_INPUT_MAX_LSB) x = -ADS1282_INPUT_MAX_LSB;
     return (int64_t)(x + 0x1p36 + 0.5) - (INT64_C(1) << 36);
 }
+
+/* What both inputs may have over ground. */
+struct ads1282_range {
+    double min_v, max_v;
+};
+
+/* n samples whose inputs have this middle: an input beyond its range stays at the limit (E0). Returns how many have one. */
+unsigned ads1282_limit_row(struct ads1282_range range, double common_mode_v, double *vin_v, unsigned n);
 
 /* n samples: volts and draws in, n numbers of full scale 2^34 out. u: 64 random bits a sample, NULL: without noise. */
 void ads1282_input_row(struct ads1282_scale scale, const double *vin_v, const uint64_t *u, unsigned n, int64_t *lsb);

@@ -5,6 +5,7 @@
 #define PSABENCH_CHIP_ADS1282_INTERNAL_H
 
 #include "chip/ads1282/ads1282.h"
+#include "chip/ads1282/input.h"
 
 #define ADS1282_PULSE_TCLK 4 /* DRDY high when no one read; E2 ADS1287, M80 */
 
@@ -50,6 +51,7 @@ void ads1282_chain_restart(struct ads1282 *a);   /* from sync_count on */
 bool ads1282_chain_forgets(const struct ads1282 *a);         /* its past is finite */
 void ads1282_chain_resume(struct ads1282 *a, int64_t index); /* samples again, from this one on, without a past */
 double ads1282_chain_noise_lsb(const struct ads1282 *a, double output_lsb); /* scale of its draws */
+struct ads1282_range ads1282_input_range(const struct ads1282 *a);
 
 unsigned ads1282_sinc_ratio(const struct ads1282 *a); /* N of the present rate; of 1000 words/s where it is reserved */
 bool ads1282_sinc_only(const struct ads1282 *a);      /* FILTR = 01 */

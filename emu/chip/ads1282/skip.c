@@ -19,6 +19,14 @@ static bool may_clip(const struct ads1282 *a, struct looks_range vin_v)
     return !(mid_lsb * GAIN_MAX + off_lsb * ADS1282_OVERSHOOT < (double)(INT64_C(1) << ADS1282_BLOCK_LOG2));
 }
 
+/* An input could leave its range. */
+static bool may_exceed(const struct ads1282 *a, struct looks_range vin_v)
+{
+    const struct ads1282_range range = ads1282_input_range(a);
+    const double half_v = 0.5 * (fabs(vin_v.mid) + vin_v.off), middle_v = a->cfg.common_mode_v;
+    return middle_v != 0.0 && !(middle_v - half_v >= range.min_v && middle_v + half_v <= range.max_v);
+}
+
 const char *ads1282_why_eager(const struct ads1282 *a, struct looks_range vin_v)
 {
     if (!a->delivers || a->special || !ads1282_chain_forgets(a)) return "a converter's filter has no finite memory";
@@ -27,6 +35,7 @@ const char *ads1282_why_eager(const struct ads1282 *a, struct looks_range vin_v)
     if (reg_peek24(&a->regs, ADS1282_OFC0) != 0 || reg_peek24(&a->regs, ADS1282_FSC0) != 0x400000)
         return "OFC or FSC of a converter are not the defaults";
     if (may_clip(a, vin_v)) return "a code may reach its limit";
+    if (may_exceed(a, vin_v)) return "an input of a converter may leave its common-mode range";
     return NULL;
 }
 

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench.conform.probes import PortProbe
-from psabench.emulator import Emulator, find_emulator
+from psabench.emulator import Emulator
 from psabench.errors import ControlError
 from psabench.link.control import Control
 from psabench.link.lineport import LineDecoder
 from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd, read_vcd
+from psabench.places import find_emulator
 
 PAIRS = ("Int", "Data", "CLK")
 SETUP_S, RUN_S = 0.2, 0.02
@@ -71,8 +72,11 @@ def test_without_wires_in_the_recording_delays_are_the_same(tmp_path: Path) -> N
 
 def test_the_line_port_has_b_in_bits_3_to_5(tmp_path: Path) -> None:
     port = PortProbe(tmp_path / "line", "psa2")
-    options = ["--quiet", "--line", port.path, "--pairs"]
-    with Emulator(scenario(tmp_path), cans=["none"], extra=options) as emu, Control(emu.control_path) as control:
+    options: list[str | Path] = ["--quiet", "--line", port.path, "--pairs"]
+    with (
+        Emulator(scenario(tmp_path), cans=["none"], extra=options) as emu,
+        Control(emu.directory / "control") as control,
+    ):
         control.call("run", for_s=SETUP_S)
         port.start()
         control.call("run", for_s=RUN_S)
@@ -87,7 +91,7 @@ def test_the_line_port_has_b_in_bits_3_to_5(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["line.open", "line.swapped"])
 def test_wires_go_on_at_the_drivers(kind: str, tmp_path: Path) -> None:
     out = tmp_path / "fault.vcd"
-    with Emulator(scenario(tmp_path), cans=["none"]) as emu, Control(emu.control_path) as control:
+    with Emulator(scenario(tmp_path), cans=["none"]) as emu, Control(emu.directory / "control") as control:
         control.call("run", for_s=SETUP_S)
         control.call("vcd.start", path=str(out), pairs=True)
         for name in PAIRS:
@@ -108,7 +112,7 @@ def test_wires_go_on_at_the_drivers(kind: str, tmp_path: Path) -> None:
 def test_a_line_without_a_pair_cannot_be_open(tmp_path: Path) -> None:
     with (
         Emulator(scenario(tmp_path), cans=["none"]) as emu,
-        Control(emu.control_path) as control,
+        Control(emu.directory / "control") as control,
         pytest.raises(ControlError, match=r"line\.open: a\.line\.SClk is no differential pair"),
     ):
         control.call("fault.add", kind="line.open", point="a.line.SClk")

@@ -161,7 +161,8 @@ static void texts_that_are_no_values_leave_the_profile_alone(void **state)
         {"colour", 0, "red",
          "colour: unknown key; expected one of name, fclk_hz, temp_clkin_hz, sclk_hz, line_hz, line_div, word_bits, "
          "lead_in_clk, word, code_bits, line_delay_ns, line_skew_ns, read_bits, gate_sclk, temp_channels, "
-         "adc_is_1281, adc_vref_v, adc_pga, temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
+         "adc_is_1281, adc_vref_v, common_mode_v, adc_avss_v, adc_avdd_v, uref_ppm_per_pct, uref_dropout_ratio, "
+         "adc_pga, temp_vref_v, temp_sensor_a_per_k, temp_load_ohm, setup"},
         {"fclk_hz", 0, "4100001", "fclk_hz: expected an integer from 1000000 to 4100000, got \"4100001\""},
         {"word_bits", 0, "thirty", "word_bits: expected an integer from 16 to 32, got \"thirty\""},
         {"word_bits", 0, "-24", "word_bits: expected an integer from 16 to 32, got \"-24\""},
