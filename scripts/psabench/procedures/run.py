@@ -72,8 +72,8 @@ def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section], N
     sections = [
         measure_section(PROCEDURES[n], c, options, progress) for c in _conditions(options) for n in options.procedures
     ]
-    nominal = passport or _nominal(options, sections[0].result.axis)
-    return report.write(options.out, sections, _facts(options), nominal), sections, nominal
+    nominal = passport or nominal_of(options, sections[0].result.axis)
+    return report.write(options.out, sections, facts_of(options), nominal), sections, nominal
 
 
 def _conditions(options: RunOptions) -> list[Condition]:
@@ -86,31 +86,56 @@ def _conditions(options: RunOptions) -> list[Condition]:
 def measure_section(procedure: Procedure, condition: Condition, options: RunOptions, progress: Progress) -> Section:
     """One procedure on one bench, with its budget; stores the readings and the resolved scenario. Raises BenchError."""
     params = made_params(procedure.params, procedure.name, options.params or {})
-    accuracy = _accuracy(EXACT if condition.exact else {}, options)
+    accuracy = accuracy_of(EXACT if condition.exact else {}, options)
     average = condition.average if options.average is None else options.average
     g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
     with ExitStack() as stack:
-        bench = stack.enter_context(_bench(condition, options))
+        bench = stack.enter_context(open_bench(condition, options))
         wired = WireBench(bench.unit, bench.head, average=average, g_mps2=g_mps2)
         on_head: HeadBench = wired
         if options.record:
             setup = {"procedure": procedure.name, "condition": condition.label, "average": average, "g_mps2": g_mps2}
-            setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "facts": _facts(options)}
+            setup |= {"node": bench.unit.node.node_id, "filter_gain": wired.filter_gain, "facts": facts_of(options)}
             setup |= {"accuracy": asdict(accuracy)}
-            setup |= {"nominal": nominal_dict(_nominal(options, params.axis))}
+            setup |= {"nominal": nominal_dict(nominal_of(options, params.axis))}
             on_head = stack.enter_context(HeadRecorder(wired, bench.host, options.record, setup))
-        recorder = stack.enter_context(CsvRecorder(options.out / f"{stem}.csv"))
-        zero = ZeroWatch(recorder, lambda: wired.t_s, lambda: _zero_moved_v(bench, params.axis))
+        m = Measurement(
+            procedure=procedure,
+            params=params,
+            accuracy=accuracy,
+            average=average,
+            label=condition.label,
+            csv=options.out / f"{stem}.csv",
+        )
+        return measure_on(bench, on_head, m, progress)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurement:
+    """What is measured on a bench that is there."""
+
+    procedure: Procedure
+    params: Any
+    accuracy: BenchAccuracy
+    average: int  # samples in a reading, 0: whole words
+    label: str
+    csv: Path
+
+
+def measure_on(bench: Bench, head: HeadBench, m: Measurement, progress: Progress) -> Section:
+    """A procedure on an open bench, with its budget; stores the readings. Raises BenchError."""
+    with CsvRecorder(m.csv) as recorder:
+        zero = ZeroWatch(recorder, lambda: bench.time_s, lambda: _zero_moved_v(bench, m.params.axis))
         watched = zero if bench.truth_path else recorder
-        result = procedure.run(on_head, params, Watch(progress=progress, record=watched))
-        truth = _axis_truth(bench.truth(), params.axis) if bench.truth_path else None
+        result = m.procedure.run(head, m.params, Watch(progress=progress, record=watched))
+    truth = _axis_truth(bench.truth(), m.params.axis) if bench.truth_path else None
     moved_v = zero.moved_v(result.readings) if truth else ()
-    result = expand_result(result, procedure, params, accuracy, _step_v(average))
-    return Section(label=condition.label, result=result, truth=truth, zero_moved_v=moved_v)
+    result = expand_result(result, m.procedure, m.params, m.accuracy, _step_v(m.average))
+    return Section(label=m.label, result=result, truth=truth, zero_moved_v=moved_v)
 
 
-def _accuracy(known: Mapping[str, float], options: RunOptions) -> BenchAccuracy:
+def accuracy_of(known: Mapping[str, float], options: RunOptions) -> BenchAccuracy:
     """What the user gave, else what is known of this bench, else the figures of our chain and head."""
     given = {**known, **fields_of(BenchAccuracy, options.params or {})}
     return made_params(BenchAccuracy, "accuracy of the bench", given)
@@ -137,7 +162,7 @@ def _replay_run(
     params = made_params(procedure.params, name, options.params or {})
     with CsvRecorder(options.out / f"{'-'.join(x for x in (name, label) if x)}.csv") as recorder:
         result = procedure.run(head, params, Watch(progress=progress, record=recorder))
-    accuracy = _accuracy(dict(head.setup.get("accuracy", {})), options)
+    accuracy = accuracy_of(dict(head.setup.get("accuracy", {})), options)
     result = expand_result(result, procedure, params, accuracy, _step_v(int(head.setup["average"])))
     section = Section(label=label, result=result, truth=None)
     facts = {str(k): str(v) for k, v in head.setup["facts"].items()}
@@ -150,7 +175,7 @@ def _there(options: RunOptions) -> bool:
     return bool(options.can or options.head or options.control)
 
 
-def _bench(condition: Condition, options: RunOptions) -> Bench:
+def open_bench(condition: Condition, options: RunOptions) -> Bench:
     if _there(options):
         if not options.head and not options.control:
             raise BadInput(expected(f"the VISA address of the dividing head, as {EXAMPLES}", "none", "--head"))
@@ -167,7 +192,7 @@ def _resolved(condition: Condition, options: RunOptions) -> Path:
     return options.out / ("-".join(x for x in ("scenario", condition.label) if x) + ".json")
 
 
-def _nominal(options: RunOptions, axis: str) -> Nominal | None:
+def nominal_of(options: RunOptions, axis: str) -> Nominal | None:
     """What the scenario says of the sensor, once its bench has been there; None: the bench is not ours."""
     if _there(options):
         return None
@@ -186,7 +211,7 @@ def _zero_moved_v(bench: Bench, axis: str) -> float:
     return float(bench.truth_state()["unit"]["zero_moved_v"]["xyz".index(axis)])
 
 
-def _facts(options: RunOptions) -> dict[str, str]:
+def facts_of(options: RunOptions) -> dict[str, str]:
     """For the head of the page, once the benches have been there."""
     there = " ".join(str(x) for x in (options.can, options.head, options.control) if x)
     where = there or str(options.scenario or ", ".join(CONDITIONS[c].scenario for c in options.conditions))

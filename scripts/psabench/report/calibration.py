@@ -36,31 +36,41 @@ FORMAT = 1  # of result.json
 
 
 def write(
-    folder: Path, sections: Sequence[Section], facts: Mapping[str, str] | None = None, nominal: Nominal | None = None
+    folder: Path,
+    sections: Sequence[Section],
+    facts: Mapping[str, str] | None = None,
+    nominal: Nominal | None = None,
+    *,
+    more: str = "",
+    data: Mapping[str, object] | None = None,
 ) -> Path:
     """Write report.html and result.json into `folder` (made when missing), each whole or not at all.
 
     Returns the page. `facts` (seed, profile, version...) go into both as they are; nominal: what the sensor is said to
-    be. Raises ValueError for no section,
+    be. more: a section after the verdict; data: what of it goes into result.json. Raises ValueError for no section,
     OSError and OutputError from the disk.
     """
     if not sections:
         raise ValueError(expected("at least one section", "none", "report"))
     facts = facts or {}
-    data = {
+    whole = {
         "format": FORMAT,
         "facts": dict(facts),
         "within_limits": within_limits(sections),
         "nominal": nominal_dict(nominal),
         "sections": [result_dict(s) for s in sections],
+        **(data or {}),
     }
-    return write_report(folder, data, html_page(sections, facts, nominal))
+    return write_report(folder, whole, html_page(sections, facts, nominal, more))
 
 
-def html_page(sections: Sequence[Section], facts: Mapping[str, str], nominal: Nominal | None = None) -> str:
+def html_page(
+    sections: Sequence[Section], facts: Mapping[str, str], nominal: Nominal | None = None, more: str = ""
+) -> str:
     """The whole page. Same input, same bytes."""
     body = [
         _verdict(sections),
+        *([more] if more else []),
         nominal_section(sections, nominal),
         _alpha0(sections, nominal),
         *(_section(s, f"f{i}") for i, s in enumerate(sections)),

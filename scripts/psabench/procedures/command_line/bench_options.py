@@ -111,6 +111,11 @@ CONVERTERS_ALONE: Mapping[str, Mapping[str, Any]] = {
     "--chamber": {"action": "store_true", "help": "compare them at temperatures of a chamber: drift of zero and scale"},
 }
 
+# Of the calibrations on the head, one at a time.
+IN_A_CLIMATE: Mapping[str, Mapping[str, Any]] = {
+    "--climate": {"action": "store_true", "help": "repeat it at temperatures of a chamber, with the scenario climate"},
+}
+
 # Of flights alone.
 IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
     "--store": {"type": Path, "default": STORE, "metavar": "FILE", "help": "store of passports (%(default)s)"},

@@ -10,7 +10,13 @@ from typing import Any
 
 from psabench.options import KEPT
 from psabench.procedures.command_line import handlers
-from psabench.procedures.command_line.bench_options import COMMON, CONVERTERS_ALONE, FROM_OUTPUTS, ON_THE_TABLE
+from psabench.procedures.command_line.bench_options import (
+    COMMON,
+    CONVERTERS_ALONE,
+    FROM_OUTPUTS,
+    IN_A_CLIMATE,
+    ON_THE_TABLE,
+)
 from psabench.procedures.command_line.offered import (
     ALL,
     COMPARE,
@@ -104,6 +110,7 @@ _FLIGHT = ("--scenario", "--can", "--control", "--receiver", "--data", "--seed",
 _EXAMPLES: Mapping[str, str] = {
     "turns": """\
   psabench run turns
+  psabench run turns --climate      at -40 to 85 degC in a chamber, on an emulator started for it
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
 """,
     "fourier": """\
@@ -253,7 +260,8 @@ def _on_the_head() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
         load = _of_all if name == ALL else partial(_of_the_head, name)
-        how = {"common": _HEAD, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
+        own = {} if name == ALL else IN_A_CLIMATE
+        how = {"common": _HEAD, "own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
         yield _command((name, summary), handlers.run_on_head, **how)
 
 

@@ -20,6 +20,7 @@ from psabench.progress import Bar
 if TYPE_CHECKING:
     from psabench.estimate.uncertainty import Estimate
     from psabench.procedures.head_bench import Progress
+    from psabench.procedures.run import RunOptions
 
 
 def _params(args: argparse.Namespace) -> dict[str, Any]:
@@ -42,6 +43,8 @@ def run_on_head(args: argparse.Namespace) -> int:
         g_mps2=args.gravity,
         params=_params(args),
     )
+    if args.procedure != ALL and args.climate:
+        return _run_in_climate(args, options)
     with progress_of(args) as followers:
         page, sections, nominal = run.run(options, followers.progress)
         for s in sections:
@@ -53,6 +56,23 @@ def run_on_head(args: argparse.Namespace) -> int:
     print(grading.verdict(sections))
     print(f"report: {page}")
     return 0 if report.within_limits(sections) else 1
+
+
+def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
+    from psabench.climate import sensors
+    from psabench.report import grading
+
+    with progress_of(args) as followers:
+        r = sensors.run_climate(options, followers.progress)
+        for s in r.sections:
+            followers.result(s.result.procedure, s.label, s.result.estimates, grading.within_limits([s]))
+    if args.verbose:
+        print("\n".join(grading.console_table(s) for s in r.sections))
+    print(sensors.console_table(r))
+    print(grading.verdict(r.sections))
+    print(sensors.verdict(r))
+    print(f"report: {r.page}")
+    return 0 if r.within else 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
