@@ -25,7 +25,8 @@ NEWTON_ROUNDS = 4
 MEANS = ((1, 150), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times
 KNOWN_SD = 2.0  # a power below so many of its sd may be none
 FOLLOWS = 0.5  # of the variance of the readings is the rate's, at the least
-OUTLIER_SD = 5.0  # a dwell that is farther from the others' prediction is a doubt
+STILL_P = 1e-7  # a dwell that is so quiet by chance is none
+OUTLIER_SD = 4.5  # a dwell that is farther from the others' prediction is a doubt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,7 +118,7 @@ def estimate_gyro(dwells: Sequence[Dwell], p: MemsGyroParams) -> MemsGyroResult:
         allan_dps=allan,
         dwells=tuple(dwells),
         residual_v=residual[o.dwell >= 0],
-        doubts=tuple(_doubts(o, theta, inverse, residual, dwells)),
+        doubts=tuple(_doubts(o, theta, inverse, residual, dwells, float(noise.v[0]))),
     )
 
 
@@ -256,7 +257,7 @@ def _noise_estimates(noise: NoiseFit, scale_v_per_dps: float) -> Iterator[Estima
 
 
 def _doubts(
-    o: _Observations, theta: Floats, inverse: Floats, residual: Floats, dwells: Sequence[Dwell]
+    o: _Observations, theta: Floats, inverse: Floats, residual: Floats, dwells: Sequence[Dwell], white: float
 ) -> Iterator[str]:
     """Dwells that the others do not predict; outputs that stand still."""
     j = model.jacobian(theta, o.rows)
@@ -268,8 +269,17 @@ def _doubts(
         d = series[o.dwell[k]]
         yield f"{_where(d)}: {z[k]:+.1f} standard deviations from what the other dwells say"
     for d in series:
-        if len(d.blocks_v) > 1 and float(np.ptp(d.blocks_v)) == 0.0:
-            yield f"{_where(d)}: the output does not move: at a limit, or stuck"
+        if _too_still(d, white):
+            yield f"{_where(d)}: the output has no noise: at a limit, or stuck"
+
+
+def _too_still(d: Dwell, white: float) -> bool:
+    """Against the white noise of the gyro."""
+    from scipy.special import gammainc  # slow to import
+
+    n = len(d.blocks_v)
+    squares = float(np.sum((d.blocks_v - d.u_v) ** 2)) * d.duration_s / n / white
+    return bool(gammainc((n - 1) / 2.0, squares / 2.0) < STILL_P)
 
 
 def _where(d: Dwell) -> str:
