@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw docs/img/heading_modes.svg, the picture of docs/procedures/heading_modes.md, as `psabench campaign heading-modes` does."""
+"""Draw docs/img/heading_modes.svg for docs/procedures/heading_modes.md, as `psabench campaign heading-modes` does."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ RUNS, SEED = 200, 1
 def main() -> None:
     p = ModeParams()
     errors = {name: errors_deg(row, p, SEED, RUNS) for name, row in ROWS.items()}
-    drawn = page.picture({name: (page.hours(p, e.shape[1]), e) for name, e in errors.items()}, "heading_modes")
+    drawn = page.draw_picture(
+        {name: (page.look_hours(p, e.shape[1]), e) for name, e in errors.items()}, "heading_modes"
+    )
     (ROOT / "docs/img/heading_modes.svg").write_text(plots.standalone(drawn), encoding="utf-8")
 
 
