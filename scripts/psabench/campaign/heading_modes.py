@@ -47,7 +47,7 @@ class Instruments:
     seeds: Floats  # (n,) of what each draws in its flight
 
 
-def instruments(seed: int, first_run: int, runs: int) -> Instruments:
+def draw_instruments(seed: int, first_run: int, runs: int) -> Instruments:
     """Those of these runs, the same each time."""
     drawn = []
     for run in range(first_run, first_run + runs):
@@ -118,12 +118,12 @@ ROWS: Mapping[str, Row] = {
 
 def errors_deg(row: Row, p: ModeParams, seed: int, runs: int, first_run: int = 0) -> Floats:
     """Heading shown less the true one, (runs, looks), deg."""
-    drawn = instruments(seed, first_run, runs)
+    drawn = draw_instruments(seed, first_run, runs)
     if row.mode == SELF_ORIENTING:
         return _self_orienting(row, p, drawn, seed, first_run)
     start = _aligned_rad(p, drawn)
     gyro = start[:, np.newaxis] + _by_panel(row, p, drawn)
-    return np.degrees(gyro if row.mode == HALF_COMPASS else _slaved(p, drawn, gyro))
+    return np.degrees(gyro if row.mode == HALF_COMPASS else _slaved_rad(p, drawn, gyro))
 
 
 # ---- the gyroscope
@@ -141,7 +141,7 @@ def _random_drift(row: Row, p: ModeParams, drawn: Instruments, before_s: float) 
     return np.asarray(row.gm_sigma_degph * DEGPH * found)
 
 
-def _integral(x: Floats) -> Floats:
+def _integrate_grid(x: Floats) -> Floats:
     """From the first grid point on, by trapezoids."""
     steps = 0.5 * GRID_S * (x[..., 1:] + x[..., :-1])
     return np.concatenate([np.zeros_like(x[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
@@ -164,7 +164,7 @@ def _flight_rate(p: ModeParams, alpha_rad: float, *, knows_speed: bool) -> Float
     t_s = _grid_s(p)
     phi = np.radians(p.latitudes_deg(t_s))
     we, wz = EARTH_RADPS * np.cos(phi), EARTH_RADPS * np.sin(phi)
-    east, north = _apparent(p, t_s)
+    east, north = _apparent_vertical(p, t_s)
     sin_a, cos_a = math.sin(alpha_rad), math.cos(alpha_rad)
     transport = -np.minimum(p.accel_mps2 * t_s, p.speed_mps) / EARTH_RADIUS_M  # about the east
     along = LEVEL_RAD - east * sin_a + north * cos_a
@@ -173,7 +173,7 @@ def _flight_rate(p: ModeParams, alpha_rad: float, *, knows_speed: bool) -> Float
     return np.asarray(believed - along * (we * cos_a - transport * sin_a) + 0.5 * wz * (along**2 - across**2))
 
 
-def _apparent(p: ModeParams, t_s: Floats) -> tuple[Floats, Floats]:
+def _apparent_vertical(p: ModeParams, t_s: Floats) -> tuple[Floats, Floats]:
     """Where the apparent vertical leans in flight, to the east and to the north, rad: Coriolis and the take-off."""
     wz = EARTH_RADPS * np.sin(np.radians(p.latitudes_deg(t_s)))
     east = -2.0 * wz * np.minimum(p.accel_mps2 * t_s, p.speed_mps) / G_MPS2
@@ -190,7 +190,7 @@ def _by_panel(row: Row, p: ModeParams, drawn: Instruments) -> Floats:
     asked = (panel + p.drift2_degph * DEGPH) * (1.0 + TORQUER_SCALE)
     rate = asked - wz + _flight_rate(p, math.radians(ALPHA0_DEG), knows_speed=False)
     drift = drawn.drift2_degph[:, np.newaxis] * DEGPH + _random_drift(row, p, drawn, 0.0)
-    return _levelled_rad() + _at_looks(p, _integral(rate[np.newaxis, :] - drift))
+    return _levelled_rad() + _at_looks(p, _integrate_grid(rate[np.newaxis, :] - drift))
 
 
 def _levelled_rad() -> float:
@@ -204,7 +204,7 @@ def _self_orienting(row: Row, p: ModeParams, drawn: Instruments, seed: int, firs
     """e' = mean of the drift in the windows - drift now, and what tilts and the torquer's scale change since then."""
     before_s = GRID_S * math.ceil(-row.windows_s[0][0] / GRID_S)
     drift = _random_drift(row, p, drawn, before_s)
-    turned = _integral(drift)
+    turned = _integrate_grid(drift)
     at_s = np.arange(drift.shape[1]) * GRID_S - before_s
     length_s = sum(length for _, length in row.windows_s)
     seen = np.stack(
@@ -221,7 +221,7 @@ def _self_orienting(row: Row, p: ModeParams, drawn: Instruments, seed: int, firs
     known = level + TORQUER_SCALE * (wz - wz[0]) + _flight_rate(p, float(alpha[-1]), knows_speed=True)
     flight = drift[:, round(before_s / GRID_S) :]
     start = compass_rad(row, seed, first_run, len(flight))[:, np.newaxis]
-    return np.degrees(start + _at_looks(p, _integral(known + seen[:, np.newaxis] - flight)))
+    return np.degrees(start + _at_looks(p, _integrate_grid(known + seen[:, np.newaxis] - flight)))
 
 
 def compass_rad(row: Row, seed: int, first_run: int, runs: int) -> Floats:
@@ -239,14 +239,14 @@ def _sensor_deg(p: ModeParams, t_s: Floats) -> Floats:
     north_deg = p.latitudes_deg(t_s) - p.latitude_deg
     d = np.radians(p.declination_deg + p.declination_slope * north_deg)
     tan_dip = np.tan(np.radians(DIP_DEG + DIP_SLOPE * north_deg))
-    east, north = _apparent(p, t_s)
+    east, north = _apparent_vertical(p, t_s)
     z = np.stack([east, np.tan(north), np.ones_like(east)])
     z /= np.linalg.norm(z, axis=0)
     y = np.array([[0.0], [1.0], [0.0]]) - z[1] * z
     y /= np.linalg.norm(y, axis=0)
     b = np.stack([np.sin(d), np.cos(d), -tan_dip])
     x = np.cross(y, z, axis=0)
-    return np.degrees(np.arctan2(-(b * x).sum(axis=0), (b * y).sum(axis=0)))
+    return np.asarray(np.degrees(np.arctan2(-(b * x).sum(axis=0), (b * y).sum(axis=0))))
 
 
 def _deviation_deg(drawn: Instruments, shown_deg: Floats) -> Floats:
@@ -268,8 +268,8 @@ def _aligned_rad(p: ModeParams, drawn: Instruments) -> Floats:
     return np.asarray(_by_sensor(p, drawn, np.zeros(1), noise[:, np.newaxis])[:, 0])
 
 
-def _slaved(p: ModeParams, drawn: Instruments, gyro_rad: Floats) -> Floats:
-    """The law of the host's `slaved`, for all runs at once."""
+def _slaved_rad(p: ModeParams, drawn: Instruments, gyro_rad: Floats) -> Floats:
+    """The law of the host's `slaved_rad`, for all runs at once."""
     t_s = p.looks_s
     noise = np.array([np.random.default_rng([int(s), 3]).standard_normal(len(t_s)) for s in drawn.seeds])
     by_sensor = _by_sensor(p, drawn, t_s, noise)

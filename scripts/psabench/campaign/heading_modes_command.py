@@ -52,21 +52,21 @@ def _run_command(args: argparse.Namespace) -> int:
     from psabench.procedures.heading_modes import ModeParams
     from psabench.report import provenance
 
-    _check(args)
+    _check_limits(args)
     facts = {"runs": args.runs, "seed": args.seed, "hours": args.hours, "chain": args.chain}
     provenance.note_digest(page.NAME, args.seed, facts)
     p = ModeParams(hours=args.hours)
-    fly = _emulated(args) if args.chain == "emulated" else _algebra(args)
+    fly = _emulated_flight(args) if args.chain == "emulated" else _algebra_flight(args)
     errors = {name: fly(name, p) for name in ROWS}
-    timed = {name: (page.hours(p, e.shape[1]), e) for name, e in errors.items()}
-    found = {name: page.summary(e, args.seed) for name, e in errors.items()}
+    timed = {name: (page.look_hours(p, e.shape[1]), e) for name, e in errors.items()}
+    found = {name: page.summary_of(e, args.seed) for name, e in errors.items()}
     report = page.write_page(args.out, timed, found, facts)
     print("\n".join(page.console_lines(found)))
     print(f"report: {report}")
     return 0
 
 
-def _check(args: argparse.Namespace) -> None:
+def _check_limits(args: argparse.Namespace) -> None:
     limits = (
         ("--runs", args.runs, 1, MOST_RUNS),
         ("--seed", args.seed, 0, MOST_SEED),
@@ -80,17 +80,17 @@ def _check(args: argparse.Namespace) -> None:
 Flight = Callable[[str, "ModeParams"], "Floats"]  # of a row's name and the flight: (runs, looks), deg
 
 
-def _algebra(args: argparse.Namespace) -> Flight:
+def _algebra_flight(args: argparse.Namespace) -> Flight:
     from psabench.campaign.heading_modes import ROWS, errors_deg
 
     return lambda name, p: errors_deg(ROWS[name], p, args.seed, args.runs)
 
 
-def _emulated(args: argparse.Namespace) -> Flight:
+def _emulated_flight(args: argparse.Namespace) -> Flight:
     import numpy as np
 
     from psabench.campaign.heading_modes import ROWS
-    from psabench.campaign.heading_modes_emulated import trip
+    from psabench.campaign.heading_modes_emulated import fly_run
     from psabench.progress import Bar
 
     bar = Bar()
@@ -99,7 +99,7 @@ def _emulated(args: argparse.Namespace) -> Flight:
         with bar.step(name, args.runs) as done:
             rows = []
             for run in range(args.runs):
-                rows.append(trip(ROWS[name], p, args.seed, run).error_deg)
+                rows.append(fly_run(ROWS[name], p, args.seed, run).error_deg)
                 done()
         return np.array(rows)
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from psabench.bench import Bench
 from psabench.campaign.emulated import resolved
-from psabench.campaign.heading_modes import Row, instruments
+from psabench.campaign.heading_modes import Row, draw_instruments
 from psabench.places import proto_file
 from psabench.procedures.gyrocompass_params import GyrocompassParams, params_of
-from psabench.procedures.heading_modes import Flown, ModeParams, fly
+from psabench.procedures.heading_modes import Flown, ModeParams, fly_mode
 from psabench.procedures.platform_bench import Floats
 from psabench.procedures.wire_platform import WirePlatform
 
@@ -32,9 +32,9 @@ class Trip:
     error_deg: Floats
 
 
-def scenario(row: Row, seed: int, run: int) -> Scenario:
+def run_scenario(row: Row, seed: int, run: int) -> Scenario:
     """The shipped scenario with what is drawn of that instrument."""
-    drawn = instruments(seed, run, 1)
+    drawn = draw_instruments(seed, run, 1)
     found: Scenario = json.loads(resolved(str(proto_file(SCENARIO))))
     found["seed"] = int(drawn.seeds[0])
     found["platform"]["drift_degph"][1] = float(drawn.drift2_degph[0])
@@ -49,16 +49,16 @@ def compass_params(row: Row, p: ModeParams) -> GyrocompassParams:
     return params_of(reading, {"latitude_deg": p.latitude_deg})
 
 
-def trip(row: Row, p: ModeParams, seed: int, run: int, bench: Scenario | None = None) -> Trip:
+def fly_run(row: Row, p: ModeParams, seed: int, run: int, bench: Scenario | None = None) -> Trip:
     """Run `run` of a row. bench: another scenario in place of the run's own."""
     with tempfile.TemporaryDirectory(prefix="psabench-") as folder:
         path = Path(folder) / "run.yaml"
-        path.write_text(json.dumps(bench or scenario(row, seed, run)), encoding="utf-8")  # YAML, too
+        path.write_text(json.dumps(bench or run_scenario(row, seed, run)), encoding="utf-8")  # YAML, too
         with Bench.start(path) as b:
-            return _flown(b, row, p)
+            return _fly_bench(b, row, p)
 
 
-def _flown(b: Bench, row: Row, p: ModeParams) -> Trip:
+def _fly_bench(b: Bench, row: Row, p: ModeParams) -> Trip:
     true_deg: list[float] = []
 
     def depart() -> None:
@@ -70,6 +70,6 @@ def _flown(b: Bench, row: Row, p: ModeParams) -> Trip:
     def watch() -> None:
         true_deg.append(float(b.truth_state()["vehicle"]["heading_deg"]))
 
-    flown = fly(WirePlatform(b), row.mode, p, compass_params(row, p), depart=depart, watch=watch)
+    flown = fly_mode(WirePlatform(b), row.mode, p, compass_params(row, p), depart=depart, watch=watch)
     off_deg = np.degrees(flown.heading_rad) - np.array(true_deg)
     return Trip(flown=flown, error_deg=(off_deg + 180.0) % 360.0 - 180.0)

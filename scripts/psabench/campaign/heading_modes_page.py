@@ -55,7 +55,7 @@ class Summary:
     within_abstract: Figure
 
 
-def share(good: int, n: int) -> Figure:
+def share_figure(good: int, n: int) -> Figure:
     """Wilson's interval."""
     p, z2 = good / n, Z * Z
     centre, half = p + z2 / (2 * n), Z * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
@@ -63,7 +63,7 @@ def share(good: int, n: int) -> Figure:
     return Figure(value=p, low=max(0.0, low), high=min(1.0, high))
 
 
-def summary(error_deg: Floats, seed: int) -> Summary:
+def summary_of(error_deg: Floats, seed: int) -> Summary:
     """error_deg: (runs, looks)."""
     n = len(error_deg)
     pick = np.random.default_rng([seed, n]).integers(n, size=(RESAMPLES, n))
@@ -78,8 +78,8 @@ def summary(error_deg: Floats, seed: int) -> Summary:
         start_rms_deg=rms(start),
         end_rms_deg=rms(end),
         end_p95_deg=Figure(value=float(np.percentile(end, 95.0)), low=float(low), high=float(high)),
-        within=share(int((largest <= CLAIM_DEG).sum()), n),
-        within_abstract=share(int((largest <= ABSTRACT_DEG).sum()), n),
+        within=share_figure(int((largest <= CLAIM_DEG).sum()), n),
+        within_abstract=share_figure(int((largest <= ABSTRACT_DEG).sum()), n),
     )
 
 
@@ -105,7 +105,7 @@ def console_lines(found: Mapping[str, Summary]) -> list[str]:
     return aligned(table_rows(found))
 
 
-def picture(errors: Mapping[str, tuple[Floats, Floats]], name: str = NAME) -> str:
+def draw_picture(errors: Mapping[str, tuple[Floats, Floats]], name: str = NAME) -> str:
     """rms of each row against time; errors: instants, h, and (runs, looks) deg."""
     with plots.drawing(3.4) as (drawn, ax):
         for (label, (t_h, e)), colour in zip(errors.items(), plots.SERIES, strict=False):
@@ -153,12 +153,12 @@ def write_page(
     sections = (
         section("Modes", table([["", "what it is"], *([n, ROWS[n].title] for n in found)])),
         section("Errors of the heading", table(table_rows(found))),
-        section("Against time", figure(picture(errors))),
+        section("Against time", figure(draw_picture(errors))),
         section("How to read it", bullets(notes)),
     )
     page = whole_page("Modes of the heading indicator", {k: str(v) for k, v in facts.items()}, sections)
     return write_report(out, result_dict(found, facts), page)
 
 
-def hours(p: ModeParams, looks: int) -> Floats:
+def look_hours(p: ModeParams, looks: int) -> Floats:
     return np.linspace(0.0, p.hours, looks)

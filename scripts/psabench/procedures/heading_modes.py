@@ -65,7 +65,7 @@ class ModeParams:
     @property
     def looks_s(self) -> Floats:
         """Instants of the readings since the flight began, the first at its beginning."""
-        return np.arange(round(self.hours * 3600.0 / self.look_s) + 1) * self.look_s
+        return np.asarray(np.arange(round(self.hours * 3600.0 / self.look_s) + 1) * self.look_s, dtype=np.float64)
 
     @property
     def farthest_deg(self) -> float:
@@ -119,14 +119,14 @@ class Flown:
     doubts: tuple[str, ...] = ()
 
 
-def slaved(correction_rad: float, error_rad: float, p: ModeParams, dt_s: float) -> float:
+def slaved_rad(correction_rad: float, error_rad: float, p: ModeParams, dt_s: float) -> float:
     """The correction of the gyroscope's heading after dt_s, with the error of the heading that was shown."""
     limit_rad = math.radians(p.slave_limit_dpm) / 60.0 * dt_s
     step_rad = error_rad * -math.expm1(-dt_s / p.slave_s)
     return correction_rad + max(-limit_rad, min(limit_rad, step_rad))
 
 
-def fly(
+def fly_mode(
     bench: ModeBench,
     mode: str,
     p: ModeParams,
@@ -168,7 +168,7 @@ def _self_orienting(
     )
 
 
-def align(bench: ModeBench, p: ModeParams) -> float:
+def align_heading(bench: ModeBench, p: ModeParams) -> float:
     """Heading by the induction sensor and the setter: the mean direction over the averaging time, rad."""
     east = north = 0.0
     for _ in range(max(1, round(p.align_s / ALIGN_LOOK_S))):
@@ -184,7 +184,7 @@ def _by_magnetic(
     """Of the vehicle's tilt the prototype knows nothing: alpha is the gimbal's angle less the heading."""
     bench.prepare(latitude_rad=math.radians(float(p.panel_deg(np.zeros(1))[0])), m1_per_s=1.0, m2_per_s=2.0)
     bench.level(LEVEL_S)
-    heading_rad = align(bench, p)
+    heading_rad = align_heading(bench, p)
     ready_s = bench.t_s
     azimuth_rad = wrapped(bench.encoder_rad() - heading_rad)
     drifts = {"drift1_radps": p.drift1_degph * DEGPH, "drift2_radps": p.drift2_degph * DEGPH}
@@ -196,7 +196,7 @@ def _by_magnetic(
         gyro_rad = nav.heading(azimuth_rad, bench.encoder_rad())
         if mode == MAGNETIC and t_s:
             error_rad = wrapped(_by_sensor(bench, p, float(t_s)) - gyro_rad - correction_rad)
-            correction_rad = slaved(correction_rad, error_rad, p, p.look_s)
+            correction_rad = slaved_rad(correction_rad, error_rad, p, p.look_s)
         shown.append(wrapped(gyro_rad + correction_rad))
         watch()
         panel_rad = math.radians(float(p.panel_deg(np.array([t_s]))[0]))

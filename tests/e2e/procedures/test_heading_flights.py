@@ -14,7 +14,7 @@ from psabench.bench import Bench
 from psabench.campaign import heading_modes as algebra
 from psabench.campaign.emulated import resolved
 from psabench.campaign.heading_modes import ROWS, errors_deg
-from psabench.campaign.heading_modes_emulated import Scenario, Trip, scenario, trip
+from psabench.campaign.heading_modes_emulated import Scenario, Trip, fly_run, run_scenario
 from psabench.errors import LinkError
 from psabench.native.nav import DEGPH
 from psabench.procedures import gyrocompass
@@ -34,10 +34,10 @@ EXACT = {"level_repeat_arcmin": 0.0, "angle_set_arcmin": 0.0, "angle_read_arcmin
 def without_chance(name: str, p: ModeParams, run: int) -> tuple[Trip, np.ndarray[Any, Any]]:
     """An emulated flight and the algebra's, of the same instrument, with all that is drawn in flight taken away."""
     row = replace(ROWS[name], gm_sigma_degph=0.0)
-    s: Scenario = scenario(row, 1, run)
+    s: Scenario = run_scenario(row, 1, run)
     s["platform"] |= EXACT
     s["magnetic"]["noise_ut"] = 0.0
-    flown = trip(row, p, 1, run, s)
+    flown = fly_run(row, p, 1, run, s)
     at = np.searchsorted(p.looks_s, flown.flown.t_s)
     return flown, errors_deg(row, p, 1, 1, run)[0][at]
 
@@ -66,7 +66,7 @@ def test_magnetic_modes_need_the_sensor() -> None:
     row = ROWS["magnetic"]
     s: Scenario = json.loads(resolved(str(ROOT / "proto/scenarios/gyrocompass.yaml")))
     with pytest.raises(LinkError, match="expected an induction sensor"):
-        trip(row, SHORT, 1, 0, s)
+        fly_run(row, SHORT, 1, 0, s)
 
 
 def compass(

@@ -13,8 +13,8 @@ from command_line import mistake_line
 from psabench import cli
 from psabench.campaign import heading_modes as modes
 from psabench.campaign import heading_modes_page as page
-from psabench.campaign.heading_modes import ROWS, errors_deg, instruments
-from psabench.procedures.heading_modes import ModeParams, slaved
+from psabench.campaign.heading_modes import ROWS, draw_instruments, errors_deg
+from psabench.procedures.heading_modes import ModeParams, slaved_rad
 
 FLIGHT = ModeParams()
 HOUR = ModeParams(hours=1.0)
@@ -41,9 +41,9 @@ def test_a_flight_that_cannot_be_is_rejected(wrong: dict[str, float]) -> None:
 
 def test_slaving_is_exponential_and_limited() -> None:
     """60 s of 300 s take off 1 - exp(-0.2) of a small error; 1.5 deg/min of a large one."""
-    assert slaved(0.1, 0.01, FLIGHT, 60.0) == pytest.approx(0.1 + 0.01 * (1.0 - math.exp(-0.2)))
-    assert slaved(0.0, 1.0, FLIGHT, 60.0) == pytest.approx(math.radians(1.5))
-    assert slaved(0.0, -1.0, FLIGHT, 60.0) == pytest.approx(-math.radians(1.5))
+    assert slaved_rad(0.1, 0.01, FLIGHT, 60.0) == pytest.approx(0.1 + 0.01 * (1.0 - math.exp(-0.2)))
+    assert slaved_rad(0.0, 1.0, FLIGHT, 60.0) == pytest.approx(math.radians(1.5))
+    assert slaved_rad(0.0, -1.0, FLIGHT, 60.0) == pytest.approx(-math.radians(1.5))
 
 
 def test_run_k_is_the_same_whatever_the_batch() -> None:
@@ -56,7 +56,7 @@ def test_run_k_is_the_same_whatever_the_batch() -> None:
 def test_a_drift_that_the_workshop_missed_turns_the_half_compass_by_its_time() -> None:
     """1 deg/h more than the passport says: 4 deg in 4 h, and as much less on the other side."""
     quiet = replace(ROWS["half-compass"], gm_sigma_degph=0.0)
-    drawn = instruments(1, 0, 1)
+    drawn = draw_instruments(1, 0, 1)
     start, end = errors_deg(quiet, FLIGHT, 1, 1)[0][[0, -1]]
     missed_degph = float(drawn.drift2_degph[0]) - 25.0
     exact = replace(FLIGHT, drift2_degph=float(drawn.drift2_degph[0]))
@@ -82,7 +82,7 @@ def test_the_magnetic_heading_errs_by_its_sensor_its_setter_and_the_dip() -> Non
     """In straight flight the slaved heading is that of the sensor: chart, deviation, division, tan dip by Coriolis."""
     row = replace(ROWS["magnetic"], gm_sigma_degph=0.0)
     p = replace(FLIGHT, setter_step_deg=0.0, fix_s=60.0)
-    drawn = instruments(3, 0, 50)
+    drawn = draw_instruments(3, 0, 50)
     e = errors_deg(row, p, 3, 50)[:, -60:].mean(axis=1)
     phi = math.radians(float(p.latitudes_deg(np.array([3.5 * 3600.0]))[0]))  # of the last hour
     dip = math.radians(66.0 + 0.6 * (math.degrees(phi) - 50.0))
@@ -107,7 +107,7 @@ def test_the_random_drift_has_its_spread_and_its_memory() -> None:
 
 def test_the_claim_holds_in_its_reading_and_not_in_the_literal_one() -> None:
     """The table of the page, at another seed."""
-    found = {name: page.summary(errors_deg(ROWS[name], FLIGHT, 7, 400), 7) for name in ROWS}
+    found = {name: page.summary_of(errors_deg(ROWS[name], FLIGHT, 7, 400), 7) for name in ROWS}
     assert found["claim"].within.value > 0.98
     assert 0.1 < found["literal"].within.value < 0.35
     assert found["literal"].end_rms_deg.value == pytest.approx(0.75, abs=0.1)
@@ -124,7 +124,7 @@ def test_the_claim_holds_in_its_reading_and_not_in_the_literal_one() -> None:
     ("good", "n", "low", "high"), [(0, 200, 0.0, 0.0188), (200, 200, 0.9812, 1.0), (5, 10, 0.2366, 0.7634)]
 )
 def test_the_interval_of_a_share_is_wilson_s(good: int, n: int, low: float, high: float) -> None:
-    f = page.share(good, n)
+    f = page.share_figure(good, n)
     assert (f.low, f.high) == pytest.approx((low, high), abs=1e-3)
 
 
@@ -132,7 +132,7 @@ def test_intervals_of_an_rms_hold_the_truth_in_most_batches() -> None:
     rng = np.random.default_rng(4)
     inside = 0
     for k in range(60):
-        s = page.summary(rng.standard_normal((200, 2)), k)
+        s = page.summary_of(rng.standard_normal((200, 2)), k)
         inside += s.end_rms_deg.low < 1.0 < s.end_rms_deg.high
     assert inside >= 51  # 95 % expected: fewer than 51 of 60 once in a thousand
 
