@@ -77,52 +77,62 @@ void afe_fault_remove(struct afe *a, struct afe_fault *f)
     if (*at) *at = f->next;
 }
 
-/* What the faults make of the chain at one instant. */
-struct faulty {
-    double signal;
-    double ripple_v;  /* before the pole */
-    double passed_v;  /* behind it, at the load's scale */
-    double reference; /* relative to what it should be */
-};
-
-static double sine(double turns)
-{
-    return det_sin(TWO_PI * (turns - floor(turns)));
-}
-
-/* A sine behind a pole that it exceeds `ratio` times, settled: the imaginary part of e^jx / (1 + j ratio). */
-static double passed_sine(double turns, double ratio)
-{
-    return (sine(turns) - ratio * sine(turns + 0.25)) / (1.0 + ratio * ratio);
-}
-
-static void apply_fault(const struct afe *a, const struct afe_fault *f, double for_s, struct faulty *out)
-{
-    const double limit = 2.0 * a->cfg.clip_v / a->scale.load, turns = f->frequency_hz * for_s;
-    if (f->kind == AFE_LOAD_OPEN) out->signal = out->signal < 0.0 ? -limit : limit;
-    else if (f->kind == AFE_LOAD_SHORT) out->signal = 0.0;
-    else if (f->kind == AFE_REFERENCE) out->reference *= 1.0 + f->value + f->rate_per_s * for_s;
-    else if (f->frequency_hz <= AFE_SLOW_HZ) out->ripple_v += f->value * sine(turns);
-    else
-        out->passed_v +=
-            f->value * passed_sine(turns, a->cfg.filter_hz > 0.0 ? f->frequency_hz / a->cfg.filter_hz : 0.0);
-}
-
-static struct faulty apply_faults(const struct afe *a, double signal, int64_t t_ns)
-{
-    struct faulty out = {.signal = signal, .reference = 1.0};
-    for (const struct afe_fault *f = a->faults; f; f = f->next) {
-        if (t_ns >= f->from_ns) apply_fault(a, f, (double)(t_ns - f->from_ns) / (double)NS_PER_S, &out);
-    }
-    return out;
-}
-
 /* ---- a row */
 
 /* Signal to volts behind the buffer. */
 static inline double loaded_v(const struct afe *a, double signal)
 {
     return clip_v(signal * a->scale.load + a->cfg.buffer_offset_v + a->scale.drift_v, a->cfg.clip_v);
+}
+
+static double for_s(const struct afe_fault *f, int64_t t_ns)
+{
+    return (double)(t_ns - f->from_ns) / (double)NS_PER_S;
+}
+
+static double angle_of(const struct afe_fault *f, int64_t t_ns)
+{
+    const double turns = f->frequency_hz * for_s(f, t_ns);
+    return TWO_PI * (turns - floor(turns));
+}
+
+static bool is_fast(const struct afe_fault *f)
+{
+    return f->kind == AFE_RIPPLE && f->frequency_hz > AFE_SLOW_HZ;
+}
+
+/* Volts behind the buffer with the faults that are before the pole. */
+static double faulty_v(const struct afe *a, double signal, int64_t t_ns)
+{
+    const double limit = 2.0 * a->cfg.clip_v / a->scale.load;
+    double ripple_v = 0.0;
+    for (const struct afe_fault *f = a->faults; f; f = f->next) {
+        if (t_ns < f->from_ns) continue;
+        if (f->kind == AFE_LOAD_OPEN) signal = signal < 0.0 ? -limit : limit;
+        else if (f->kind == AFE_LOAD_SHORT) signal = 0.0;
+        else if (f->kind == AFE_RIPPLE && !is_fast(f)) ripple_v += f->value * det_sin(angle_of(f, t_ns));
+    }
+    return loaded_v(a, signal) + ripple_v;
+}
+
+/* A ripple behind the pole, settled, at the load's scale: the imaginary part of V e^jx / (1 + j ratio). */
+static double passed_v(const struct afe *a, const struct afe_fault *f, int64_t t_ns)
+{
+    const double ratio = a->cfg.filter_hz > 0.0 ? f->frequency_hz / a->cfg.filter_hz : 0.0;
+    const struct det_pair x = det_sin_cos(angle_of(f, t_ns));
+    return f->value * (x.sin - ratio * x.cos) / (1.0 + ratio * ratio);
+}
+
+/* And with those that are behind it. */
+static double faulty_out_v(const struct afe *a, double v, int64_t t_ns)
+{
+    double reference = 1.0;
+    for (const struct afe_fault *f = a->faults; f; f = f->next) {
+        if (t_ns < f->from_ns) continue;
+        if (f->kind == AFE_REFERENCE) reference *= 1.0 + f->value + f->rate_per_s * for_s(f, t_ns);
+        else if (is_fast(f)) v += passed_v(a, f, t_ns) / a->scale.divider;
+    }
+    return v / reference;
 }
 
 LANES_BODY void load_row(const struct afe *a, double *row, unsigned n)
@@ -145,10 +155,7 @@ LANES_BODY void load_row(const struct afe *a, double *row, unsigned n)
 /* The same with the faults that are before it. */
 static void faulty_row(const struct afe *a, double *row, const struct looks *at)
 {
-    for (unsigned i = 0; i < at->n; i++) {
-        const struct faulty f = apply_faults(a, row[i], at->t_ns[i]);
-        row[i] = loaded_v(a, f.signal) + f.ripple_v;
-    }
+    for (unsigned i = 0; i < at->n; i++) row[i] = faulty_v(a, row[i], at->t_ns[i]);
 }
 
 static void add_noise(const struct afe *a, double *row, const struct looks *at)
@@ -247,10 +254,7 @@ void afe_out_row_v(struct afe *a, double *signal_to_v, double temp_degc, const s
     if (temp_degc != a->scale.degc) a->scale = scale_at(&a->cfg, temp_degc);
     if (at->n >= LANES && lanes_avx2()) pass_row_avx2(a, signal_to_v, at);
     else pass_row(a, signal_to_v, at);
-    for (unsigned i = 0; a->faults && i < at->n; i++) {
-        const struct faulty f = apply_faults(a, 0.0, at->t_ns[i]);
-        signal_to_v[i] = (signal_to_v[i] + f.passed_v / a->scale.divider) / f.reference;
-    }
+    for (unsigned i = 0; a->faults && i < at->n; i++) signal_to_v[i] = faulty_out_v(a, signal_to_v[i], at->t_ns[i]);
 }
 
 /* ---- rows left out */

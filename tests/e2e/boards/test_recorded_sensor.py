@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-import ads1282_reference as reference
+from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,7 @@
 """What the ADS1281/ADS1282 makes of voltages: filter, codes, corrections, noise (sources 1.7 to 1.9), by libpsabench.
 
 The expectation is computed here: the decimation chain in exact integers from the published coefficients
-(ads1282_reference.py), everything else from the formulas and tables as typed below.
+(psabench.boards.psa2.converter_filter), everything else from the formulas and tables as typed below.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 
-import ads1282_reference as reference
+from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
-from ads1282_reference import BLOCKS
+from psabench.boards.psa2.converter_filter import BLOCKS
 from chip_bench import Ads1282, amplitude, chi_square_is_inside
 from numpy.typing import NDArray
 

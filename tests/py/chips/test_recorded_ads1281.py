@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import ads1282_reference as reference
+from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
 from chip_bench import Ads1282

@@ -128,3 +128,20 @@ def corner(ratio: int, phase: str) -> float:
         middle = (low + high) / 2
         low, high = (middle, high) if abs(response(ratio, phase, middle)) > 0.5**0.5 else (low, middle)
     return low
+
+
+def at_modulator(ratio: int, phase: str, f: float) -> float:
+    """Gain at f, of any size, for an input that the modulator takes at each of its clocks: as sources 1.8 give it.
+
+    It repeats itself at each multiple of the modulator's clock, 32 ratio data rates.
+    """
+    turn = np.exp(-2j * np.pi * (f / BLOCKS - np.floor(f / BLOCKS)))
+    fir = np.prod([np.polyval(taps, turn**stride) for taps, stride in zip(STAGES[phase], STRIDE, strict=True)])
+    return float(abs(fir) / SCALE * abs(sinc(ratio, f)))
+
+
+def sinc(ratio: int, f: float) -> float:
+    """The first stage alone: the fifth power of a mean of `ratio` clocks of the modulator."""
+    x = np.pi * (f / (BLOCKS * ratio) - np.floor(f / (BLOCKS * ratio)))
+    below = np.sin(x)
+    return 1.0 if below == 0.0 else float((np.sin(ratio * x) / (ratio * below)) ** 5)
