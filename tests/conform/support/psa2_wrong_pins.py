@@ -75,6 +75,7 @@ WRONG_PINS: Mapping[str, Sequence[Bad]] = {
     ],
     "clk_is_a_division_of_the_crystal": [slower_clk],
     # pairs
+    "wires_stand_at_their_rest_levels": [inverted("Int_B"), inverted("CLK_A"), still("Data_B", 0)],
     "wire_b_is_the_inverse_of_a": [inverted("CLK_B"), moved("Data_B", 50), still("Int_B", 0), less("CLK_B", 30, 1)],
     "receivers_give_what_is_on_the_pairs": [inverted("Int"), moved("CLK", -30), moved("Int", 1000), still("Data", 1)],
     # reading

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from psabench.boards.psa2.conform.check_serial import quiet_instants
+from psabench.conform.capture.intervals import none_at
 from psabench.conform.capture.log import Capture
 from psabench.conform.plan import check
 from psabench.conform.requirements import Requirement
@@ -12,6 +14,18 @@ from psabench.link.vcd import Wire
 
 PAIRS = ("Int", "Data", "CLK")
 LEAST = 20  # edges that a judgement wants
+
+
+@check("pairs", "PSA2-SIG-02", needs={"pins", "wires"}, on_recording="stream")
+def wires_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
+    """Look at the wires of the pairs where nothing moves on any of the ports."""
+    at_ns = quiet_instants(e, row.limit("quiet_us") * 1e3)
+    for name in PAIRS:
+        level = int(row.limit(f"{name.lower()}_level"))
+        for wire, due in ((f"{name}_A", level), (f"{name}_B", 1 - level)):
+            bad = e.wires[wire].at(at_ns) != due
+            none_at(at_ns[bad], f"{wire} at {1 - due}", f"{due} at rest", (wire,))
+    return f"{2 * len(PAIRS)} wires at {len(at_ns)} instants"
 
 
 @check("pairs", "PSA2-SIG-14", needs={"pins", "wires"}, on_recording="stream")

@@ -89,7 +89,7 @@ def the_board_has_its_lines(e: Capture, row: Requirement) -> str:
 def lines_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
     """Look at every line where nothing moves on any of the ports."""
     levels = {n.removesuffix("_level"): int(v) for n, v in row.limits.items() if n.endswith("_level")}
-    at_ns = _quiet(e, row.limit("quiet_us") * 1e3)
+    at_ns = quiet_instants(e, row.limit("quiet_us") * 1e3)
     names = {n.lower(): n for n in e.wires.recording.wires}
     for low, level in levels.items():
         bad = e.wires[names[low]].at(at_ns) != level
@@ -97,7 +97,7 @@ def lines_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
     return f"{len(levels)} lines at {len(at_ns)} instants"
 
 
-def _quiet(e: Capture, quiet_ns: float) -> Ints:
+def quiet_instants(e: Capture, quiet_ns: float) -> Ints:
     """Instants with nothing on SClk, Int and CST for so long on either side."""
     edges = np.unique(
         np.concatenate([e.wires[n].t_ns for n in ("SClk", "Int", "CLK", "CST", "SYNC_T", "DRD_A") if n in e.wires])
