@@ -129,7 +129,7 @@ def measure_on(bench: Bench, head: HeadBench, m: Measurement, progress: Progress
         zero = ZeroWatch(recorder, lambda: bench.time_s, lambda: _zero_moved_v(bench, m.params.axis))
         watched = zero if bench.truth_path else recorder
         result = m.procedure.run(head, m.params, Watch(progress=progress, record=watched))
-    truth = _axis_truth(bench.truth(), m.params.axis) if bench.truth_path else None
+    truth = axis_truth(bench.truth(), m.params.axis) if bench.truth_path else None
     moved_v = zero.moved_v(result.readings) if truth else ()
     result = expand_result(result, m.procedure, m.params, m.accuracy, _step_v(m.average))
     return Section(label=m.label, result=result, truth=truth, zero_moved_v=moved_v)
@@ -175,16 +175,18 @@ def _there(options: RunOptions) -> bool:
     return bool(options.can or options.head or options.control)
 
 
-def open_bench(condition: Condition, options: RunOptions) -> Bench:
+def open_bench(condition: Condition, options: RunOptions, *, every_unit: bool = False) -> Bench:
+    """The bench that is there, or of an emulator; with the unit of --node alone, or with every one."""
+    node = None if every_unit else options.node
     if _there(options):
         if not options.head and not options.control:
             raise BadInput(expected(f"the VISA address of the dividing head, as {EXAMPLES}", "none", "--head"))
         there = {"head": options.head} if options.head else {}
-        return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=options.node)
+        return Bench.connect(options.can, scpi=there, control=options.control, truth=options.truth, node=node)
     scenario = options.scenario or condition.scenario
     pace = "wall" if options.real_time else "step"
     extra: list[str | Path] = ["--resolved", _resolved(condition, options)]
-    return Bench.start(scenario, pace=pace, seed=options.seed, node=options.node, extra=extra)
+    return Bench.start(scenario, pace=pace, seed=options.seed, node=node, extra=extra)
 
 
 def _resolved(condition: Condition, options: RunOptions) -> Path:
@@ -201,7 +203,7 @@ def nominal_of(options: RunOptions, axis: str) -> Nominal | None:
     return nominal_of_scenario(resolved, axis, options.node, Path(condition.scenario).name)
 
 
-def _axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
+def axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
     first = next(iter(truth["units"].values()))
     sensor = first["axes"][axis]
     return {k: float(v) for k, v in sensor.items() if isinstance(v, int | float)}

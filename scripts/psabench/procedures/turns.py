@@ -31,14 +31,33 @@ class Pair:
     face: Face
     along_deg: float
     against_deg: float
+    moved: str  # axis of the sensor that a small turn of the head moves out of the horizontal
+    tilt: int  # +1: towards gravity where the axis is along it, -1: away from it
 
 
 PAIRS = (
-    Pair(axis="x", face=Face.DIRECT, along_deg=270.0, against_deg=90.0),  # fig. 2; the text prints a_x = -g twice
-    Pair(axis="y", face=Face.DIRECT, along_deg=180.0, against_deg=0.0),  # fig. 3
+    # fig. 2; the text prints a_x = -g twice
+    Pair(axis="x", face=Face.DIRECT, along_deg=270.0, against_deg=90.0, moved="y", tilt=-1),
+    Pair(axis="y", face=Face.DIRECT, along_deg=180.0, against_deg=0.0, moved="x", tilt=1),  # fig. 3
     # fig. 4: about Oy, which then lies along the head
-    Pair(axis="z", face=Face.SIDE, along_deg=180.0, against_deg=0.0),
+    Pair(axis="z", face=Face.SIDE, along_deg=180.0, against_deg=0.0, moved="x", tilt=1),
 )
+
+
+def pairs_of_channel(channel: str) -> tuple[Pair, ...]:
+    """Of a sensor of a triad: its x is the case's axis of that name, its y and z are the next ones in turn.
+
+    The same six positions, so that one pass measures all three: each is along gravity once and against it once.
+    """
+    shift = "xyz".index(channel)
+
+    def named(axis: str) -> str:
+        return "xyz"[("xyz".index(axis) - shift) % 3]
+
+    by_axis = [replace(p, axis=named(p.axis), moved=named(p.moved)) for p in PAIRS]
+    return tuple(sorted(by_axis, key=lambda p: p.axis))
+
+
 SEARCH_POINTS = 5
 
 
@@ -106,12 +125,14 @@ def estimate_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -
     return replace(fit_turns(readings, p, g_mps2), doubts=wander_doubts(readings, drift=False))
 
 
-def fit_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -> ProcedureResult:
+def fit_turns(
+    readings: Sequence[Reading], p: TurnsParams, g_mps2: float, pairs: Sequence[Pair] = PAIRS
+) -> ProcedureResult:
     """The same without a look for a zero that wanders, which takes longer than all else."""
     halves: dict[str, _Halves] = {}
     notes: list[str] = []
-    for pair in PAIRS:
-        kx_v_per_g = float(halves["x"].diff_v.mean()) if "x" in halves else 0.0
+    for pair in pairs:
+        kx_v_per_g = pair.tilt * float(halves["x"].diff_v.mean()) if pair.moved == "x" else 0.0
         h = _halves(readings, pair, p.search_deg, kx_v_per_g)
         if h.sum_v.size >= 2:
             halves[pair.axis] = h
@@ -119,7 +140,7 @@ def fit_turns(readings: Sequence[Reading], p: TurnsParams, g_mps2: float) -> Pro
             raise ValueError(expected("at least 2 complete realisations of the x pair", h.sum_v.size))
         else:
             notes.append(f"no k{pair.axis}: {h.sum_v.size} complete realisations of its pair")
-    estimates = _estimates(halves)
+    estimates = _estimates(halves, pairs)
     series = tuple(
         _series(readings, face) for face in (Face.DIRECT, Face.SIDE) if any(r.face is face for r in readings)
     )
@@ -175,17 +196,20 @@ def _position(readings: Sequence[Reading], centre_deg: float, searched: bool) ->
     return float(c0 - c1 * c1 / (4 * c2)), 0.0
 
 
-def _estimates(halves: Mapping[str, _Halves]) -> list[Estimate]:
+def _estimates(halves: Mapping[str, _Halves], pairs: Sequence[Pair]) -> list[Estimate]:
     """Eqs (4), (5), (8), (11); sd from the scatter of the realisations, pooled over the pairs."""
     x = halves["x"]
     u0_sd, k_sd, dof = _pooled_sd(halves, "sum_v"), _pooled_sd(halves, "diff_v"), _dof(halves)
     out = [estimate("u0_v", "u_0", "V", float(x.sum_v.mean()), u0_sd / math.sqrt(x.sum_v.size), dof)]
-    sums = []
+    sums, of_axis = [], {pair.axis: pair for pair in pairs}
     for axis, h in halves.items():
+        other, sign = of_axis[axis].moved, of_axis[axis].tilt
         value, sd = float(h.diff_v.mean()), k_sd / math.sqrt(h.diff_v.size)
         e = estimate(f"k{axis}_v_per_g", f"k_{axis}", "V/g", value, sd, dof)
-        out.append(not_identifiable(e, f"this is {_SUM_TEXT[axis]}: test turns do not know alpha0"))
-        sums.append(estimate(f"k{axis}_sum_v_per_g", _SUM_SYMBOL[axis], "V/g", value, sd, dof))
+        what = f"k{axis} cos alpha0 {'+' if sign > 0 else '-'} k{other} sin alpha0"
+        out.append(not_identifiable(e, f"this is {what}: test turns do not know alpha0"))
+        symbol = f"k_{axis} cos α_0 {'+' if sign > 0 else '−'} k_{other} sin α_0"
+        sums.append(estimate(f"k{axis}_sum_v_per_g", symbol, "V/g", value, sd, dof))
     for axis in ("y", "z"):
         if axis in halves:
             h = halves[axis]
@@ -193,18 +217,6 @@ def _estimates(halves: Mapping[str, _Halves]) -> list[Estimate]:
             sd = u0_sd * math.sqrt(1 / h.sum_v.size + 1 / x.sum_v.size)
             sums.append(estimate(f"closure_{axis}_v", f"u_0({axis}) − u_0(x)", "V", gap, sd, dof))
     return out + sums
-
-
-_SUM_TEXT = {
-    "x": "kx cos alpha0 - ky sin alpha0",
-    "y": "ky cos alpha0 + kx sin alpha0",
-    "z": "kz cos alpha0 + kx sin alpha0",
-}
-_SUM_SYMBOL = {
-    "x": "k_x cos α_0 − k_y sin α_0",
-    "y": "k_y cos α_0 + k_x sin α_0",
-    "z": "k_z cos α_0 + k_x sin α_0",
-}
 
 
 def _dof(halves: Mapping[str, _Halves]) -> int:
@@ -245,3 +257,27 @@ def expected_turns(truth: model.Sensor, at_side: model.Sensor) -> Mapping[str, f
         "closure_y_v": 2 * c[4],
         "closure_z_v": side[0] + side[4] - (c[0] - c[4]),
     }
+
+
+def expected_of_pairs(pairs: Sequence[Pair], truth: model.Sensor, at_side: model.Sensor) -> Mapping[str, float]:
+    """The same of any sensor of a triad: model (1) at the two positions of each pair, turned by alpha0."""
+    halves = {}
+    for pair in pairs:
+        sensor = truth if pair.face is Face.DIRECT else at_side
+        along = {pair.axis: math.cos(sensor.alpha0_rad), pair.moved: pair.tilt * math.sin(sensor.alpha0_rad)}
+        u1, u2 = (_output_v(sensor, {axis: sign * a for axis, a in along.items()}) for sign in (1.0, -1.0))
+        halves[pair.axis] = ((u1 + u2) / 2, (u1 - u2) / 2)
+    return {
+        "u0_v": halves["x"][0],
+        **{f"k{axis}_v_per_g": getattr(truth, f"k{axis}_v_per_g") for axis in halves},
+        **{f"k{axis}_sum_v_per_g": half for axis, (_, half) in halves.items()},
+        **{f"closure_{axis}_v": halves[axis][0] - halves["x"][0] for axis in halves if axis != "x"},
+    }
+
+
+def _output_v(s: model.Sensor, a_g: Mapping[str, float]) -> float:
+    """Model (1) with its quadratic terms, inputs in g."""
+    x, y, z = (a_g.get(axis, 0.0) for axis in "xyz")
+    linear_v = s.kx_v_per_g * x + s.ky_v_per_g * y + s.kz_v_per_g * z
+    squares_v = s.kxx_v_per_g2 * x * x + s.kyy_v_per_g2 * y * y + s.kzz_v_per_g2 * z * z
+    return s.u0_v + linear_v + squares_v + s.kxy_v_per_g2 * x * y + s.kxz_v_per_g2 * x * z

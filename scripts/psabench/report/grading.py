@@ -7,7 +7,7 @@ kx_v_per_g, ... kyy_v_per_g2, drift_v_per_s); no procedure ever sees it.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 from psabench.budget.gum import COVERAGE
@@ -27,6 +27,7 @@ class Section:
     result: ProcedureResult
     truth: Mapping[str, float] | None = None  # the sensor's hidden parameters
     zero_moved_v: tuple[float, ...] = ()  # from u0_v, at each reading; (): by drift_v_per_s alone
+    expected: Callable[[Sensor, Sensor], Mapping[str, float]] | None = None  # None: the procedure's own
 
     @property
     def title(self) -> str:
@@ -84,7 +85,7 @@ def grade(section: Section) -> tuple[Graded, ...]:
     if section.truth is None:
         return tuple(_graded(e, None) for e in result.estimates)
     upright, side = (_sensor_when(section, faces) for faces in (_UPRIGHT, _SIDE))
-    want = PROCEDURES[result.procedure].expected(upright, side)
+    want = (section.expected or PROCEDURES[result.procedure].expected)(upright, side)
     return tuple(_graded(e, want.get(e.name)) for e in result.estimates)
 
 

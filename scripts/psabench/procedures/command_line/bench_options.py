@@ -116,6 +116,11 @@ IN_A_CLIMATE: Mapping[str, Mapping[str, Any]] = {
     "--climate": {"action": "store_true", "help": "repeat it at temperatures of a chamber, with the scenario climate"},
 }
 
+# Of the test turns alone.
+OF_A_BATCH: Mapping[str, Mapping[str, Any]] = {
+    "--batch": {"action": "store_true", "help": "all sensors of all units in one pass, with the scenario batch"},
+}
+
 # Of flights alone.
 IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
     "--store": {"type": Path, "default": STORE, "metavar": "FILE", "help": "store of passports (%(default)s)"},

@@ -15,6 +15,7 @@ from psabench.procedures.command_line.bench_options import (
     CONVERTERS_ALONE,
     FROM_OUTPUTS,
     IN_A_CLIMATE,
+    OF_A_BATCH,
     ON_THE_TABLE,
 )
 from psabench.procedures.command_line.offered import (
@@ -111,6 +112,7 @@ _EXAMPLES: Mapping[str, str] = {
     "turns": """\
   psabench run turns
   psabench run turns --climate      at -40 to 85 degC in a chamber, on an emulator started for it
+  psabench run turns --batch        twelve sensors on four units in one pass, a passport for each
   psabench run turns --can slcan:/dev/ttyACM0 --head TCPIP::192.0.2.7::5025::SOCKET   on the bench at these addresses
 """,
     "fourier": """\
@@ -260,7 +262,7 @@ def _on_the_head() -> Iterator[Command]:
     every = f"{', '.join(ON_THE_HEAD)}: an accelerometer on the dividing head, each procedure on each bench"
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
         load = _of_all if name == ALL else partial(_of_the_head, name)
-        own = {} if name == ALL else IN_A_CLIMATE
+        own = {} if name == ALL else {**IN_A_CLIMATE, **(OF_A_BATCH if name == "turns" else {})}
         how = {"common": _HEAD, "own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
         yield _command((name, summary), handlers.run_on_head, **how)
 

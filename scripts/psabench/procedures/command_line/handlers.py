@@ -43,7 +43,12 @@ def run_on_head(args: argparse.Namespace) -> int:
         g_mps2=args.gravity,
         params=_params(args),
     )
-    if args.procedure != ALL and args.climate:
+    ways = [way for way in ("climate", "batch") if getattr(args, way, False)]
+    if len(ways) > 1:
+        raise BadInput(expected("one of --climate and --batch", "both", args.procedure))
+    if "batch" in ways:
+        return _run_batch(args, options)
+    if "climate" in ways:
         return _run_in_climate(args, options)
     with progress_of(args) as followers:
         page, sections, nominal = run.run(options, followers.progress)
@@ -71,6 +76,22 @@ def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
     print(sensors.console_table(r))
     print(grading.verdict(r.sections))
     print(sensors.verdict(r))
+    print(f"report: {r.page}")
+    return 0 if r.within else 1
+
+
+def _run_batch(args: argparse.Namespace, options: RunOptions) -> int:
+    from psabench.batch import run as batch
+    from psabench.report import grading
+
+    with progress_of(args) as followers:
+        r = batch.run_batch(options, followers.progress)
+    sections = list(r.sections.values())
+    if args.verbose:
+        print("\n".join(grading.console_table(s) for s in sections))
+    print(batch.console_table(r))
+    print(grading.verdict(sections))
+    print(f"passports: {r.store}")
     print(f"report: {r.page}")
     return 0 if r.within else 1
 
