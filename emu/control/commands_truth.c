@@ -29,8 +29,11 @@ static void add_noise(const struct unit *u, cJSON *to)
 
 static void add_axis(struct unit *u, unsigned i, cJSON *to, int64_t t_ns)
 {
-    static const char *const names[] = {
-        [UNIT_NO_SENSOR] = "none", [UNIT_MEMS] = "mems", [UNIT_QUARTZ] = "quartz", [UNIT_RECORDED] = "recorded", [UNIT_CVG] = "mems_gyro"};
+    static const char *const names[] = {[UNIT_NO_SENSOR] = "none",
+                                        [UNIT_MEMS] = "mems",
+                                        [UNIT_QUARTZ] = "quartz",
+                                        [UNIT_RECORDED] = "recorded",
+                                        [UNIT_CVG] = "mems_gyro"};
     const enum unit_sensor sensor = u->cfg.axis[i].sensor;
     cJSON_AddStringToObject(to, "sensor", names[sensor]);
     if (sensor == UNIT_MEMS) yaml_dump(&scenario_mems_fields, &u->cfg.axis[i].mems, to);

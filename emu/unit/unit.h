@@ -26,7 +26,7 @@ struct unit_axis_cfg {
     enum unit_sensor sensor;
     struct mems_g mems;
     struct quartz_g quartz;
-    bool quartz_given;    /* the scenario says something of it */
+    bool quartz_given; /* the scenario says something of it */
     struct cvg_dps cvg;
     bool cvg_given;
     double at_m[3];       /* where it is in the unit, its case's axes */

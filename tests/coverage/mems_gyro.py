@@ -1,4 +1,4 @@
-"""Coverage of the intervals of `psabench run mems-gyro`: drawn gyros on a table, through the sensor's model or the wire."""
+"""Coverage of the intervals of `psabench run mems-gyro`: drawn gyros on a table, through the model or the wire."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ import physics
 
 EPILOG = """\
 examples (in the root of a checkout, with PYTHONPATH=.):
-  python -m tests.coverage.mems_gyro                       200 gyros through the model of the sensor: minutes of one core
-  python -m tests.coverage.mems_gyro --wire --runs 4       four of them through the wire
+  python -m tests.coverage.mems_gyro                   200 gyros through the model of the sensor: minutes of one core
+  python -m tests.coverage.mems_gyro --wire --runs 4   four of them through the wire
 
 The table is the one of docs/procedures/mems_gyro.md.
 """

@@ -1,7 +1,7 @@
 """Estimates of a gyro from its dwells, with covariance and budget. Pure.
 
-Generalised least squares: the noise that correlates the dwells is fitted to the same readings (`noise`). The zero that is
-stated is the mean over the rests of the series: flicker and random walk move it, and no run says where it will be later.
+Generalised least squares: the noise that correlates the dwells is fitted to the same readings (`noise`). The zero is
+the mean over the rests of the series: flicker and random walk move it, and no run says where it will be later.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from psabench.mems_gyro.params import BLOCK_S, NAME, MemsGyroParams
 from psabench.mems_gyro.plan import Dwell, Floats
 
 NEWTON_ROUNDS = 4
-MEANS = ((1, 150), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times
+MEANS = ((1, 100), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times
 KNOWN_SD = 2.0  # a power below so many of its sd may be none
 FOLLOWS = 0.5  # of the variance of the readings is the rate's, at the least
 STILL_P = 1e-7  # a dwell that is so quiet by chance is none
@@ -208,7 +208,13 @@ def _with_confidence(
         sd = math.sqrt(cov[i, i]) * q.per_si
         found.append(
             Estimate(
-                name=q.name, symbol=q.symbol, unit=q.unit, value=float(values[i]) * q.per_si, sd=sd, ci_half=2 * sd, dof=dof
+                name=q.name,
+                symbol=q.symbol,
+                unit=q.unit,
+                value=float(values[i]) * q.per_si,
+                sd=sd,
+                ci_half=2 * sd,
+                dof=dof,
             )
         )
     return found, cov
@@ -287,7 +293,7 @@ def _where(d: Dwell) -> str:
 
 
 def expected_values(truth: Mapping[str, float]) -> dict[str, float]:
-    """By the parameters of a scenario's gyro at 25 °C: what each estimate should have been, without the zero's motion."""
+    """By the parameters of a scenario's gyro at 25 °C: what each estimate should have been, had the zero not moved."""
     phase = math.radians(truth["phase_deg"])
     scale = truth["scale_v_per_dps"]
     return {

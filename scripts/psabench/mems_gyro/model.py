@@ -2,7 +2,8 @@
 
 W = wx + my wy + mz wz + dx ax + dy ay + dz az,  u = zero + S (W + c2 W^2 + c3 W^3)
 
-w is the inertial rate, °/s, a the projection of gravity in g (an axis that points down reads +1), both on the gyro's axes.
+w is the inertial rate, °/s, a the projection of gravity in g (an axis that points down reads +1), both on the gyro's
+axes.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def _turn_x(deg: float) -> Floats:
 
 
 def felt(d: Dwell, p: MemsGyroParams) -> tuple[Floats, Floats]:
-    """Mean rate, °/s, and a, g, on the gyro's axes: the table's rate and the Earth's, its horizontal part turned along."""
+    """Mean rate, °/s, and a, g, on the gyro's axes. The horizontal part of the Earth's rate turns with the table."""
     half_turn_rad = math.radians(d.rate_dps * d.duration_s / 2)
     azimuth_rad = math.radians(p.azimuth_deg + d.heading_deg) + half_turn_rad
     level_dps = EARTH_DPS * math.cos(math.radians(p.latitude_deg)) * float(np.sinc(half_turn_rad / math.pi))

@@ -6,7 +6,8 @@ Terms of IEEE Std 952, each with its power v in the covariance of two means, ove
   bias instability v2 = B^2   -ln|t - s| / pi + const    2 ln 2 / pi B^2
   random walk      v3 = K^2   -|t - s| / 2 + const       K^2 tau / 3
 
-The constants do not matter as long as a zero is estimated beside: they cancel in every contrast (intrinsic covariances).
+The constants do not matter as long as a zero is estimated beside: they cancel in every contrast (intrinsic
+covariances).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 TERMS = ("N", "B", "K")
-ROUNDS, CLOSE = 60, 1e-4
+ROUNDS, CLOSE = 30, 1e-3
 LEAST = 1e-9  # of the variance of the readings: a term below is none
 
 
@@ -96,14 +97,14 @@ def fit_noise(y: Floats, design: Floats, parts: list[Floats]) -> NoiseFit:
         score, info = _scoring(z, h, v)
         step = np.zeros_like(v)
         step[active] = np.linalg.solve(info[np.ix_(active, active)], score[active])
-        new = np.where(active, np.maximum(v + step, 0.1 * v), 0.0)
+        new = np.where(active, np.maximum(v + step, 0.03 * v), 0.0)
         new, active = _pinned(new, scale, active)
         done = bool(np.all(np.abs(new - v) <= CLOSE * np.maximum(new, LEAST * scale)))
         v = new
         if done:
             break
     _, info = _scoring(z, h, v)
-    return NoiseFit(v=v, cov=np.linalg.inv(info))
+    return NoiseFit(v=v, cov=np.asarray(np.linalg.inv(info), dtype=np.float64))
 
 
 def _pinned(v: Floats, scale: Floats, active: npt.NDArray[np.bool_]) -> tuple[Floats, npt.NDArray[np.bool_]]:

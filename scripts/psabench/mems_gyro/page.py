@@ -17,9 +17,10 @@ from psabench.report import plots
 from psabench.report.page import bullets, figure, section, table, verdict_line, whole_page, write_report
 
 NOTES = (
-    "u = u0 + S (W + c2 W² + c3 W³), W = ωx + my ωy + mz ωz + dx ax + dy ay + dz az; a is +1 g on an axis that points down.",
-    "u0 is the mean over the rests of the series. It holds what the quadrature makes of a zero; a rate table at one temperature "
-    "cannot tell them apart.",
+    "u = u0 + S (W + c2 W² + c3 W³), W = ωx + my ωy + mz ωz + dx ax + dy ay + dz az; "
+    "a is +1 g on an axis that points down.",
+    "u0 is the mean over the rests of the series. It holds what the quadrature makes of a zero; a rate table at one "
+    "temperature cannot tell them apart.",
     "U is the expanded uncertainty, k = 2 of a normal distribution (95.45 %): scatter and the bench's components.",
     "my and mz hold the mounting of the unit on the table.",
 )
@@ -56,7 +57,9 @@ def draw_allan(run: MemsGyroRun) -> str:
     tau_s = np.geomspace(r.tau_s[0], r.tau_s[-1], 60)
     with plots.drawing(3.0) as (fig, ax):
         ax.loglog(r.tau_s, 3600.0 * r.allan_dps, "o", ms=4, color=plots.SERIES[0], label="recording at rest")
-        ax.loglog(tau_s, 3600.0 * allan_law(r.powers, tau_s), lw=1.3, color=plots.SERIES[1], label="N, B, K as estimated")
+        ax.loglog(
+            tau_s, 3600.0 * allan_law(r.powers, tau_s), lw=1.3, color=plots.SERIES[1], label="N, B, K as estimated"
+        )
         ax.set_xlabel("averaging time τ, s")
         ax.set_ylabel("Allan deviation, °/h")
         ax.legend(loc="best")

@@ -1,7 +1,8 @@
 """Attitudes and rates of the table, and what is recorded in each. Pure.
 
-The table has three axes: the outer one is vertical and turns, the two inside it put each axis of the gyro along the vertical, up
-and down. So the acceleration is constant in every dwell, and only the horizontal part of the Earth's rate turns.
+The table has three axes: the outer one is vertical and turns, the two inside it put each axis of the gyro along the
+vertical, up and down. So the acceleration is constant in every dwell, and only the horizontal part of the Earth's rate
+turns.
 """
 
 from __future__ import annotations

@@ -226,8 +226,9 @@ def test_a_full_disk_ends_the_trace_and_not_the_run(for_time: str) -> None:
         (
             "run frobnicate",
             2,
-            "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, sins-covariance, "
-            "sins-snake, sins-calibration-secondary, koi-flight, koi-season, thermal, gyrocompass, heading-hold",
+            "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, mems-gyro, "
+            "sins-covariance, sins-snake, sins-calibration-secondary, koi-flight, koi-season, thermal, gyrocompass, "
+            "heading-hold",
         ),
         ("run fourier --can socketcand:127.0.0.1:{port}", 2, "--head: expected the VISA address"),
         ("run fourier --positions 1 --condition quiet --out {dir}", 2, "fourier: "),

@@ -81,8 +81,8 @@ def test_a_fault_of_the_sensor_is_a_doubt(tmp_path: Path, capsys: Lines) -> None
     ("old", "new", "text"),
     [
         (
-            "  axes:                            # z carries y carries x\n    - {along: z}\n    - {along: y}\n    - {along: x}\n",
-            "  axes: 1\n",
+            "    - {along: z}\n    - {along: y}\n    - {along: x}\n",
+            "    - {along: z}\n",
             "expected a table of 3 axes, each of the gyro's goes along the vertical, got 1",
         ),
         ("        sensor: mems_gyro\n", "        sensor: mems_gyro\n        afe: {input: current}\n", "voltage"),

@@ -28,8 +28,9 @@ from tests.py.link.test_lineport import lines
 MISTAKES: list[tuple[str, str]] = [
     (
         "run",
-        "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, sins-covariance, "
-        "sins-snake, sins-calibration-secondary, koi-flight, koi-season, thermal, gyrocompass, heading-hold or script",
+        "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, mems-gyro, "
+        "sins-covariance, sins-snake, sins-calibration-secondary, koi-flight, koi-season, thermal, gyrocompass, "
+        "heading-hold or script",
     ),
     ("run --out turns", "run: expected turns"),
     ("run spin", "run: expected turns, fourier, reversal, all, compare-converters, sins-calibration, "),
