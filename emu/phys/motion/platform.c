@@ -20,6 +20,7 @@ struct platform_cfg platform_default(void)
         .gm_sigma_degph = 0.2,
         .gm_tau_s = 1000.0,
         .torquer_limit_dps = 20.0,
+        .servo = {.limit_dps = 60.0},
         .level_tilt_arcmin = {10.0, 10.0},
         .level_repeat_arcmin = 1.0,
         .angle_zero_arcmin = 6.0,
@@ -80,6 +81,19 @@ static void gyro_rates(const struct platform *p, const struct platform_node *n, 
     }
 }
 
+/* Rates of the platform over the step from n on: of the gyroscope, which its motors follow. behind_rad: after the step. */
+static void platform_rates(const struct platform *p, const struct platform_node *n, double w_radps[2],
+                           double behind_rad[2])
+{
+    gyro_rates(p, n, w_radps);
+    for (unsigned i = 0; i < PLATFORM_AXES; i++) {
+        behind_rad[i] = 0.0;
+        if (p->cfg.servo.hz <= 0.0) continue;
+        behind_rad[i] = follow_after(&p->cfg.servo, n->behind_rad[i], w_radps[i], n->carrier_radps[i], p->step_s);
+        w_radps[i] -= (behind_rad[i] - n->behind_rad[i]) / p->step_s;
+    }
+}
+
 static void invalidate_node(struct platform_node *n)
 {
     const struct det_pair a = det_sin_cos(n->alpha_rad), b = det_sin_cos(n->beta_rad);
@@ -129,6 +143,20 @@ static void drift_by_force(struct platform *p, struct platform_node *n, int64_t 
     }
 }
 
+/* The outer frame turns with the vehicle about x_p, which is across its axis; about z_p so does what the azimuth motor stands on. */
+static void carrier_of(struct platform *p, struct platform_node *n, int64_t t_ns)
+{
+    if (p->cfg.servo.hz <= 0.0) return;
+    const struct trig t = {n->sin_a, n->cos_a, n->sin_b, n->cos_b};
+    const struct vehicle_state *v = vehicle_state_at(p, t_ns);
+    double C_lp[3][3], w_l_radps[3], w_p_radps[3];
+    axes_at(&t, v, C_lp);
+    for (unsigned k = 0; k < 3; k++) w_l_radps[k] = v->w_il_l_radps[k] + v->w_lc_l_radps[k];
+    into_p((const double(*)[3])C_lp, w_l_radps, w_p_radps);
+    n->carrier_radps[PLATFORM_LEVEL] = w_p_radps[0];
+    n->carrier_radps[PLATFORM_AZIMUTH] = w_p_radps[2];
+}
+
 /* Runge and Kutta's fourth-order step. */
 static void advance_step(struct platform *p)
 {
@@ -140,8 +168,8 @@ static void advance_step(struct platform *p)
     const struct ground middle = ground_at(p, t_ns + p->cfg.step_ns / 2);
     const struct ground end = ground_at(p, t_ns + p->cfg.step_ns);
     const struct trig now = {from->sin_a, from->cos_a, from->sin_b, from->cos_b};
-    double w[2], k1[2], k2[2], k3[2], k4[2];
-    gyro_rates(p, from, w);
+    double w[2], behind_rad[2], k1[2], k2[2], k3[2], k4[2];
+    platform_rates(p, from, w, behind_rad);
     solve_rates(&start, &now, w, k1);
     struct trig t = trig_at(from, 0.5 * h * k1[0], 0.5 * h * k1[1]);
     solve_rates(&middle, &t, w, k2);
@@ -155,6 +183,7 @@ static void advance_step(struct platform *p)
     t = trig_at(from, da_rad, db_rad);
     solve_rates(&end, &t, w, from->rate_end_radps);
     *to = *from;
+    memcpy(to->behind_rad, behind_rad, sizeof behind_rad);
     to->alpha_rad += da_rad;
     to->beta_rad += db_rad;
     to->sin_a = t.sin_a;
@@ -170,6 +199,7 @@ static void advance_step(struct platform *p)
     }
     drift_on(p, to);
     drift_by_force(p, to, t_ns + p->cfg.step_ns);
+    carrier_of(p, to, t_ns + p->cfg.step_ns);
 }
 
 static void advance_to(struct platform *p, int64_t k)
@@ -238,6 +268,7 @@ void platform_init(struct platform *p, const struct platform_cfg *cfg, const str
     for (unsigned i = 0; i < PLATFORM_AXES; i++)
         p->feels_force |= cfg->unbalance_degph_per_g[i] != 0.0 || cfg->quadrature_degph_per_g[i] != 0.0;
     drift_by_force(p, n, 0);
+    carrier_of(p, n, 0);
 }
 
 bool platform_torque(struct platform *p, double u1_radps, double u2_radps, int64_t t_ns)
@@ -333,9 +364,8 @@ void platform_at(struct platform *p, int64_t t_ns, struct platform_state *out)
     const struct look l = look_at(p, t_ns);
     const struct ground on = ground_at(p, t_ns);
     const struct tilt g = tilt_of(&l.trig, on.z_c);
-    double w_radps[2];
-    double rate_radps[2];
-    gyro_rates(p, l.node, w_radps);
+    double w_radps[2], behind_rad[2], rate_radps[2];
+    platform_rates(p, l.node, w_radps, behind_rad);
     solve_rates(&on, &l.trig, w_radps, rate_radps);
     const double gamma = gamma_radps(&p->ground, &l.trig, &g, rate_radps);
     *out = (struct platform_state){

@@ -13,6 +13,7 @@
 #define PSABENCH_PHYS_MOTION_PLATFORM_H
 
 #include "base/rng.h"
+#include "phys/motion/follow.h"
 #include "phys/motion/pose.h"
 #include "phys/motion/vehicle.h"
 
@@ -33,6 +34,7 @@ struct platform_cfg {
     bool gm_from_zero;                            /* else it starts with a draw of its stationary distribution */
     double torquer_scale[PLATFORM_AXES];          /* relative error */
     double torquer_limit_dps;
+    struct follow_cfg servo;     /* of both motors */
     double level_tilt_arcmin[2]; /* of the level sensors: they show so much more beta, and gamma */
     double level_repeat_arcmin;  /* the same, drawn for each setting */
     double angle_zero_arcmin;    /* the gimbal's angle sensor shows so much more q */
@@ -50,6 +52,8 @@ struct platform_node {
     double torquer_gain[PLATFORM_AXES];      /* 1; a fault makes it 0 */
     double drift_step_radps[PLATFORM_AXES];  /* a fault's */
     double by_force_radps[PLATFORM_AXES];    /* of the specific force here */
+    double behind_rad[PLATFORM_AXES],
+        carrier_radps[PLATFORM_AXES]; /* of the servo: rotor from platform; what carries it */
     double gm_radps[PLATFORM_AXES];
     struct rng gm[PLATFORM_AXES];
 };

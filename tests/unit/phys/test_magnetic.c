@@ -1,7 +1,8 @@
 /* The induction sensor: the field's direction on level ground, its vertical part in a plane that is not level, deviation, noise. */
 #include "platform_rig.h"
-
 #include "phys/sensor/magnetic.h"
+
+#include <string.h>
 
 static const struct site still = {.g_mps2 = 9.81}; /* an Earth that does not turn: no Coriolis in the pendulum */
 

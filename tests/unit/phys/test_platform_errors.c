@@ -1,6 +1,8 @@
 /* Errors of the platform's parts, and their faults: torquers, drifts, angle sensor, level sensors, stops. */
 #include "platform_rig.h"
 
+#include <string.h>
+
 static const struct site still = {.g_mps2 = 9.81}; /* an Earth that does not turn */
 
 static struct platform up(const struct platform_cfg *c, uint64_t seed)
@@ -110,6 +112,44 @@ static void drift_by_force_follows_the_vehicle(void **state)
     near(look(&p, 0.995).drift_radps[0], 0.0, 1e-12);
     near(look(&p, 40.0).drift_radps[0], 10.0 * 2.0 / 9.80665 * DEGPH, 1e-9);
     near(look(&p, 60.0).drift_radps[0], 0.0, 1e-9);
+}
+
+/* Asked to turn at 3 deg/s, a platform with motors of 5 Hz comes after its rotor by 3 / (2 pi 5) deg and its dead zone. */
+static void motors_follow_the_gyroscope(void **state)
+{
+    (void)state;
+    for (unsigned axis = 0; axis < PLATFORM_AXES; axis++) {
+        struct platform_cfg c = ideal();
+        c.servo = (struct follow_cfg){.hz = 5.0, .dead_arcsec = 20.0, .limit_dps = 10.0};
+        struct platform p = up(&c, 1);
+        const double u_radps = 3.0 * RAD_PER_DEG, behind_rad = u_radps / (2.0 * 3.141592653589793 * 5.0) + 20.0 * DEGPH;
+        (void)(axis == PLATFORM_LEVEL ? platform_torque(&p, u_radps, 0.0, 0) : platform_torque(&p, 0.0, u_radps, 0));
+        const struct platform_state s = look(&p, 5.0);
+        near(axis == PLATFORM_LEVEL ? s.beta_rad : s.alpha_rad, 5.0 * u_radps - behind_rad, 1e-9);
+        near(s.w_ip_p_radps[axis == PLATFORM_LEVEL ? 0 : 2], u_radps, 1e-9);
+        (void)platform_torque(&p, 0.0, 0.0, ns(5.0));
+        const struct platform_state after = look(&p, 10.0); /* to the edge of the dead zone */
+        near(axis == PLATFORM_LEVEL ? after.beta_rad : after.alpha_rad, 5.0 * u_radps - 20.0 * DEGPH, 1e-9);
+    }
+}
+
+/* A vehicle that turns drags the platform with it by as much, and no further; faster than the motor, it takes it along. */
+static void a_turning_vehicle_drags_the_platform(void **state)
+{
+    (void)state;
+    static const struct {
+        double limit_dps, dragged_deg;
+    } rows[] = {{10.0, 3.0 / (2.0 * 3.141592653589793 * 5.0)}, {2.0, 9.0}};
+    for (unsigned i = 0; i < COUNT(rows); i++) {
+        struct platform_cfg c = ideal();
+        c.servo = (struct follow_cfg){.hz = 5.0, .limit_dps = rows[i].limit_dps};
+        struct platform p = up(&c, 1);
+        vehicle_attitude(platform_vehicle(&p, ns(1.0)), 90.0, 0.0, 0.0, ns(1.0));
+        /* Heading grows clockwise, alpha the other way. With 2 deg/s of 3 it loses 1 deg/s, and what the gain needs. */
+        const double lost_rad = -look(&p, 10.0).alpha_rad;
+        near(lost_rad, rows[i].dragged_deg * RAD_PER_DEG, i ? 0.08 * RAD_PER_DEG : 1e-6);
+        near(look(&p, 60.0).alpha_rad, 0.0, 1e-9); /* and comes back to the rotor */
+    }
 }
 
 /* The random drift of an axis at an instant, deg/h. */
@@ -289,6 +329,8 @@ int main(void)
         cmocka_unit_test(drifts_move_it),
         cmocka_unit_test(drift_by_force_is_that_of_the_force_on_the_platform),
         cmocka_unit_test(drift_by_force_follows_the_vehicle),
+        cmocka_unit_test(motors_follow_the_gyroscope),
+        cmocka_unit_test(a_turning_vehicle_drags_the_platform),
         cmocka_unit_test(gauss_markov_drift_is_stationary),
         cmocka_unit_test(gauss_markov_drift_from_zero_grows),
         cmocka_unit_test(gauss_markov_law_does_not_depend_on_the_step),
