@@ -1,4 +1,4 @@
-"""What the settings of PSA-2's converter filter do to its zero and to interference, through the wire, beside what is published.
+"""What PSA-2's converter filter does to its zero and to interference, through the wire, beside what is published.
 
 Section 5 of the article (boards) says that the tunable filter improves the drift of zero, its conclusion that these
 converters must be protected from interference. Here the rate, the phase and the gain are written to the converters'
@@ -95,7 +95,10 @@ def record(unit: Psa2, setting: Setting, seconds: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Zero:
-    """Of one setting: rms of a reading (3,), Allan deviations (taus, 3), V; X board, Y with a walk, Z with mains."""
+    """Of one setting: rms of a reading (3,), Allan deviations (taus, 3), V, NaN where the record is too short.
+
+    X is the board alone, Y has a sensor whose zero walks, Z the mains.
+    """
 
     setting: Setting
     rms_v: Floats
@@ -107,8 +110,11 @@ def zero_of(bench: Bench, setting: Setting, seconds: float, taus_s: Sequence[flo
     unit = bench.board(Psa2)
     set_up(unit, setting)
     u_v = record(unit, setting, seconds)
-    allan = [[allan_deviation(u_v[:, a], 1.0 / setting.rate_hz, tau) for a in range(3)] for tau in taus_s]
-    return Zero(setting, u_v.std(axis=0), np.array(allan))
+    allan = np.full((len(taus_s), 3), np.nan)
+    for i, tau_s in enumerate(taus_s):
+        if 2.0 * tau_s < seconds:
+            allan[i] = [allan_deviation(u_v[:, axis], 1.0 / setting.rate_hz, tau_s) for axis in range(3)]
+    return Zero(setting, u_v.std(axis=0), allan)
 
 
 # ---- interference
