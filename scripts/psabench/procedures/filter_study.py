@@ -23,7 +23,6 @@ from psabench.link.signals import Floats
 MOD_HZ = 1_024_000.0  # 4.096 MHz / 4, converter data sheet
 VREF_V, DIVIDER = 5.0, 8.0  # article; profile
 POLE_HZ = 10e3  # of the board, E0
-NOISE_BAND = {"linear": 0.4130, "minimum": 0.4138}  # of the data rate, from the coefficients (docs/chips/ads1282.md)
 # SNR, dB, of a full-scale sine by gain, for 250 SPS; 3 dB less for each doubling of the rate (docs/chips/ads1282.md).
 SNR_DB: Mapping[int, float] = {1: 130.0, 2: 130.0, 4: 129.0, 8: 128.0, 16: 125.0, 32: 119.0, 64: 114.0}
 PHASES = ("linear", "minimum")
@@ -68,7 +67,9 @@ class Setting:
     @property
     def density_v_rthz(self) -> float:
         """The same as white noise before the filter."""
-        return self.noise_v / math.sqrt(NOISE_BAND[self.phase] * self.rate_hz)
+        h = converter_filter.weights(self.ratio, self.phase)
+        band = float(np.sum(h**2) / np.sum(h) ** 2) * converter_filter.BLOCKS / 2.0  # of the data rate
+        return self.noise_v / math.sqrt(band * self.rate_hz)
 
     def __str__(self) -> str:
         return f"{self.rate_hz} SPS, {self.phase}, gain {self.gain}"
