@@ -2,8 +2,8 @@
 
     s^2(tau) = 1/2 <(m_(k+1) - m_k)^2>,   m_k: means over tau, one after the other
 
-White noise of one-sided density S0 has sqrt(S0 / (2 tau)), a random walk of K per root second K sqrt(tau / 3), a sine of
-amplitude A and frequency f A sin^2(pi f tau) / (pi f tau).
+White noise of one-sided density S0 has sqrt(S0 / (2 tau)), a random walk of K per root second K sqrt(tau / 3), a sine
+of amplitude A and frequency f A sin^2(pi f tau) / (pi f tau).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def allan_deviation(values: Floats, step_s: float, tau_s: float) -> float:
-    """Over tau_s, a whole number of steps; every pair of neighbouring means. Raises ValueError for too short a record."""
+    """Over tau_s, a whole number of steps, from every pair of neighbouring means. Raises ValueError: too short."""
     m = round(tau_s / step_s)
     if not 1 <= m <= len(values) // 2:
         raise ValueError(expected(f"{step_s:g} to {len(values) // 2 * step_s:g} s", tau_s, "tau_s"))

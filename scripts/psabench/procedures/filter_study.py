@@ -1,4 +1,4 @@
-"""What the settings of PSA-2's converter filter do to its zero and to interference, through the wire, beside what is published.
+"""What PSA-2's converter filter does to its zero and to interference, through the wire, beside what is published.
 
 Section 5 of the article (boards) says that the tunable filter improves the drift of zero, its conclusion that these
 converters must be protected from interference. Here the rate, the phase and the gain are written to the converters'
@@ -23,7 +23,6 @@ from psabench.link.signals import Floats
 MOD_HZ = 1_024_000.0  # 4.096 MHz / 4, converter data sheet
 VREF_V, DIVIDER = 5.0, 8.0  # article; profile
 POLE_HZ = 10e3  # of the board, E0
-NOISE_BAND = {"linear": 0.4130, "minimum": 0.4138}  # of the data rate, from the coefficients (docs/chips/ads1282.md)
 # SNR, dB, of a full-scale sine by gain, for 250 SPS; 3 dB less for each doubling of the rate (docs/chips/ads1282.md).
 SNR_DB: Mapping[int, float] = {1: 130.0, 2: 130.0, 4: 129.0, 8: 128.0, 16: 125.0, 32: 119.0, 64: 114.0}
 PHASES = ("linear", "minimum")
@@ -68,7 +67,9 @@ class Setting:
     @property
     def density_v_rthz(self) -> float:
         """The same as white noise before the filter."""
-        return self.noise_v / math.sqrt(NOISE_BAND[self.phase] * self.rate_hz)
+        h = converter_filter.weights(self.ratio, self.phase)
+        band = float(np.sum(h**2) / np.sum(h) ** 2) * converter_filter.BLOCKS / 2.0  # of the data rate
+        return self.noise_v / math.sqrt(band * self.rate_hz)
 
     def __str__(self) -> str:
         return f"{self.rate_hz} SPS, {self.phase}, gain {self.gain}"
@@ -95,7 +96,10 @@ def record(unit: Psa2, setting: Setting, seconds: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Zero:
-    """Of one setting: rms of a reading (3,), Allan deviations (taus, 3), V; X board, Y with a walk, Z with mains."""
+    """Of one setting: rms of a reading (3,), Allan deviations (taus, 3), V, NaN where the record is too short.
+
+    X is the board alone, Y has a sensor whose zero walks, Z the mains.
+    """
 
     setting: Setting
     rms_v: Floats
@@ -107,8 +111,11 @@ def zero_of(bench: Bench, setting: Setting, seconds: float, taus_s: Sequence[flo
     unit = bench.board(Psa2)
     set_up(unit, setting)
     u_v = record(unit, setting, seconds)
-    allan = [[allan_deviation(u_v[:, a], 1.0 / setting.rate_hz, tau) for a in range(3)] for tau in taus_s]
-    return Zero(setting, u_v.std(axis=0), np.array(allan))
+    allan = np.full((len(taus_s), 3), np.nan)
+    for i, tau_s in enumerate(taus_s):
+        if 2.0 * tau_s < seconds:
+            allan[i] = [allan_deviation(u_v[:, axis], 1.0 / setting.rate_hz, tau_s) for axis in range(3)]
+    return Zero(setting, u_v.std(axis=0), allan)
 
 
 # ---- interference

@@ -7,11 +7,11 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from psabench import Bench
+from psabench.boards.psa2 import converter_filter as reference
 from rig import one_line, psa_emu
 
 pytestmark = pytest.mark.host

@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 
-from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
-from psabench.boards.psa2.converter_filter import BLOCKS
 from chip_bench import Ads1282, amplitude, chi_square_is_inside
 from numpy.typing import NDArray
+from psabench.boards.psa2 import converter_filter as reference
+from psabench.boards.psa2.converter_filter import BLOCKS
 
 FULL_SCALE = 2**30  # of a word of the FIR modes, in LSB of its 31 bits
 VREF_V = 5.0

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from psabench.boards.psa2 import converter_filter as reference
 import numpy as np
 import pytest
 from chip_bench import Ads1282
 from numpy.typing import NDArray
+from psabench.boards.psa2 import converter_filter as reference
 from recordings import recorded_file
 from scipy.signal import fftconvolve
 
