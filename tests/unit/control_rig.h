@@ -32,6 +32,7 @@ static struct {
     char pushed[2048]; /* the latest line */
     char path[64];
     unsigned unit;
+    bool wires;
 } asked;
 
 static inline bool on_run(void *ctx, int64_t for_ns, uint64_t after_tx, char *why)
@@ -59,12 +60,13 @@ static inline void on_push(void *ctx, void *client, const char *line)
     snprintf(asked.pushed, sizeof asked.pushed, "%s", line);
 }
 
-static inline bool on_vcd_start(void *ctx, const char *path, unsigned unit, uint64_t max_bytes, char *why)
+static inline bool on_vcd_start(void *ctx, const char *path, unsigned unit, bool wires, uint64_t max_bytes, char *why)
 {
     (void)ctx, (void)max_bytes;
     snprintf(asked.path, sizeof asked.path, "%s", path);
     snprintf(why, CONTROL_WHY_MAX, "no room");
     asked.unit = unit;
+    asked.wires = wires;
     return !asked.refuse;
 }
 

@@ -219,7 +219,10 @@ static void recordings_go_to_the_bench(void **state)
     assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\",\"unit\":\"b\"}}", "\"ok\":true");
     assert_string_equal(asked.path, "x.vcd");
     assert_int_equal(asked.unit, 1);
+    assert_false(asked.wires);
     assert_says("{\"cmd\":\"vcd.stop\"}", "\"ok\":true");
+    assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\",\"pairs\":true}}", "\"ok\":true");
+    assert_true(asked.wires);
     asked.refuse = true;
     assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"x.vcd\"}}", "\"text\":\"no room\"");
     assert_says("{\"cmd\":\"vcd.start\",\"args\":{\"path\":\"\"}}", "path: expected a text");
