@@ -18,7 +18,7 @@ from psabench.mems_gyro.fit import MemsGyroResult, estimate_gyro, expected_value
 from psabench.mems_gyro.params import BLOCK_S, MemsGyroOptions, MemsGyroParams
 from psabench.mems_gyro.plan import Dwell
 from psabench.mems_gyro.run import run_gyro
-from psabench.mems_gyro.wire import measure
+from psabench.mems_gyro.wire import measure_gyro
 from psabench.procedures.head_bench import Silent
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py/support"))
@@ -127,7 +127,7 @@ def through_the_model(seed: int, p: MemsGyroParams, folder: str) -> Run:
     """One drawn gyro; the library is in the folder."""
     bench = ModelBench(library(folder), p, seed)
     dwells: list[Dwell] = []
-    measure(bench, p, Silent(), dwells.append)
+    measure_gyro(bench, p, Silent(), dwells.append)
     right = expected_values(bench.truth)
     right["zero_v"] += float(np.mean(bench.moved_v))
     return errors_of(estimate_gyro(dwells, p), right)

@@ -17,7 +17,7 @@ from psabench.budget.gum import expand_estimate
 from psabench.errors import BenchError, expected
 from psabench.estimate.uncertainty import Component, Correlation, Estimate, correlation, not_identifiable
 from psabench.mems_gyro import model
-from psabench.mems_gyro.noise import NoiseFit, allan_deviations, fit_noise, kernels
+from psabench.mems_gyro.noise import NoiseFit, allan_deviations, fit_noise, term_kernels
 from psabench.mems_gyro.params import BLOCK_S, NAME, MemsGyroParams
 from psabench.mems_gyro.plan import Dwell, Floats
 
@@ -89,16 +89,16 @@ class _Observations:
 
 def estimate_gyro(dwells: Sequence[Dwell], p: MemsGyroParams) -> MemsGyroResult:
     """From one recording at rest and the dwells of the series. Raises BenchError where a term cannot be told."""
-    o = _observed(dwells, p)
+    o = _as_observations(dwells, p)
     theta = _least_squares(o, np.eye(len(o.y)))
-    parts = kernels(o.t_s, o.duration_s)
-    noise = fit_noise(o.y - model.predict_v(theta, o.rows), model.jacobian(theta, o.rows), parts)
+    parts = term_kernels(o.t_s, o.duration_s)
+    noise = fit_noise(o.y - model.predict_v(theta, o.rows), model.model_jacobian(theta, o.rows), parts)
     v = sum((x * k for x, k in zip(noise.v, parts, strict=True)), np.zeros_like(parts[0]))
     inverse = np.linalg.inv(v)
     theta = _least_squares(o, inverse)
-    gain = _gain(o, theta, inverse)
+    gain = _gain_matrix(o, theta, inverse)
     estimates, cov = _with_confidence(o, theta, gain, noise, parts)
-    budget = dict(_budget(o, theta, gain, p))
+    budget = dict(_budget_rows(o, theta, gain, p))
     expanded = [
         expand_estimate(e, [Component(name=n, u=float(u[k])) for n, u in budget.items() if u[k] > 1e-6 * e.sd])
         for k, e in enumerate(estimates)
@@ -118,16 +118,16 @@ def estimate_gyro(dwells: Sequence[Dwell], p: MemsGyroParams) -> MemsGyroResult:
         allan_dps=allan,
         dwells=tuple(dwells),
         residual_v=residual[o.dwell >= 0],
-        doubts=tuple(_doubts(o, theta, inverse, residual, dwells, float(noise.v[0]))),
+        doubts=tuple(_list_doubts(o, theta, inverse, residual, dwells, float(noise.v[0]))),
     )
 
 
-def _observed(dwells: Sequence[Dwell], p: MemsGyroParams) -> _Observations:
+def _as_observations(dwells: Sequence[Dwell], p: MemsGyroParams) -> _Observations:
     y, rows, t_s, duration_s, rest, number = [], [], [], [], [], []
     count = 0
     for d in dwells:
-        row = np.concatenate(model.felt(d, p))
-        sizes = _sizes(len(d.blocks_v)) if d.recording else [len(d.blocks_v)]
+        row = np.concatenate(model.felt_motion(d, p))
+        sizes = _mean_sizes(len(d.blocks_v)) if d.recording else [len(d.blocks_v)]
         block_s, first = d.duration_s / len(d.blocks_v), 0
         for size in sizes:
             y.append(float(d.blocks_v[first : first + size].mean()))
@@ -148,7 +148,7 @@ def _observed(dwells: Sequence[Dwell], p: MemsGyroParams) -> _Observations:
     )
 
 
-def _sizes(blocks: int) -> list[int]:
+def _mean_sizes(blocks: int) -> list[int]:
     """Of the means of a recording: short ones show white noise, long ones the slow terms."""
     found: list[int] = []
     for size, most in MEANS:
@@ -162,7 +162,7 @@ def _least_squares(o: _Observations, weight: Floats) -> Floats:
     theta[model.SCALE] = _first_scale(o)
     theta[model.ZERO] = float(o.y.mean())
     for _ in range(NEWTON_ROUNDS):
-        theta = theta + _gain(o, theta, weight) @ (o.y - model.predict_v(theta, o.rows))
+        theta = theta + _gain_matrix(o, theta, weight) @ (o.y - model.predict_v(theta, o.rows))
     return theta
 
 
@@ -175,9 +175,9 @@ def _first_scale(o: _Observations) -> float:
     return slope
 
 
-def _gain(o: _Observations, theta: Floats, weight: Floats) -> Floats:
+def _gain_matrix(o: _Observations, theta: Floats, weight: Floats) -> Floats:
     """(SIZE, n): changes of the estimates by the readings."""
-    j = model.jacobian(theta, o.rows)
+    j = model.model_jacobian(theta, o.rows)
     size = np.abs(j).max(axis=0)
     x = j / size
     normal = x.T @ weight @ x
@@ -194,7 +194,7 @@ def _with_confidence(
     zero = o.rest / o.rest.sum()
     residual = o.y - model.predict_v(theta, o.rows)
     white, slow = gain.copy(), gain.copy()
-    white[0] = gain[0] + zero - zero @ model.jacobian(theta, o.rows) @ gain
+    white[0] = gain[0] + zero - zero @ model.model_jacobian(theta, o.rows) @ gain
     slow[0] = white[0] - zero
     weights = [white, slow, slow]
     shares = np.array([w @ k @ w.T for w, k in zip(weights, parts, strict=True)])  # (3, SIZE, SIZE)
@@ -220,7 +220,7 @@ def _with_confidence(
     return found, cov
 
 
-def _budget(o: _Observations, theta: Floats, gain: Floats, p: MemsGyroParams) -> Iterator[tuple[str, Floats]]:
+def _budget_rows(o: _Observations, theta: Floats, gain: Floats, p: MemsGyroParams) -> Iterator[tuple[str, Floats]]:
     """What no reading shows: each influence disturbs the readings by one standard uncertainty (GUM 5.1.3, note 2)."""
     out_v = model.predict_v(theta, o.rows)
     zero = o.rest / o.rest.sum()
@@ -228,7 +228,7 @@ def _budget(o: _Observations, theta: Floats, gain: Floats, p: MemsGyroParams) ->
 
     def moved(change_v: Floats) -> Floats:
         d = gain @ change_v
-        d[0] += float(zero @ (change_v - model.jacobian(theta, o.rows) @ (gain @ change_v)))
+        d[0] += float(zero @ (change_v - model.model_jacobian(theta, o.rows) @ (gain @ change_v)))
         found: Floats = d * per
         return found
 
@@ -262,21 +262,21 @@ def _noise_estimates(noise: NoiseFit, scale_v_per_dps: float) -> Iterator[Estima
         yield e if known else not_identifiable(e, f"the recording says no more than: below {most:.3g} {q.unit}")
 
 
-def _doubts(
+def _list_doubts(
     o: _Observations, theta: Floats, inverse: Floats, residual: Floats, dwells: Sequence[Dwell], white: float
 ) -> Iterator[str]:
     """Dwells that the others do not predict; outputs that stand still."""
-    j = model.jacobian(theta, o.rows)
+    j = model.model_jacobian(theta, o.rows)
     j = j / np.abs(j).max(axis=0)
     pure = inverse - inverse @ j @ np.linalg.solve(j.T @ inverse @ j, j.T @ inverse)
     z = (pure @ residual) / np.sqrt(np.maximum(np.diag(pure), 1e-300))
     series = [d for d in dwells if not d.recording]
     for k in np.flatnonzero((np.abs(z) > OUTLIER_SD) & (o.dwell >= 0)):
         d = series[o.dwell[k]]
-        yield f"{_where(d)}: {z[k]:+.1f} standard deviations from what the other dwells say"
+        yield f"{_dwell_name(d)}: {z[k]:+.1f} standard deviations from what the other dwells say"
     for d in series:
         if _too_still(d, white):
-            yield f"{_where(d)}: the output has no noise: at a limit, or stuck"
+            yield f"{_dwell_name(d)}: the output has no noise: at a limit, or stuck"
 
 
 def _too_still(d: Dwell, white: float) -> bool:
@@ -288,7 +288,7 @@ def _too_still(d: Dwell, white: float) -> bool:
     return bool(gammainc((n - 1) / 2.0, squares / 2.0) < STILL_P)
 
 
-def _where(d: Dwell) -> str:
+def _dwell_name(d: Dwell) -> str:
     return f"{d.rate_dps:+.1f} °/s at {d.middle_deg:g}°, {d.inner_deg:g}°"
 
 

@@ -32,7 +32,7 @@ def _turn_x(deg: float) -> Floats:
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
-def felt(d: Dwell, p: MemsGyroParams) -> tuple[Floats, Floats]:
+def felt_motion(d: Dwell, p: MemsGyroParams) -> tuple[Floats, Floats]:
     """Mean rate, °/s, and a, g, on the gyro's axes. The horizontal part of the Earth's rate turns with the table."""
     half_turn_rad = math.radians(d.rate_dps * d.duration_s / 2)
     azimuth_rad = math.radians(p.azimuth_deg + d.heading_deg) + half_turn_rad
@@ -45,7 +45,7 @@ def felt(d: Dwell, p: MemsGyroParams) -> tuple[Floats, Floats]:
 
 def felt_rows(dwells: Sequence[Dwell], p: MemsGyroParams) -> Floats:
     """(n, 6): rate and a of each dwell."""
-    return np.array([np.concatenate(felt(d, p)) for d in dwells])
+    return np.array([np.concatenate(felt_motion(d, p)) for d in dwells])
 
 
 def _sensed_dps(theta: Floats, rows: Floats) -> Floats:
@@ -61,7 +61,7 @@ def predict_v(theta: Floats, rows: Floats) -> Floats:
     return out
 
 
-def jacobian(theta: Floats, rows: Floats) -> Floats:
+def model_jacobian(theta: Floats, rows: Floats) -> Floats:
     """(n, SIZE): derivatives of `predict_v` by the parameters."""
     x = _sensed_dps(theta, rows)
     slope = theta[SCALE] * (1.0 + x * (2.0 * theta[SQUARE] + 3.0 * x * theta[CUBE]))

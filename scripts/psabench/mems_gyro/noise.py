@@ -57,7 +57,7 @@ def _walk_twice(t: Floats) -> Floats:
     return out
 
 
-def kernels(t_s: Floats, duration_s: Floats) -> list[Floats]:
+def term_kernels(t_s: Floats, duration_s: Floats) -> list[Floats]:
     """Covariance of means over [t, t + duration] by each term of power 1, (n, n) each."""
     span_s = float((t_s + duration_s).max() - t_s.min())
     ends = np.subtract.outer(t_s, t_s)
@@ -87,34 +87,34 @@ class NoiseFit:
 
 def fit_noise(y: Floats, design: Floats, parts: list[Floats]) -> NoiseFit:
     """Restricted maximum likelihood by Fisher scoring; powers that would be negative are none."""
-    free = _complement(design)
+    free = _free_basis(design)
     z = free.T @ y
     h = [free.T @ g @ free for g in parts]
     scale = np.array([float(z @ z) / float(np.trace(k)) for k in h])
     v = scale / len(h)
     active = np.ones(len(h), dtype=bool)
     for _ in range(ROUNDS):
-        score, info = _scoring(z, h, v)
+        score, info = _score_terms(z, h, v)
         step = np.zeros_like(v)
         step[active] = np.linalg.solve(info[np.ix_(active, active)], score[active])
         new = np.where(active, np.maximum(v + step, 0.03 * v), 0.0)
-        new, active = _pinned(new, scale, active)
+        new, active = _pin_terms(new, scale, active)
         done = bool(np.all(np.abs(new - v) <= CLOSE * np.maximum(new, LEAST * scale)))
         v = new
         if done:
             break
-    _, info = _scoring(z, h, v)
+    _, info = _score_terms(z, h, v)
     return NoiseFit(v=v, cov=np.asarray(np.linalg.inv(info), dtype=np.float64))
 
 
-def _pinned(v: Floats, scale: Floats, active: npt.NDArray[np.bool_]) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _pin_terms(v: Floats, scale: Floats, active: npt.NDArray[np.bool_]) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """White noise stays: without it nothing has an inverse."""
     none = active & (v < LEAST * scale)
     none[0] = False
     return np.where(none, 0.0, v), active & ~none
 
 
-def _scoring(z: Floats, h: list[Floats], v: Floats) -> tuple[Floats, Floats]:
+def _score_terms(z: Floats, h: list[Floats], v: Floats) -> tuple[Floats, Floats]:
     inverse = np.linalg.inv(sum((x * k for x, k in zip(v, h, strict=True)), np.zeros_like(h[0])))
     weighed = [inverse @ k for k in h]
     w = inverse @ z
@@ -123,7 +123,7 @@ def _scoring(z: Floats, h: list[Floats], v: Floats) -> tuple[Floats, Floats]:
     return score, info
 
 
-def _complement(design: Floats) -> Floats:
+def _free_basis(design: Floats) -> Floats:
     """Orthonormal columns across those of the design."""
     scaled = design / np.abs(design).max(axis=0)
     q, _ = np.linalg.qr(scaled, mode="complete")

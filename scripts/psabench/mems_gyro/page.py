@@ -83,7 +83,7 @@ def result_dict(run: MemsGyroRun) -> dict[str, Any]:
     one = {
         "label": str(run.facts["bench"]),
         "procedure": NAME,
-        "estimates": [_estimate(run, e) for e in (*r.estimates, *r.noise)],
+        "estimates": [_estimate_dict(run, e) for e in (*r.estimates, *r.noise)],
         "correlation": {"names": list(r.correlation.names), "matrix": r.correlation.matrix.tolist()},
         "nonlinearity_part_of_full_scale": r.nonlinearity,
         "allan": {"tau_s": r.tau_s.tolist(), "deviation_dps": r.allan_dps.tolist()},
@@ -92,7 +92,7 @@ def result_dict(run: MemsGyroRun) -> dict[str, Any]:
     return {"format": 1, "facts": {"procedure": NAME, **run.facts}, "params": asdict(run.params), "sections": [one]}
 
 
-def _estimate(run: MemsGyroRun, e: Estimate) -> dict[str, Any]:
+def _estimate_dict(run: MemsGyroRun, e: Estimate) -> dict[str, Any]:
     found: dict[str, Any] = {
         "name": e.name,
         "unit": e.unit,

@@ -51,7 +51,7 @@ def rates_dps(p: MemsGyroParams, attitude: int) -> list[float]:
     return [0.0, *(sign * level * p.range_dps for level in levels for sign in (1.0, -1.0)), 0.0]
 
 
-def steps(p: MemsGyroParams) -> Iterator[tuple[float, float, list[float]]]:
+def plan_steps(p: MemsGyroParams) -> Iterator[tuple[float, float, list[float]]]:
     """Middle and inner angle, rates: every second series in the other order, so that a drift is no asymmetry."""
     for series in range(p.series):
         order = range(len(ATTITUDES)) if series % 2 == 0 else reversed(range(len(ATTITUDES)))
@@ -62,4 +62,4 @@ def steps(p: MemsGyroParams) -> Iterator[tuple[float, float, list[float]]]:
 
 def parts_of(p: MemsGyroParams) -> int:
     """Dwells of the series."""
-    return sum(len(rates) for *_, rates in steps(p))
+    return sum(len(rates) for *_, rates in plan_steps(p))

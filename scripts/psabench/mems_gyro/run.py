@@ -16,7 +16,7 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.mems_gyro.fit import MemsGyroResult, estimate_gyro, expected_values
 from psabench.mems_gyro.params import NAME, SCENARIO, MemsGyroOptions, MemsGyroParams
 from psabench.mems_gyro.plan import Dwell
-from psabench.mems_gyro.wire import WireTable, measure
+from psabench.mems_gyro.wire import WireTable, measure_gyro
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.result import made_params
 
@@ -81,7 +81,7 @@ def run_gyro(options: MemsGyroOptions, progress: Progress) -> MemsGyroRun:
         watch = TruthWatch(bench, p.channel)
         table = WireTable(bench, p, watch)
         try:
-            measure(table, p, progress, dwells.append)
+            measure_gyro(table, p, progress, dwells.append)
         finally:  # Ctrl-C, too: what was measured is kept
             write_dwells(options, dwells)
     result = estimate_gyro(dwells, p)

@@ -11,7 +11,7 @@ from psabench.bench import Bench
 from psabench.boards.psa2.device import SETTLE_PERIODS
 from psabench.errors import BadInput, LinkError, TimeOut, expected
 from psabench.mems_gyro.params import BLOCK_S, NAME, MemsGyroParams
-from psabench.mems_gyro.plan import Dwell, parts_of, steps
+from psabench.mems_gyro.plan import Dwell, parts_of, plan_steps
 from psabench.procedures.head_bench import Progress
 from psabench.sins.table_drive import table_axes
 
@@ -38,7 +38,7 @@ class TableBench(Protocol):
         ...
 
 
-def measure(bench: TableBench, p: MemsGyroParams, progress: Progress, keep: Callable[[Dwell], None]) -> None:
+def measure_gyro(bench: TableBench, p: MemsGyroParams, progress: Progress, keep: Callable[[Dwell], None]) -> None:
     """The recording at rest, then the series. keep: gets each dwell as it comes."""
     with progress.step("recording at rest", 1) as done:
         bench.orient(0.0, 0.0)
@@ -46,7 +46,7 @@ def measure(bench: TableBench, p: MemsGyroParams, progress: Progress, keep: Call
         keep(bench.dwell(p.rest_s, recording=True))
         done("")
     with progress.step("attitudes and rates", parts_of(p)) as done:
-        for middle_deg, inner_deg, rates in steps(p):
+        for middle_deg, inner_deg, rates in plan_steps(p):
             bench.spin(0.0)
             bench.orient(middle_deg, inner_deg)
             for rate_dps in rates:

@@ -11,10 +11,10 @@ import pytest
 from psabench.errors import BenchError
 from psabench.mems_gyro import model
 from psabench.mems_gyro.fit import estimate_gyro, expected_values
-from psabench.mems_gyro.noise import allan_deviations, allan_law, fit_noise, kernels
+from psabench.mems_gyro.noise import allan_deviations, allan_law, fit_noise, term_kernels
 from psabench.mems_gyro.params import MemsGyroParams
 from psabench.mems_gyro.plan import ATTITUDES, Dwell
-from psabench.mems_gyro.wire import measure
+from psabench.mems_gyro.wire import measure_gyro
 from psabench.procedures.head_bench import Silent
 
 from tests.coverage import mems_gyro as coverage
@@ -32,7 +32,7 @@ def dwells_of(folder: str, p: MemsGyroParams, seed: int, **changed: float) -> tu
     """Of a drawn gyro with a chain and a mounting without error where p says so; what the estimates should be."""
     bench = coverage.ModelBench(coverage.library(folder), p, seed, changed)
     dwells: list[Dwell] = []
-    measure(bench, p, Silent(), dwells.append)
+    measure_gyro(bench, p, Silent(), dwells.append)
     right = expected_values(bench.truth)
     right["zero_v"] += float(np.mean(bench.moved_v))
     return dwells, right
@@ -73,7 +73,7 @@ def test_each_channel_has_its_own_axes(folder: str, channel: str) -> None:
             duration_s=1.0,
             blocks_v=np.zeros(1),
         )
-        w_dps, a_g = model.felt(still, p)
+        w_dps, a_g = model.felt_motion(still, p)
         assert np.roll(w_dps, p.channel) == pytest.approx(np.degrees(w), abs=1e-9)
         assert np.roll(a_g, p.channel) == pytest.approx(-f / lab.g_mps2, abs=1e-6)
 
@@ -91,16 +91,16 @@ def test_the_earth_s_rate_is_averaged_over_a_turn() -> None:
     parts = 3000
     step_s = turning.duration_s / parts
     each = [
-        model.felt(replace(turning, heading_deg=25.0 + 70.0 * k * step_s, duration_s=step_s), SHORT)[0]
+        model.felt_motion(replace(turning, heading_deg=25.0 + 70.0 * k * step_s, duration_s=step_s), SHORT)[0]
         for k in range(parts)
     ]
-    assert model.felt(turning, SHORT)[0] == pytest.approx(np.mean(each, axis=0), abs=1e-9)
+    assert model.felt_motion(turning, SHORT)[0] == pytest.approx(np.mean(each, axis=0), abs=1e-9)
 
 
 @pytest.mark.parametrize("v", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, 2.0, 1e-3)])
 @pytest.mark.parametrize("tau_s", [1.0, 30.0, 400.0])
 def test_covariances_of_means_give_the_allan_law(v: tuple[float, float, float], tau_s: float) -> None:
-    parts = kernels(np.array([0.0, tau_s, 5000.0]), np.array([tau_s, tau_s, 1.0]))
+    parts = term_kernels(np.array([0.0, tau_s, 5000.0]), np.array([tau_s, tau_s, 1.0]))
     c = sum(x * k for x, k in zip(v, parts, strict=True))
     allan = math.sqrt(0.5 * (c[0, 0] + c[1, 1] - 2.0 * c[0, 1]))
     assert allan == pytest.approx(float(allan_law(np.array(v), np.array([tau_s]))[0]), rel=1e-6)
@@ -117,7 +117,7 @@ def test_allan_deviation_of_a_ramp_and_of_white_noise() -> None:
 def test_the_terms_of_the_noise_are_found() -> None:
     """Mean and standard deviation of the powers over drawn recordings are those that the fit says."""
     t_s, duration_s = np.arange(0.0, 1200.0, 10.0), np.full(120, 10.0)
-    parts = kernels(t_s, duration_s)
+    parts = term_kernels(t_s, duration_s)
     right = np.array([1.0, 0.5, 2e-3])
     root = np.linalg.cholesky(sum(x * k for x, k in zip(right, parts, strict=True)))
     rng, ones = np.random.default_rng(3), np.ones((120, 1))
@@ -186,7 +186,7 @@ def test_parameters_out_of_range_are_refused(name: str, value: object, text: str
 def test_the_model_s_derivatives_are_those_of_its_values() -> None:
     theta = np.array([2.5, 0.0125, 0.01, -0.02, 0.1, -0.2, 0.05, 2e-5, 5e-7])
     rows = np.array([[100.0, 3.0, -50.0, 1.0, 0.0, 0.2], [-20.0, 90.0, 1.0, 0.1, -1.0, 0.0]])
-    j = model.jacobian(theta, rows)
+    j = model.model_jacobian(theta, rows)
     for k in range(model.SIZE):
         step = np.zeros(model.SIZE)
         step[k] = 1e-6 * max(abs(theta[k]), 1e-6)
