@@ -71,7 +71,7 @@ def test_magnetic_modes_need_the_sensor() -> None:
 
 
 def tilted_compass(folder: Path, *, known: Mapping[str, float] | None = None, **platform: object) -> GyrocompassResult:
-    """The article's run on the ideal platform with these keys; a vehicle of 5 deg of pitch and roll. known: passport."""
+    """The article's run on the ideal platform with these keys, 5 deg of pitch and roll. known: passport."""
     s: Scenario = json.loads(resolved(str(ROOT / "proto/scenarios/gyrocompass_ideal.yaml")))
     s["platform"] |= platform
     s["vehicle"] |= {"heading_deg": 40.0, "pitch_deg": 5.0, "roll_deg": -5.0}
