@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -69,39 +70,45 @@ def test_magnetic_modes_need_the_sensor() -> None:
         fly_run(row, SHORT, 1, 0, s)
 
 
-def compass(
-    folder: Path, reading: str, *, passport: bool, unbalance: float = 0.0, quadrature: float = 0.0
-) -> GyrocompassResult:
-    """The ideal platform on a vehicle of 5 deg of pitch and roll; on a level one it drifts by 25 deg/h in all."""
+def tilted_compass(folder: Path, *, known: Mapping[str, float] | None = None, **platform: object) -> GyrocompassResult:
+    """The article's run on the ideal platform with these keys, 5 deg of pitch and roll. known: passport."""
     s: Scenario = json.loads(resolved(str(ROOT / "proto/scenarios/gyrocompass_ideal.yaml")))
-    s["platform"] |= {
-        "unbalance_degph_per_g": [unbalance] * 2,
-        "quadrature_degph_per_g": [quadrature] * 2,
-        "drift_degph": [25.0 - quadrature, 25.0 - unbalance],
-    }
+    s["platform"] |= platform
     s["vehicle"] |= {"heading_deg": 40.0, "pitch_deg": 5.0, "roll_deg": -5.0}
     path = folder / "tilted.yaml"
     path.write_text(json.dumps(s), encoding="utf-8")
-    known = {"unbalance1_degph_per_g": unbalance, "quadrature2_degph_per_g": quadrature} if passport else {}
-    p = params_of(reading, {"latitude_deg": 50.0, **known})
+    p = params_of("article", {"latitude_deg": 50.0, **(known or {})})
     with Bench.start(path) as b:
         return gyrocompass.estimate(gyrocompass.measure(WirePlatform(b), p, Silent()), p)
+
+
+def heading_off_deg(r: GyrocompassResult) -> float:
+    return (math.degrees(r.heading_rad) - 40.0 + 180.0) % 360.0 - 180.0
 
 
 def test_mass_unbalance_turns_the_heading_of_a_tilted_vehicle(tmp_path: Path) -> None:
     """1 deg/h/g times the sine of 5 deg twice over, by the Earth's 9.67 deg/h: 0.73 deg; with its passport nothing."""
     want_deg = -math.degrees(math.sin(math.radians(5.0)) * math.sqrt(2.0) / 9.67)
-    off_deg = [
-        math.degrees(compass(tmp_path, "article", unbalance=1.0, passport=known).heading_rad) - 40.0
-        for known in (False, True)
-    ]
-    assert off_deg[0] == pytest.approx(want_deg, abs=0.03)
-    assert abs(off_deg[1]) < 0.01
+    keys = {"unbalance_degph_per_g": [1.0, 1.0], "drift_degph": [25.0, 24.0]}
+    without, known = (tilted_compass(tmp_path, known=k, **keys) for k in ({}, {"unbalance1_degph_per_g": 1.0}))
+    assert heading_off_deg(without) == pytest.approx(want_deg, abs=0.03)
+    assert abs(heading_off_deg(known)) < 0.01
 
 
 def test_quadrature_turns_the_drift_of_a_level_flight(tmp_path: Path) -> None:
     """What the windows find about z has the force of a parked vehicle in it; a hold is level."""
-    without, known = (compass(tmp_path, "article", quadrature=1.0, passport=k).drift2 for k in (False, True))
+    keys = {"quadrature_degph_per_g": [1.0, 1.0], "drift_degph": [24.0, 25.0]}
+    without, known = (tilted_compass(tmp_path, known=k, **keys).drift2 for k in ({}, {"quadrature2_degph_per_g": 1.0}))
     assert abs(without.level_radps / DEGPH - 25.0) > 0.04
     assert known.level_radps / DEGPH == pytest.approx(25.0, abs=0.004)
     assert known.radps == pytest.approx(without.radps, abs=1e-4 * DEGPH)
+
+
+def test_motors_cost_a_heading_by_their_dead_zone_not_by_their_bandwidth(tmp_path: Path) -> None:
+    """1 Hz without a dead zone changes nothing; 20 Hz with one of 10 arcsec costs half a degree, in doubt."""
+    slow = tilted_compass(tmp_path, servo_hz=1.0)
+    stiff = tilted_compass(tmp_path, servo_hz=20.0, servo_dead_arcsec=10.0)
+    assert abs(heading_off_deg(slow)) < 0.06
+    assert slow.doubts == ()
+    assert abs(heading_off_deg(stiff)) > 0.3
+    assert stiff.doubts
