@@ -85,13 +85,13 @@ def allan_figure() -> Figure:
             walk_v = np.array([allan.of_walk(WALK_V_RTS, tau) for tau in TAUS_S])
             ax.plot(taus_s, 1e6 * white_v, color=colour, lw=0.9)
             ax.plot(taus_s, 1e6 * np.hypot(white_v, walk_v), color=colour, lw=0.9, ls="--")
-            ax.plot(taus_s, 1e6 * z.allan_v[:, 0], "o", ms=4, color=colour, label=f"board, {setting}")
-            ax.plot(taus_s, 1e6 * z.allan_v[:, 1], "s", ms=4, mfc="none", color=colour, label="sensor that walks")
+            ax.plot(taus_s, 1e6 * z.allan_v[:, 0], "o", ms=4, color=colour, label=f"{setting.rate_hz} SPS, gain {setting.gain}")
+            ax.plot(taus_s, 1e6 * z.allan_v[:, 1], "s", ms=4, mfc="none", color=colour, label="the same, sensor walks")
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.set_xlabel("averaging time, s (lines: laws of white noise, dashed with the walk; points: readings)")
         ax.set_ylabel("Allan deviation, µV")
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=3)
+        ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8)
         return figure
 
 
