@@ -378,15 +378,27 @@ static bool open_mavlinks(struct ports *p, struct bench *b, const struct options
     return true;
 }
 
+/* --pairs and --vcd-analog add to recordings: of --vcd the unit, without it one of the bench must have what they add. */
+static bool check_signals(const struct bench *b, const struct options *o, char *why, size_t cap)
+{
+    const unsigned first = o->vcd ? b->watched : 0, end = o->vcd ? first + 1 : b->scenario.unit_count;
+    bool pairs = false, reals = false;
+    for (unsigned i = first; i < end; i++) {
+        pairs |= b->unit[i].type->pairs != NULL;
+        reals |= unit_trace(&b->unit[i])->reals != NULL;
+    }
+    const char *const got = b->unit[first].type->name;
+    if (o->pairs && !pairs)
+        return why_fail(why, cap, "--pairs: expected a board with differential pairs (psa2, bins), got %s", got);
+    return !o->vcd_analog || reals ||
+           why_fail(why, cap, "--vcd-analog: expected a board with real-valued channels (pmka), got %s", got);
+}
+
 static bool open_vcd(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     if (!o->vcd) return true;
     p->vcd = own_file_output("--vcd ", o->vcd, &p->refused, why, cap);
     if (!p->vcd) return false;
-    const struct unit *u = &b->unit[b->watched];
-    if (o->vcd_analog && !unit_trace(u)->reals)
-        return why_fail(why, cap, "--vcd-analog: expected a board with real-valued channels (pmka), got %s",
-                        u->type->name);
     const struct bench_recording what = {b->watched, o->pairs, o->vcd_analog, o->vcd_unit_ns, 0};
     return bench_record(b, &what, p->vcd) ||
            why_fail(why, cap, "--vcd-unit: expected a time unit of VCD, got %u", o->vcd_unit_ns);
@@ -419,7 +431,7 @@ bool ports_check(struct ports *p, const struct bench *b, const struct options *o
     return instruments_check(&p->scpi, o, why, cap) &&
            check_unit_ports(b, &bus_ports, o->bus, o->bus_count, why, cap) &&
            check_unit_ports(b, &serial_ports, o->serial, o->serial_count, why, cap) && logic_check(b, o, why, cap) &&
-           mavlink_check(b, o, why, cap);
+           mavlink_check(b, o, why, cap) && check_signals(b, o, why, cap);
 }
 
 bool ports_open(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)

@@ -44,9 +44,8 @@ static bool has_pair(const struct control_bench *b, const struct fault *f, char 
 {
     const struct unit *u = b->unit[f->point.unit];
     return line_has_pair(&u->board->line, f->point.index) ||
-           why_fail(why, CONTROL_WHY_MAX, "%s: %s is no differential pair; %s%s", f->kind->name, f->name,
-                    u->type->pairs ? "such are the lines to the navigation computer of a " : "there is none on a ",
-                    u->type->title);
+           why_fail(why, CONTROL_WHY_MAX, "%s: expected %s, got %s", f->kind->name,
+                    u->type->pairs ? "a line with wires A and B" : "a board with differential pairs", f->name);
 }
 
 /* Only one line has pulses with a place in the frame. */

@@ -94,7 +94,7 @@ struct levels {
 static struct levels faulty_levels(const struct line_faults *l)
 {
     uint64_t level = l->level, swapped = 0, high = 0, low = 0, open = 0;
-    for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) {
+    for (const struct line_fault_slot *s = l->slot; s < l->slot + l->top; s++) {
         if (s->id == 0 || !s->began) continue;
         if (s->flip) level ^= bit_of(s);
         if (s->f.kind == LINE_INVERTED) swapped ^= bit_of(s);
@@ -142,7 +142,7 @@ static void report_levels(struct line_faults *l, struct out *o, int64_t t_ns)
 static int64_t next_due_ns(const struct line_faults *l)
 {
     int64_t next_ns = NEVER;
-    for (const struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
+    for (const struct line_fault_slot *s = l->slot; s < l->slot + l->top; s++)
         if (due_ns(s) < next_ns) next_ns = due_ns(s);
     for (const struct pair *p = l->pair; p < l->pair + l->pairs; p++)
         if (pair_due_ns(p) < next_ns) next_ns = pair_due_ns(p);
@@ -154,7 +154,7 @@ static int64_t next_due_ns(const struct line_faults *l)
 static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
 {
     for (int64_t at_ns; (at_ns = next_due_ns(l)) <= t_ns;) {
-        for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++)
+        for (struct line_fault_slot *s = l->slot; s < l->slot + l->top; s++)
             if (due_ns(s) == at_ns) run_fault(s, at_ns);
         for (struct pair *p = l->pair; p < l->pair + l->pairs; p++) pair_run(p, at_ns);
         if (at_ns < t_ns) report_levels(l, o, at_ns < l->done_ns ? l->done_ns : at_ns);
@@ -164,12 +164,12 @@ static void run_until(struct line_faults *l, struct out *o, int64_t t_ns)
 static void take_step(struct line_faults *l, const struct trace_step *step)
 {
     l->level = trace_after(l->level, step);
-    for (struct line_fault_slot *s = l->slot; s < l->slot + LINE_FAULTS_MAX; s++) watch_step(s, step);
+    for (struct line_fault_slot *s = l->slot; s < l->slot + l->top; s++) watch_step(s, step);
 }
 
 static bool any_active(const struct line_faults *l)
 {
-    for (unsigned i = 0; i < LINE_FAULTS_MAX; i++)
+    for (unsigned i = 0; i < l->top; i++)
         if (l->slot[i].id) return true;
     return false;
 }
@@ -180,7 +180,7 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
     struct out o = {.n = 0};
     /* No sinks are left: early reports are processed, but a new sink gets steps from done_ns on. */
     if (until_ns == INT64_MAX || until_ns < l->done_ns) until_ns = l->done_ns;
-    l->level = before; /* lines that no observer to move without a step */
+    l->level = before; /* a line without an observer moves without a step */
     for (const struct trace_step *const end = s + n; s < end;) {
         const int64_t t_ns = s->t_ns;
         run_until(l, &o, t_ns);
@@ -191,7 +191,9 @@ static void on_steps(void *ctx, uint64_t before, const struct trace_step *s, uns
     report_levels(l, &o, until_ns);
     flush_steps(l, &o);
     l->done_ns = until_ns;
-    if (!any_active(l) && !(l->trace->standing && l->trace->sinks)) l->trace->filter = NULL;
+    const bool active = any_active(l);
+    if (!active) l->top = 0;
+    if (!active && !(l->trace->standing && l->trace->sinks)) l->trace->filter = NULL;
 }
 
 /* ---- for the owner ---- */
@@ -259,6 +261,7 @@ uint32_t line_fault_add(struct line_faults *l, const struct line_fault *f)
     if (!s) return 0;
     trace_wake(l->trace);
     install_filter(l);
+    if (s >= l->slot + l->top) l->top = (unsigned)(s - l->slot) + 1;
     *s = (struct line_fault_slot){.f = *f, .id = ++l->last_id, .next_ns = NEVER};
     return s->id;
 }

@@ -4,7 +4,7 @@
  * see the fault. Steps stay in order of time and are real changes. Several faults of a line add up, stuck ones win, an open pair
  * wins over these. A line with a pair (pair.h) is seen behind its receiver; its wires A and B are signals of their own, at the
  * drivers: swapped and open wires are at the receiver's end, all other faults at the driver's input. Without a fault, a delay of a
- * receiver and somebody who looks at the wires the trace has no filter. Fixed storage, one thread. */
+ * receiver and a recording of the wires the trace has no filter. Fixed storage, one thread. */
 #ifndef PSABENCH_TRACE_LINE_FAULT_H
 #define PSABENCH_TRACE_LINE_FAULT_H
 
@@ -59,6 +59,7 @@ struct line_faults {
     struct trace *trace;
     struct trace_filter filter;
     struct line_fault_slot slot[LINE_FAULTS_MAX];
+    unsigned top; /* slots from here on are free: an edge looks at none of them */
     uint32_t last_id;
     uint64_t level; /* true levels up to done_ns; those shown are filter.level */
     int64_t done_ns;
@@ -71,7 +72,7 @@ void line_faults_init(struct line_faults *l, struct trace *t);
 /* Before the first step: a line leaves by a pair, whose wires are added to the trace under these names. */
 void line_pair_add(struct line_faults *l, const struct pair_cfg *cfg, const char *name_a, const char *name_b);
 
-/* Somebody looks at the wires, from now on: without this their levels stay as they are. */
+/* The wires are recorded from now on: without this their levels stay as they are. */
 void line_pairs_show(struct line_faults *l);
 
 bool line_has_pair(const struct line_faults *l, unsigned line);

@@ -57,7 +57,7 @@ struct vcd { /* read-only outside vcd.c */
         double value;
     } real[VCD_REALS]; /* in order of time, a ring */
     unsigned real_first, real_count;
-    bool reals;   /* wanted and there */
+    bool reals;   /* requested, and the board has them */
     int error;    /* errno of the first write that failed */
     bool limited; /* EFBIG, at max_bytes */
     bool reported;

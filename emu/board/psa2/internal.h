@@ -90,7 +90,7 @@ void psa2_out_start(struct psa2 *b, int64_t t_ns); /* sends b->latest; dropped a
 
 /* ---- UREF: psa2/uref.c ---- */
 
-#define PSA2_UREF_LEAST 0.01 /* of UREF, where the supply fails altogether: codes are at their limit then */
+#define PSA2_UREF_LEAST 0.01 /* of UREF, whatever the supply does: codes are at their limit then */
 
 bool psa2_uref_moves(const struct psa2 *b);
 double psa2_uref_ratio(const struct psa2_profile *p, double supply_ratio); /* UREF to its nominal value */

@@ -8,73 +8,75 @@
 
 /* The motor's law on one side of the dead zone, x from its edge: gain x, up to a limit. */
 struct side {
-    double gain, limit, rate; /* rate: of x without the motor */
+    double gain_per_s, limit_radps, rate_radps; /* rate: of x without the motor */
 };
 
 /* x after *left_s, or the edge of the piece that it comes to, and the time then left. */
-static double in_limit(const struct side *k, double x, double *left_s)
+static double in_limit(const struct side *k, double x_rad, double *left_s)
 {
-    const double rate = k->rate - k->limit, edge = k->limit / k->gain, t_s = (edge - x) / rate;
-    if (rate >= 0.0 || t_s >= *left_s) {
-        x += rate * *left_s;
+    const double rate_radps = k->rate_radps - k->limit_radps, edge_rad = k->limit_radps / k->gain_per_s,
+                 t_s = (edge_rad - x_rad) / rate_radps;
+    if (rate_radps >= 0.0 || t_s >= *left_s) {
+        x_rad += rate_radps * *left_s;
         *left_s = 0.0;
-        return x;
+        return x_rad;
     }
     *left_s -= t_s;
-    return edge;
+    return edge_rad;
 }
 
-static double in_proportion(const struct side *k, double x, double *left_s)
+static double in_proportion(const struct side *k, double x_rad, double *left_s)
 {
-    const double end = k->rate / k->gain, edge = k->limit / k->gain;
-    const double then = end + (x - end) * det_exp(-fmin(k->gain * *left_s, 700.0));
-    if (then >= 0.0 && then <= edge) {
+    const double end_rad = k->rate_radps / k->gain_per_s, edge_rad = k->limit_radps / k->gain_per_s;
+    const double then_rad = end_rad + (x_rad - end_rad) * det_exp(-fmin(k->gain_per_s * *left_s, 700.0));
+    if (then_rad >= 0.0 && then_rad <= edge_rad) {
         *left_s = 0.0;
-        return then;
+        return then_rad;
     }
-    const double border = then < 0.0 ? 0.0 : edge;
-    const double t_s = x == border ? 0.0 : det_log((x - end) / (border - end)) / k->gain;
+    const double border_rad = then_rad < 0.0 ? 0.0 : edge_rad;
+    const double t_s = x_rad == border_rad ? 0.0 : det_log((x_rad - end_rad) / (border_rad - end_rad)) / k->gain_per_s;
     *left_s = fmax(*left_s - t_s, 0.0);
-    return border;
+    return border_rad;
 }
 
-static double in_dead_zone(double e, double dead, double rate, double *left_s)
+static double in_dead_zone(double now_rad, double dead_rad, double rate_radps, double *left_s)
 {
-    const double border = rate > 0.0 ? dead : -dead;
-    const double t_s = rate == 0.0 ? *left_s : (border - e) / rate;
+    const double border_rad = rate_radps > 0.0 ? dead_rad : -dead_rad;
+    const double t_s = rate_radps == 0.0 ? *left_s : (border_rad - now_rad) / rate_radps;
     if (t_s >= *left_s) {
-        e += rate * *left_s;
+        now_rad += rate_radps * *left_s;
         *left_s = 0.0;
-        return e;
+        return now_rad;
     }
     *left_s -= t_s;
-    return border;
+    return border_rad;
 }
 
 /* +1, -1: on that side of the dead zone, or at its edge and leaving it; 0: in it. */
-static double side_of(double e, double dead, double rate)
+static double side_of(double now_rad, double dead_rad, double rate_radps)
 {
-    if (e > dead || (e == dead && rate > 0.0)) return 1.0;
-    if (e < -dead || (e == -dead && rate < 0.0)) return -1.0;
+    if (now_rad > dead_rad || (now_rad == dead_rad && rate_radps > 0.0)) return 1.0;
+    if (now_rad < -dead_rad || (now_rad == -dead_rad && rate_radps < 0.0)) return -1.0;
     return 0.0;
 }
 
 double follow_after(const struct follow_cfg *cfg, double e_rad, double rotor_radps, double carrier_radps, double h_s)
 {
-    const double dead = cfg->dead_arcsec * RAD_PER_ARCSEC, rate = rotor_radps - carrier_radps;
-    double e = e_rad, left_s = h_s;
+    const double dead_rad = cfg->dead_arcsec * RAD_PER_ARCSEC, rate_radps = rotor_radps - carrier_radps;
+    double now_rad = e_rad, left_s = h_s;
     for (unsigned i = 0; i < PIECES && left_s > 0.0; i++) {
-        const double sign = side_of(e, dead, rate);
+        const double sign = side_of(now_rad, dead_rad, rate_radps);
         if (sign == 0.0) {
-            e = in_dead_zone(e, dead, rate, &left_s);
+            now_rad = in_dead_zone(now_rad, dead_rad, rate_radps, &left_s);
             continue;
         }
-        const struct side k = {TURN_RAD * cfg->hz, cfg->limit_dps * RAD_PER_DEG, sign * rate};
-        const double x = sign * e - dead, edge = k.limit / k.gain;
-        const double further = x > edge || (x > edge * (1.0 - 1e-12) && k.rate > k.limit)
-                                   ? in_limit(&k, x, &left_s)
-                                   : in_proportion(&k, fmin(x, edge), &left_s);
-        e = sign * (dead + further);
+        const struct side k = {TURN_RAD * cfg->hz, cfg->limit_dps * RAD_PER_DEG, sign * rate_radps};
+        const double x_rad = sign * now_rad - dead_rad, edge_rad = k.limit_radps / k.gain_per_s;
+        const double further_rad =
+            x_rad > edge_rad || (x_rad > edge_rad * (1.0 - 1e-12) && k.rate_radps > k.limit_radps)
+                ? in_limit(&k, x_rad, &left_s)
+                : in_proportion(&k, fmin(x_rad, edge_rad), &left_s);
+        now_rad = sign * (dead_rad + further_rad);
     }
-    return e;
+    return now_rad;
 }

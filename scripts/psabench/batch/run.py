@@ -76,8 +76,10 @@ def run_batch(options: RunOptions, progress: Progress) -> BatchRun:
         if getattr(options, name):
             raise BadInput(expected(f"no --{name} beside --batch", getattr(options, name), "run"))
     params = made_params(TurnsParams, "turns", options.params or {})
-    if params.axis != "x" or params.search_deg:
-        raise BadInput(expected("all channels, without a search", f"axis {params.axis}", "turns --batch"))
+    if params.axis != "x":
+        raise BadInput(expected("all channels, no --axis", params.axis, "turns --batch"))
+    if params.search_deg:
+        raise BadInput(expected("no --search-deg", f"{params.search_deg:g}", "turns --batch"))
     options = replace(options, scenario=options.scenario or Path(BATCH.scenario))
     options.out.mkdir(parents=True, exist_ok=True)
     with open_bench(BATCH, options, every_unit=True) as bench:

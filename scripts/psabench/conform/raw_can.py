@@ -27,7 +27,7 @@ LOCKSTEP_S, REAL_S = 1.0, 5.0  # timeout for an answer, bench time; in real time
 FIRST_S, LONGEST_S = 0.0005, 0.05  # steps of the board's time while waiting
 # An emulator takes no more than 128 frames while its time stands still: so many, then so long for them to pass.
 BURST, BURST_S = 50, 0.02
-LEAST = 5  # readings that a judgement wants
+LEAST = 5  # readings that a judgement needs
 # A flood: frames of the highest priority, so many that nothing else goes out meanwhile.
 FLOOD_ID, FLOOD_DATA = 0x001, bytes(range(0x55, 0x5D))
 BIT_S, SPACE_BITS = 1e-6, 3  # of a bus of 1 Mbit/s; on a slower one they take longer

@@ -114,7 +114,8 @@ def _fields(r: Reading) -> dict[str, object]:
     ("words", "why"),
     [
         (["--record", "x.log"], "run: expected no --record beside --batch, got x.log"),
-        (["--axis", "y"], "turns --batch: expected all channels, without a search, got axis y"),
+        (["--axis", "y"], "turns --batch: expected all channels, no --axis, got y"),
+        (["--search-deg", "1"], "turns --batch: expected no --search-deg, got 1"),
         (["--climate"], "turns: expected one of --climate and --batch, got both"),
     ],
 )

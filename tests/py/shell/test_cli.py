@@ -293,7 +293,7 @@ def test_list_names_every_procedure_with_its_parameters(capsys: pytest.CaptureFi
         assert line.split() == [*(f"--{f.replace('_', '-')}" for f in c.parameters.fields), *c.common]
 
 
-def test_list_as_json_has_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_as_json_has_the_same(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     assert cli.main(["run", "--list", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert [c["name"] for c in found] == list(COMMANDS)
@@ -301,6 +301,11 @@ def test_list_as_json_has_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     assert {p["option"]: p["default"] for p in found[0]["parameters"]} == {
         f"--{name.replace('_', '-')}": f.default for name, f in turns.items()
     }
+    for command in found:
+        offered = help_of(f"run {command['name']}", capsys, monkeypatch)
+        assert all(option in offered for option in command["options"])
+        parameters = {p["option"] for p in command["parameters"]}
+        assert set(re.findall(r"^  (?:-v, )?(--[a-z0-9-]+)", offered, re.MULTILINE)) == parameters | set(command["options"])
 
 
 def test_requirements_as_json_are_those_of_the_list(capsys: pytest.CaptureFixture[str]) -> None:

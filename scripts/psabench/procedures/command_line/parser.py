@@ -148,4 +148,4 @@ def _command_dict(c: Command) -> dict[str, Any]:
         {"option": _option(name), "unit": f.metadata["unit"], "default": f.default, "help": f.metadata["help"]}
         for name, f in c.parameters.fields.items()
     ]
-    return {"name": c.name, "summary": c.summary, "parameters": taken, "options": list(c.common)}
+    return {"name": c.name, "summary": c.summary, "parameters": taken, "options": [*c.own, *c.common]}

@@ -92,6 +92,12 @@ static double very_low(void *ctx, int64_t t_ns)
     return 0.8;
 }
 
+static double doubled(void *ctx, int64_t t_ns)
+{
+    (void)ctx, (void)t_ns;
+    return 2.0;
+}
+
 /* 100 ppm of UREF for a percent of the supply; below 85 % of it UREF falls in proportion. */
 static void uref_follows_the_supply(void **state)
 {
@@ -106,6 +112,16 @@ static void uref_follows_the_supply(void **state)
     volts_are(2, 9.0 / (1.0 - 1000e-6));
     run(&p, very_low);
     volts_are(0, 5.0 / ((1.0 - 2000e-6) * 0.8 / 0.85));
+}
+
+/* A law that would turn UREF round leaves a hundredth of it: the code is at its limit, of the sign of the input. */
+static void uref_has_a_floor(void **state)
+{
+    (void)state;
+    struct psa2_profile p = psa2_profile_file("article");
+    p.uref_ppm_per_pct = -10000.0;
+    run(&p, doubled);
+    volts_are(0, 10.0);
 }
 
 static void without_a_law_or_a_supply_uref_is_constant(void **state)
@@ -136,6 +152,7 @@ int main(void)
         cmocka_unit_test(common_mode_of_both_signs_changes_no_code),
         cmocka_unit_test(limits_follow_the_supplies_and_the_part),
         cmocka_unit_test(uref_follows_the_supply),
+        cmocka_unit_test(uref_has_a_floor),
         cmocka_unit_test(without_a_law_or_a_supply_uref_is_constant),
         cmocka_unit_test(supplies_that_no_converter_takes_are_rejected),
     };

@@ -17,7 +17,7 @@ from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.estimate.angles import wrapped_deg
 from psabench.link.signals import Floats
 
-LEAST = 20  # readings that a judgement wants
+LEAST = 20  # readings that a judgement needs
 ACCEL_OVER_S = 0.3  # rates so far apart give an acceleration: the encoder has an error that goes with its angle
 
 

@@ -13,7 +13,7 @@ from psabench.conform.verdict import conclusive
 from psabench.link.signals import Floats, Ints
 
 WORDS = 4  # a transfer (article, section 5: protocol of exchange)
-LEAST = 20  # transfers that a judgement wants
+LEAST = 20  # transfers that a judgement needs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from psabench.conform.verdict import Failed, conclusive, expect
 from psabench.link.vcd import Wire
 
 PAIRS = ("Int", "Data", "CLK")
-LEAST = 20  # edges that a judgement wants
+LEAST = 20  # edges that a judgement needs
 
 
 @check("pairs", "PSA2-SIG-02", needs={"pins", "wires"}, on_recording="stream")

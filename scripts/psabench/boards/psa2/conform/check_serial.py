@@ -21,7 +21,7 @@ NS = 1e9
 RDATA, MUX_WRITE = 0x01, 0x51
 READING = ("DRD_A", "SClk", "CST", "DOutX", "Int")
 STILL_IN_A_STREAM = ("Res", "SYNC_A", "DIn")  # lines that only a set-up or a request moves
-LEAST = 5  # messages or instants that a judgement wants
+LEAST = 5  # messages or instants that a judgement needs
 
 
 def tclk_ns(e: Capture, n: float = 1.0) -> float:

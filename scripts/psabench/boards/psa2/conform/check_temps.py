@@ -20,7 +20,7 @@ from psabench.conform.requirements import Requirement
 from psabench.conform.verdict import Failed, Inconclusive, conclusive, expect
 from psabench.link.signals import Ints
 
-TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement wants, one every 10 ms at 1000 SPS
+TEMP_LEAST = 120  # samples: fewer have not the temperatures that a judgement needs, one every 10 ms at 1000 SPS
 
 
 @check("quiet", "PSA2-TEMP-01")

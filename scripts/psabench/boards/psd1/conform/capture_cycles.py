@@ -17,7 +17,7 @@ LINES = (*FRAMES, "SCLK", "SDAT", "FL2", "CS")  # those of the line port, too
 ADDRESS, DATA = tuple(f"AB{k}" for k in range(4)), tuple(f"D{k}" for k in range(16))
 PINS = ("A0", "INT0", "FL1", "DR", "TFS", "CLK_1M25", "RW", *LINES, *ADDRESS, *DATA)
 BITS, CONTROL_BITS = 16, 24  # a word; a control word or a coefficient, which end in no FL2
-LEAST = 8  # cycles that a judgement wants
+LEAST = 8  # cycles that a judgement needs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
