@@ -92,10 +92,10 @@ static double very_low(void *ctx, int64_t t_ns)
     return 0.8;
 }
 
-static double doubled(void *ctx, int64_t t_ns)
+static double trebled(void *ctx, int64_t t_ns)
 {
     (void)ctx, (void)t_ns;
-    return 2.0;
+    return 3.0;
 }
 
 /* 100 ppm of UREF for a percent of the supply; below 85 % of it UREF falls in proportion. */
@@ -120,8 +120,8 @@ static void uref_has_a_floor(void **state)
     (void)state;
     struct psa2_profile p = psa2_profile_file("article");
     p.uref_ppm_per_pct = -10000.0;
-    run(&p, doubled);
-    volts_are(0, 10.0);
+    run(&p, trebled);
+    assert_int_equal(last(&rig)->code[0], 0x7FFFFF);
 }
 
 static void without_a_law_or_a_supply_uref_is_constant(void **state)
