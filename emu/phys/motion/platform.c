@@ -143,7 +143,7 @@ static void drift_by_force(struct platform *p, struct platform_node *n, int64_t 
     }
 }
 
-/* The outer frame turns with the vehicle about x_p, which is across its axis; about z_p so does what the azimuth motor stands on. */
+/* The outer frame turns with the vehicle about x_p, which is across its axis; about z_p the vehicle carries the azimuth motor. */
 static void carrier_of(struct platform *p, struct platform_node *n, int64_t t_ns)
 {
     if (p->cfg.servo.hz <= 0.0) return;
@@ -155,6 +155,14 @@ static void carrier_of(struct platform *p, struct platform_node *n, int64_t t_ns
     into_p((const double(*)[3])C_lp, w_l_radps, w_p_radps);
     n->carrier_radps[PLATFORM_LEVEL] = w_p_radps[0];
     n->carrier_radps[PLATFORM_AZIMUTH] = w_p_radps[2];
+}
+
+/* What a grid point has of the vehicle there, and of the motors after the step to it. */
+static void arrive_at(struct platform *p, struct platform_node *n, const double behind_rad[2], int64_t t_ns)
+{
+    memcpy(n->behind_rad, behind_rad, sizeof n->behind_rad);
+    drift_by_force(p, n, t_ns);
+    carrier_of(p, n, t_ns);
 }
 
 /* Runge and Kutta's fourth-order step. */
@@ -183,7 +191,6 @@ static void advance_step(struct platform *p)
     t = trig_at(from, da_rad, db_rad);
     solve_rates(&end, &t, w, from->rate_end_radps);
     *to = *from;
-    memcpy(to->behind_rad, behind_rad, sizeof behind_rad);
     to->alpha_rad += da_rad;
     to->beta_rad += db_rad;
     to->sin_a = t.sin_a;
@@ -198,8 +205,7 @@ static void advance_step(struct platform *p)
         invalidate_node(to);
     }
     drift_on(p, to);
-    drift_by_force(p, to, t_ns + p->cfg.step_ns);
-    carrier_of(p, to, t_ns + p->cfg.step_ns);
+    arrive_at(p, to, behind_rad, t_ns + p->cfg.step_ns);
 }
 
 static void advance_to(struct platform *p, int64_t k)
@@ -267,8 +273,7 @@ void platform_init(struct platform *p, const struct platform_cfg *cfg, const str
     start_drift(p, n, seed);
     for (unsigned i = 0; i < PLATFORM_AXES; i++)
         p->feels_force |= cfg->unbalance_degph_per_g[i] != 0.0 || cfg->quadrature_degph_per_g[i] != 0.0;
-    drift_by_force(p, n, 0);
-    carrier_of(p, n, 0);
+    arrive_at(p, n, (const double[2]){0.0, 0.0}, 0);
 }
 
 bool platform_torque(struct platform *p, double u1_radps, double u2_radps, int64_t t_ns)

@@ -45,14 +45,14 @@ static void field_ut(const struct magnetic *m, const struct vehicle *v, const st
 
 /* ---- the sensor */
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void normalise(double a[3])
+static void make_unit(double a[3])
 {
-    const double size = sqrt(dot(a, a));
+    const double size = sqrt(dot_product(a, a));
     for (unsigned k = 0; k < 3; k++) a[k] /= size;
 }
 
@@ -65,10 +65,10 @@ static void axes_of(const struct magnetic *m, const struct vehicle *v, const str
         y[k] = at->C_lc[k][1];
         z[k] = m->cfg.pendulous ? at->accel_l_mps2[k] + (k == 2 ? v->site.g_mps2 : 0.0) : at->C_lc[k][2];
     }
-    normalise(z);
-    const double up = dot(y, z);
+    make_unit(z);
+    const double up = dot_product(y, z);
     for (unsigned k = 0; k < 3; k++) y[k] -= up * z[k];
-    normalise(y);
+    make_unit(y);
     pose_cross(y, z, x);
     const struct det_pair nose = det_sin_cos(m->cfg.tilt_arcmin[0] * RAD_PER_ARCMIN);
     const struct det_pair right = det_sin_cos(m->cfg.tilt_arcmin[1] * RAD_PER_ARCMIN);
@@ -93,8 +93,8 @@ double magnetic_heading_rad(const struct magnetic *m, const struct vehicle *v, i
     vehicle_at(v, t_ns, &at);
     field_ut(m, v, &at, b_l);
     axes_of(m, v, &at, x, y);
-    const double across = dot(b_l, x) + m->cfg.noise_ut * draws_gauss(&m->noise[0], t_ns / DRAW_NS);
-    const double along = dot(b_l, y) + m->cfg.noise_ut * draws_gauss(&m->noise[1], t_ns / DRAW_NS);
+    const double across = dot_product(b_l, x) + m->cfg.noise_ut * draws_gauss(&m->noise[0], t_ns / DRAW_NS);
+    const double along = dot_product(b_l, y) + m->cfg.noise_ut * draws_gauss(&m->noise[1], t_ns / DRAW_NS);
     const double shown_rad = det_atan2(-across, along);
     return det_wrap_rad(shown_rad + deviation_rad(m, shown_rad));
 }
