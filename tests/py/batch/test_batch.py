@@ -42,7 +42,8 @@ def output_v(truth: dict[str, float], channel: str, face: Face, alpha_deg: float
 
 def readings(channel: str, noise_v: float = 1e-9, off_deg: float = 0.0) -> list[Reading]:
     """Two realisations; off_deg: that the head misses each position by, in turn to either side, and says so."""
-    rng, found = np.random.default_rng(4), []
+    rng = np.random.default_rng(4)
+    found: list[Reading] = []
     for realisation in range(2):
         for k, (face, set_deg) in enumerate(POSITIONS):
             alpha_deg = set_deg + off_deg * (-1) ** (k // 2)
