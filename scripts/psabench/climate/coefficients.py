@@ -56,12 +56,12 @@ def at_temperature(truth: Mapping[str, float], degc: float) -> dict[str, float]:
     return {**truth, **warm, "u0_v": truth["u0_v"] + truth.get("u0_tc_v_per_k", 0.0) * off_k}
 
 
-def courses(points: Sequence[Point]) -> list[Course]:
+def courses_of(points: Sequence[Point]) -> list[Course]:
     """Of every estimate that is identifiable at all temperatures."""
     degc = np.array([p.degc for p in points])
     graded = [{g.estimate.name: g for g in grade(p.section)} for p in points]
     names = [n for n, g in graded[0].items() if all(n in at and at[n].estimate.identifiable for at in graded)]
-    return [_course(degc, tuple(at[n] for at in graded)) for n in names]
+    return [_course_of(degc, tuple(at[n] for at in graded)) for n in names]
 
 
 def weights_per_k(degc: Floats) -> Floats:
@@ -70,7 +70,7 @@ def weights_per_k(degc: Floats) -> Floats:
     return np.asarray(off_k / float(off_k @ off_k))
 
 
-def _course(degc: Floats, found: tuple[Graded, ...]) -> Course:
+def _course_of(degc: Floats, found: tuple[Graded, ...]) -> Course:
     w = weights_per_k(degc)
     values = np.array([g.estimate.value for g in found])
     truths = [g.truth for g in found]

@@ -130,7 +130,7 @@ class Drift:
 # ---- measuring
 
 
-def measure(bench: Bench, p: ChamberParams, progress: Progress) -> tuple[Soak, ...]:
+def measure_soaks(bench: Bench, p: ChamberParams, progress: Progress) -> tuple[Soak, ...]:
     """Every position at every temperature. Raises BadInput for a bench without the units, LinkError."""
     units = units_of(bench)
     soaks = []
@@ -197,8 +197,8 @@ def _drift_of(name: str, soaks: Sequence[Soak]) -> Drift:
         scales.append([fits[i].slope_v_per_g / ma for i in SCALED])
         zero_u.append([math.hypot(f.zero_factor * u_v, own.zero_v) for f in fits])
         scale_u.append([math.hypot(fits[i].slope_factor * u_v / ma, own.scale) for i in SCALED])
-    of_zeros = _lines(degc, zeros, zero_u, second_order=False)
-    of_scales = _lines(degc, scales, scale_u, second_order=True)
+    of_zeros = _lines_of(degc, zeros, zero_u, second_order=False)
+    of_scales = _lines_of(degc, scales, scale_u, second_order=True)
     return Drift(name=name, quantum_vs=every[0].quantum_vs, zero_v=of_zeros, scale=of_scales)
 
 
@@ -256,15 +256,15 @@ def _fit_axis(input_g: Floats, mean_v: Floats) -> _AxisFit:
     )
 
 
-def _lines(
+def _lines_of(
     degc: Floats, values: Sequence[Sequence[float]], u: Sequence[Sequence[float]], *, second_order: bool
 ) -> tuple[Line, ...]:
     """Of each axis; values and u have a row for each temperature."""
     of_axes = zip(np.array(values).T, np.array(u).mean(axis=0), strict=True)
-    return tuple(_line(degc, v, float(u_axis), second_order=second_order) for v, u_axis in of_axes)
+    return tuple(_line_of(degc, v, float(u_axis), second_order=second_order) for v, u_axis in of_axes)
 
 
-def _line(degc: Floats, values: Floats, u: float, *, second_order: bool) -> Line:
+def _line_of(degc: Floats, values: Floats, u: float, *, second_order: bool) -> Line:
     """second_order: of a ratio of parts that drift, whose square the straight line leaves."""
     if second_order:
         u = math.hypot(u, float(np.max(np.abs(values - values[0]))) ** 2)

@@ -19,7 +19,7 @@ _ABOUT = (
 _CAPTION = "Of the axis that drifts most; bars: U of a drift."
 
 
-def write(folder: Path, c: ChamberComparison) -> Path:
+def write_page(folder: Path, c: ChamberComparison) -> Path:
     """result.json and report.html into `folder`; returns the page. Raises as write_report."""
     return write_report(folder, result.result_dict(c), html_page(c))
 
@@ -27,15 +27,15 @@ def write(folder: Path, c: ChamberComparison) -> Path:
 def html_page(c: ChamberComparison) -> str:
     """The whole page. Same input, same bytes."""
     body = [
-        verdict_line(result.verdict(c), c.within),
+        verdict_line(result.verdict_of_drifts(c), c.within),
         section("Drift with temperature", table(result.drift_table(c), 2), f"<p class=small>{_ABOUT}</p>"),
-        section("At each temperature", table(result.course_table(c), 2), figure(_course(c), _CAPTION)),
+        section("At each temperature", table(result.course_table(c), 2), figure(_course_picture(c), _CAPTION)),
         section("What the drift is made of", table(result.sources_table(c), 1)),
     ]
     return whole_page(TITLE, c.facts, body)
 
 
-def _course(c: ChamberComparison) -> str:
+def _course_picture(c: ChamberComparison) -> str:
     """Zero and scale of each generation against temperature."""
     degc = np.array([s.degc for s in c.soaks])
     order = np.argsort(degc)

@@ -120,7 +120,7 @@ class ChamberComparison:
         return all(abs(en) <= LIMIT_CI for en in self.ens)
 
 
-def compare(
+def compare_in_chamber(
     out: Path,
     p: ChamberParams,
     progress: Progress,
@@ -133,7 +133,7 @@ def compare(
     name = scenario or measured.SCENARIO
     resolved = out / "scenario-converters.json"
     with Bench.start(name, seed=seed, extra=["--resolved", resolved]) as bench:
-        soaks = measured.measure(bench, p, progress)
+        soaks = measured.measure_soaks(bench, p, progress)
         truth = bench.truth()["units"]
     facts = {
         "scenario": str(name),
@@ -192,7 +192,7 @@ def quantum_mps(d: Drift) -> float:
     return d.quantum_vs * G_MPS2 / d.ma_v_per_g
 
 
-def _ug(volts: float, d: Drift) -> float:
+def _as_ug(volts: float, d: Drift) -> float:
     return volts / d.ma_v_per_g * 1e6
 
 
@@ -205,7 +205,7 @@ def drift_table(c: ChamberComparison) -> Table:
     for d in c.drifts:
         zero, scale = d.worst_zero, d.worst_scale
         figures = (
-            *(_ug(x, d) for x in (zero.worst, zero.drift_expanded_u, zero.per_k, zero.per_k_expanded_u)),
+            *(_as_ug(x, d) for x in (zero.worst, zero.drift_expanded_u, zero.per_k, zero.per_k_expanded_u)),
             *(1e6 * x for x in (scale.worst, scale.drift_expanded_u, scale.per_k, scale.per_k_expanded_u)),
         )
         texts = (f"{x:.2g}" if k % 2 else f"{x:+.3g}" for k, x in enumerate(figures))
@@ -218,7 +218,7 @@ def course_table(c: ChamberComparison) -> Table:
     degc = [f"{s.degc:+.0f} °C" for s in c.soaks[1:]]
     rows: Table = [("", *degc, *degc), ("", *["µg"] * len(degc), *["ppm"] * len(degc))]
     for d in c.drifts:
-        zeros = (f"{_ug(v, d):+.3g}" for v in d.worst_zero.drift[1:])
+        zeros = (f"{_as_ug(v, d):+.3g}" for v in d.worst_zero.drift[1:])
         rows.append((d.title, *zeros, *(f"{1e6 * v:+.3g}" for v in d.worst_scale.drift[1:])))
     return rows
 
@@ -250,7 +250,7 @@ def order_of_resolution(drifts: Sequence[Drift]) -> float:
     return min(v for k, v in of.items() if k not in ("psa1", "psa2")) / of["psa2"]
 
 
-def verdict(c: ChamberComparison) -> str:
+def verdict_of_drifts(c: ChamberComparison) -> str:
     """What was compared with what, and how it came out."""
     ens = c.ens
     beyond = f"{sum(abs(en) > 1.0 for en in ens)} are beyond U (expected: {0.0455 * len(ens):.1f})"

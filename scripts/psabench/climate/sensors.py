@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
-from psabench.climate.coefficients import REFERENCE_DEGC, Course, Point, at_temperature, courses
+from psabench.climate.coefficients import REFERENCE_DEGC, Course, Point, at_temperature, courses_of
 from psabench.climate.soak import soak_units
 from psabench.errors import BadInput, expected
 from psabench.procedures.command_line.offered import SITE_G_MPS2, Condition
@@ -61,7 +61,7 @@ def run_climate(options: RunOptions, progress: Progress) -> ClimateRun:
     options.out.mkdir(parents=True, exist_ok=True)
     with open_bench(CLIMATE, options) as bench:
         points = tuple(_measure_at(bench, degc, procedure, params, options, progress) for degc in POINTS_DEGC)
-    found = tuple(courses(points))
+    found = tuple(courses_of(points))
     more = section("Against temperature", table(course_table(points, found), 2))
     data = {"temperatures_degc": [p.degc for p in points], "against_temperature": [_course_dict(c) for c in found]}
     page = calibration.write(options.out, [p.section for p in points], facts_of(options), more=more, data=data)
@@ -123,7 +123,7 @@ def console_table(r: ClimateRun) -> str:
     return "\n  ".join([f"{r.points[0].section.result.procedure} against temperature", *rows])
 
 
-def verdict(r: ClimateRun) -> str:
+def verdict_of_slopes(r: ClimateRun) -> str:
     """How the slopes came out; those of each temperature have their own line."""
     compared = [c for c in r.courses if c.en is not None]
     out = sum(not c.within for c in compared)

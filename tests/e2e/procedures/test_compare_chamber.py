@@ -13,7 +13,7 @@ POINTS = ChamberParams(points_degc=(25.0, -60.0, 70.0), seconds=20.0)
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> result.ChamberComparison:
-    return result.compare(tmp_path_factory.mktemp("chamber"), POINTS, Silent())
+    return result.compare_in_chamber(tmp_path_factory.mktemp("chamber"), POINTS, Silent())
 
 
 def of(c: result.ChamberComparison, name: str) -> Drift:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,8 @@ def output_v(truth: dict[str, float], channel: str, face: Face, alpha_deg: float
 
 def readings(channel: str, noise_v: float = 1e-9, off_deg: float = 0.0) -> list[Reading]:
     """Two realisations; off_deg: that the head misses each position by, in turn to either side, and says so."""
-    rng, found = np.random.default_rng(4), []
+    rng = np.random.default_rng(4)
+    found: list[Reading] = []
     for realisation in range(2):
         for k, (face, set_deg) in enumerate(POSITIONS):
             alpha_deg = set_deg + off_deg * (-1) ** (k // 2)
@@ -95,7 +97,7 @@ def test_the_first_channel_is_the_article_s() -> None:
 def test_spread_is_of_what_each_sensor_determines() -> None:
     sections = []
     for k in range(3):
-        given = [Reading(**{**_fields(r), "u_v": r.u_v + 0.01 * k}) for r in readings("x", noise_v=1e-6)]
+        given = [replace(r, u_v=r.u_v + 0.01 * k) for r in readings("x", noise_v=1e-6)]
         sections.append(
             section_of(Place("a", "x"), given, TurnsParams(realisations=2), BenchAccuracy(**EXACT), 9.8, None)
         )
@@ -104,10 +106,6 @@ def test_spread_is_of_what_each_sensor_determines() -> None:
     assert of["u0_v"].sd == pytest.approx(0.01, rel=1e-6)
     assert of["kx_sum_v_per_g"].sd < 1e-9
     assert Spread(name="a", unit="V", values=(1.0, 3.0), u=0.1).mean == 2.0
-
-
-def _fields(r: Reading) -> dict[str, object]:
-    return {name: getattr(r, name) for name in r.__dataclass_fields__}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from psabench.climate.coefficients import Point, at_temperature, courses, weights_per_k
+from psabench.climate.coefficients import Point, at_temperature, courses_of, weights_per_k
 from psabench.estimate.uncertainty import Component, Correlation, Estimate
 from psabench.procedures.result import ProcedureResult
 from psabench.report.grading import Section
@@ -58,11 +58,11 @@ def test_zero_and_sensitivities_go_with_the_temperature() -> None:
 
 
 def test_a_slope_comes_out_as_it_went_in() -> None:
-    (c,) = courses([point(t, 2.5 + 3e-4 * (t - 25.0), budget(t, scatter=1e-6)) for t in DEGC])
+    (c,) = courses_of([point(t, 2.5 + 3e-4 * (t - 25.0), budget(t, scatter=1e-6)) for t in DEGC])
     assert c.slope.value == pytest.approx(3e-4, rel=1e-9)
     assert c.truth_per_k == pytest.approx(2e-4, rel=1e-9)
     assert not c.within
-    (good,) = courses([point(t, 2.5 + 2e-4 * (t - 25.0), budget(t, scatter=1e-6)) for t in DEGC])
+    (good,) = courses_of([point(t, 2.5 + 2e-4 * (t - 25.0), budget(t, scatter=1e-6)) for t in DEGC])
     assert good.within
     assert good.slope.name == "u0_v_per_k"
     assert good.slope.unit == "V/K"
@@ -71,12 +71,12 @@ def test_a_slope_comes_out_as_it_went_in() -> None:
 def test_scatter_is_independent_and_the_chain_drifts_in_line() -> None:
     degc = np.array(DEGC)
     w = weights_per_k(degc)
-    (scatter,) = courses([point(t, 2.5, budget(t, scatter=1e-5)) for t in DEGC])
+    (scatter,) = courses_of([point(t, 2.5, budget(t, scatter=1e-5)) for t in DEGC])
     assert scatter.slope.sd == pytest.approx(1e-5 / math.sqrt(((degc - degc.mean()) ** 2).sum()))
-    (chain,) = courses([point(t, 2.5, budget(t, tc=1e-5)) for t in DEGC])
+    (chain,) = courses_of([point(t, 2.5, budget(t, tc=1e-5)) for t in DEGC])
     assert chain.slope.sd == pytest.approx(1e-5 * abs(w @ (degc - 25.0)))  # a coefficient: no mean takes it off
     assert chain.slope.sd == pytest.approx(1e-5)
-    (constant,) = courses([point(t, 2.5, budget(t, scatter=1e-7, constant=1e-3)) for t in DEGC])
+    (constant,) = courses_of([point(t, 2.5, budget(t, scatter=1e-7, constant=1e-3)) for t in DEGC])
     assert constant.slope.sd < 1e-8
 
 
@@ -86,7 +86,7 @@ def test_u_is_what_slopes_scatter_by() -> None:
     for _ in range(300):
         tc = 1e-5 * rng.standard_normal()
         values = [2.5 + (2e-4 + tc) * (t - 25.0) + 2e-4 * rng.standard_normal() for t in DEGC]
-        (c,) = courses([point(t, v, budget(t, scatter=2e-4, tc=1e-5)) for t, v in zip(DEGC, values, strict=True)])
+        (c,) = courses_of([point(t, v, budget(t, scatter=2e-4, tc=1e-5)) for t, v in zip(DEGC, values, strict=True)])
         assert c.truth_per_k is not None
         errors.append(c.slope.value - c.truth_per_k)
         u = c.slope.sd
@@ -95,4 +95,4 @@ def test_u_is_what_slopes_scatter_by() -> None:
 
 def test_what_one_temperature_does_not_determine_has_no_slope() -> None:
     points = [point(t, 2.5, budget(t), identifiable=t != 60.0) for t in DEGC]
-    assert courses(points) == []
+    assert courses_of(points) == []

@@ -110,10 +110,10 @@ def test_a_coefficient_is_graded_against_the_true_one(tmp_path: Path) -> None:
     assert good.within
     bad = comparison(TrueDrift(zero_v_per_k=(4e-6, *ZERO_V_PER_K[1:]), scale_per_k=SCALE_PER_K))
     assert not bad.within
-    assert "1 of 5 temperature coefficients are not within 2 U" in result.verdict(bad)
-    assert "All 5 temperature coefficients are within 2 U" in result.verdict(good)
+    assert "1 of 5 temperature coefficients are not within 2 U" in result.verdict_of_drifts(bad)
+    assert "All 5 temperature coefficients are within 2 U" in result.verdict_of_drifts(good)
     assert comparison(result.NO_LINE).ens == []
-    page = converters_page.write(tmp_path, good)
+    page = converters_page.write_page(tmp_path, good)
     assert page.read_text(encoding="utf-8").count("<svg") == 1
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["within_limits"] is True
 

@@ -199,8 +199,8 @@ def test_it_takes_no_addresses_and_no_parameters_of_others(
 ) -> None:
     assert cli.main(["run", "compare-converters", *option]) == 2
     assert (
-        f"compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, got {option[0]}"
-        in capsys.readouterr().err
+        "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, "
+        f"got {option[0]}" in capsys.readouterr().err
     )
 
 

@@ -63,7 +63,8 @@ MISTAKES: list[tuple[str, str]] = [
     ("run heading-hold --average 16", "heading-hold: expected an option that --help lists, got --average"),
     (
         "run compare-converters --real-time",
-        "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, got --real-time",
+        "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, "
+        "got --real-time",
     ),
     ("run gyrocompass --window-s 0", "gyrocompass: window_s, repeat: expected at least 0.1 s and 1, got 0.0 s and 1"),
     (

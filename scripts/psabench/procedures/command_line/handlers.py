@@ -75,7 +75,7 @@ def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
         print("\n".join(grading.console_table(s) for s in r.sections))
     print(sensors.console_table(r))
     print(grading.verdict(r.sections))
-    print(sensors.verdict(r))
+    print(sensors.verdict_of_slopes(r))
     print(f"report: {r.page}")
     return 0 if r.within else 1
 
@@ -146,11 +146,11 @@ def _compare_in_chamber(args: argparse.Namespace) -> int:
     for option, given in (("--record", args.record), ("--replay", args.replay)):
         if given:  # table, chamber and supply are not in a recording
             raise BadInput(expected(f"no {option} beside --chamber", given, "compare-converters"))
-    c = converters_result.compare(args.out, ChamberParams(), Bar(), scenario=args.scenario, seed=args.seed)
-    page = converters_page.write(args.out, c)
+    c = converters_result.compare_in_chamber(args.out, ChamberParams(), Bar(), scenario=args.scenario, seed=args.seed)
+    page = converters_page.write_page(args.out, c)
     if args.verbose:
         print(converters_result.console_table(c))
-    print(converters_result.verdict(c))
+    print(converters_result.verdict_of_drifts(c))
     print(f"report: {page}")
     return 0 if c.within else 1
 
