@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import physics
@@ -38,7 +39,9 @@ def dwells_of(folder: str, p: MemsGyroParams, seed: int, **changed: float) -> tu
     return dwells, right
 
 
-EXACT = {name: 0.0 for name in MemsGyroParams.__dataclass_fields__ if name.startswith(("chain_", "rate_", "mount_"))}
+EXACT: dict[str, Any] = {
+    name: 0.0 for name in MemsGyroParams.__dataclass_fields__ if name.startswith(("chain_", "rate_", "mount_"))
+}
 
 
 def test_without_noise_every_parameter_is_found(folder: str) -> None:
@@ -101,7 +104,7 @@ def test_the_earth_s_rate_is_averaged_over_a_turn() -> None:
 @pytest.mark.parametrize("tau_s", [1.0, 30.0, 400.0])
 def test_covariances_of_means_give_the_allan_law(v: tuple[float, float, float], tau_s: float) -> None:
     parts = term_kernels(np.array([0.0, tau_s, 5000.0]), np.array([tau_s, tau_s, 1.0]))
-    c = sum(x * k for x, k in zip(v, parts, strict=True))
+    c = sum((x * k for x, k in zip(v, parts, strict=True)), np.zeros((3, 3)))
     allan = math.sqrt(0.5 * (c[0, 0] + c[1, 1] - 2.0 * c[0, 1]))
     assert allan == pytest.approx(float(allan_law(np.array(v), np.array([tau_s]))[0]), rel=1e-6)
 
@@ -130,16 +133,16 @@ def test_the_terms_of_the_noise_are_found() -> None:
 
 
 def test_u_contains_the_truth_as_often_as_it_says(folder: str) -> None:
-    """200 drawn gyros: 93 to 97 % of all numbers of the model within U (docs/procedures/mems_gyro.md)."""
-    p = MemsGyroParams(rest_s=900)
-    runs = [coverage.through_the_model(seed, p, folder) for seed in range(5001, 5201)]
+    """60 drawn gyros, 540 numbers of the model; docs/procedures/mems_gyro.md has 200, by tests/coverage/mems_gyro.py."""
+    p = MemsGyroParams(rest_s=600)
+    runs = [coverage.through_the_model(seed, p, folder) for seed in range(5001, 5061)]
     en = np.array([[run[q][0] for q in run if not q.endswith(("_rth", "degph"))] for run in runs])
     share = float(np.mean(np.abs(en) <= 1.0))
     print(f"{en.size} values, {share:.4f} within U")
-    assert en.shape == (200, 9)
-    assert 0.93 <= share <= 0.97
+    assert en.shape == (60, 9)
+    assert 0.93 <= share <= 0.98
     each = np.mean(np.abs(en) <= 1.0, axis=0)
-    assert np.all(each >= 0.89), each  # 4 standard deviations of 200 runs below 95.45 %
+    assert np.all(each >= 0.85), each  # 4 standard deviations of 60 runs below 95.45 %
 
 
 def test_a_dwell_that_the_others_do_not_predict_is_a_doubt(folder: str) -> None:
