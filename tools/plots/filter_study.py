@@ -20,6 +20,7 @@ sys.path[:0] = [str(ROOT / "scripts")]
 
 from psabench import Bench  # noqa: E402 of this tree
 from psabench.estimate import allan  # noqa: E402 of this tree
+from psabench.link.signals import Floats  # noqa: E402 of this tree
 from psabench.procedures import filter_study as fs  # noqa: E402 of this tree
 from psabench.report import plots as report_plots  # noqa: E402 of this tree
 
@@ -35,8 +36,9 @@ ZEROS = ((fs.Setting(rate_hz=1000), 250.0), (fs.Setting(rate_hz=250), 400.0), (f
 WALK_V_RTS = 1e-7  # filter_study_drift.yaml
 
 
-def decibel(gain: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
-    return np.maximum(20.0 * np.log10(np.maximum(gain, 1e-12)), LEAST_DB)
+def decibel(gain: Floats) -> Floats:
+    level: Floats = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-12)), LEAST_DB)
+    return level
 
 
 def response_figure() -> Figure:
@@ -85,8 +87,10 @@ def allan_figure() -> Figure:
             walk_v = np.array([allan.of_walk(WALK_V_RTS, tau) for tau in TAUS_S])
             ax.plot(taus_s, 1e6 * white_v, color=colour, lw=0.9)
             ax.plot(taus_s, 1e6 * np.hypot(white_v, walk_v), color=colour, lw=0.9, ls="--")
-            ax.plot(taus_s, 1e6 * z.allan_v[:, 0], "o", ms=4, color=colour, label=f"{setting.rate_hz} SPS, gain {setting.gain}")
-            ax.plot(taus_s, 1e6 * z.allan_v[:, 1], "s", ms=4, mfc="none", color=colour, label="the same, sensor walks")
+            label = f"{setting.rate_hz} SPS, gain {setting.gain}"
+            ax.plot(taus_s, 1e6 * z.allan_v[:, 0], "o", ms=4, color=colour, label=label)
+            label = "the same, sensor walks"
+            ax.plot(taus_s, 1e6 * z.allan_v[:, 1], "s", ms=4, mfc="none", color=colour, label=label)
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.set_xlabel("averaging time, s (lines: laws of white noise, dashed with the walk; points: readings)")

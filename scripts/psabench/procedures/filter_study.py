@@ -62,7 +62,7 @@ class Setting:
     def noise_v(self) -> float:
         """Published noise of a reading, rms at the load."""
         snr_db = SNR_DB[self.gain] - 10.0 * math.log10(self.rate_hz / 250.0)
-        return self.range_v / math.sqrt(2.0) * 10.0 ** (-snr_db / 20.0)
+        return self.range_v / math.sqrt(2.0) * math.pow(10.0, -snr_db / 20.0)
 
     @property
     def density_v_rthz(self) -> float:

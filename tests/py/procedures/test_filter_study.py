@@ -53,17 +53,18 @@ def test_settings_are_the_registers_of_the_datasheet() -> None:
 def test_allan_deviation_of_known_processes() -> None:
     rng = np.random.default_rng(1)
     dt_s, n = 0.01, 400_000
-    white = rng.normal(0.0, 2.0, n)
+    white = np.asarray(rng.normal(0.0, 2.0, n), np.float64)
     density = 2.0 / math.sqrt(0.5 / dt_s)
-    walk = np.cumsum(rng.normal(0.0, 0.3 * math.sqrt(dt_s), n))
-    sine = 0.7 * np.sin(2.0 * np.pi * 0.31 * dt_s * np.arange(n))
+    walk: allan.Floats = np.cumsum(rng.normal(0.0, 0.3 * math.sqrt(dt_s), n))
+    t_s = dt_s * np.arange(n, dtype=np.float64)
+    sine = np.asarray(0.7 * np.sin(2.0 * np.pi * 0.31 * t_s), np.float64)
     for tau_s in (0.1, 1.0, 10.0):
         assert allan.allan_deviation(white, dt_s, tau_s) == pytest.approx(allan.of_white(density, tau_s), rel=0.1)
         assert allan.allan_deviation(walk, dt_s, tau_s) == pytest.approx(allan.of_walk(0.3, tau_s), rel=0.2)
         assert allan.allan_deviation(sine, dt_s, tau_s) == pytest.approx(allan.of_sine(0.7, 0.31, tau_s), rel=1e-2)
-    ramp = 3e-4 * dt_s * np.arange(n)
+    ramp = np.asarray(3e-4 * t_s, np.float64)
     assert allan.allan_deviation(ramp, dt_s, 5.0) == pytest.approx(3e-4 * 5.0 / math.sqrt(2.0), rel=1e-6)
-    with pytest.raises(ValueError, match="tau_s: expected 0.01 to 0.05 s, got 0.06"):
+    with pytest.raises(ValueError, match=r"tau_s: expected 0\.01 to 0\.05 s, got 0\.06"):
         allan.allan_deviation(white[:10], dt_s, 0.06)
 
 
