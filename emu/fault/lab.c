@@ -138,7 +138,7 @@ static struct table *table_of(const struct fault *f)
 }
 
 /* No servo does more. */
-static bool follows(const struct control_bench *b, const struct fault *f, char *why)
+static bool servo_follows(const struct control_bench *b, const struct fault *f, char *why)
 {
     (void)b;
     return f->value[FAULT_FREQUENCY_HZ] <= AFE_SLOW_HZ ||
@@ -187,7 +187,7 @@ static const struct fault_kind lab[] = {
      .unless = "no unit is on the head", .fits = turns_units, .lift = refresh_slip},
     {"table.ripple", "The servo of the axis ripples: a sine of amplitude ripple_dps in its rate.", "a spectral line at frequency_hz in the readout of the rate, and in the codes of a unit on the table",
      .places = FAULT_BIT(FAULT_AT_TABLE), .need = FAULT_BIT(FAULT_RIPPLE_DPS) | FAULT_BIT(FAULT_FREQUENCY_HZ),
-     .unless = "frequency_hz is above 100", .fits = follows, .apply = ripple_axis, .lift = lift_ripple},
+     .unless = "frequency_hz is above 100", .fits = servo_follows, .apply = ripple_axis, .lift = lift_ripple},
 };
 // clang-format on
 const struct fault_table fault_lab = {lab, sizeof lab / sizeof *lab};
