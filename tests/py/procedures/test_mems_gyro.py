@@ -133,7 +133,7 @@ def test_the_terms_of_the_noise_are_found() -> None:
 
 
 def test_u_contains_the_truth_as_often_as_it_says(folder: str) -> None:
-    """60 drawn gyros, 540 numbers of the model; docs/procedures/mems_gyro.md has 200, by tests/coverage/mems_gyro.py."""
+    """60 drawn gyros, 540 numbers of the model; docs/procedures/mems_gyro.md has 200, by tests/coverage."""
     p = MemsGyroParams(rest_s=600)
     runs = [coverage.through_the_model(seed, p, folder) for seed in range(5001, 5061)]
     en = np.array([[run[q][0] for q in run if not q.endswith(("_rth", "degph"))] for run in runs])
