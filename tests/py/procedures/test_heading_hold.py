@@ -55,6 +55,15 @@ def test_the_drift_of_the_other_axis_is_the_wrong_one() -> None:
     assert abs(end_error_deg(bench, r)) == pytest.approx(2.0, abs=0.05)
 
 
+def test_what_the_passport_says_of_the_force_in_the_windows_is_not_in_the_drift_of_the_hold() -> None:
+    bench = FakePlatform(drift2_degph=lambda t_s: 24.0)
+    found = start(bench)
+    forced = replace(found, drift2=replace(found.drift2, by_force_radps=math.radians(0.5 / 3600.0)))
+    r = hold(bench, forced, HoldParams(), Silent())
+    assert math.degrees(r.drift2_radps) * 3600.0 == pytest.approx(23.5, abs=0.01)
+    assert abs(end_error_deg(bench, r)) == pytest.approx(2.0, abs=0.05)
+
+
 def test_the_article_s_sum() -> None:
     """0.1 deg and 0.05 deg/h for 4 h are 0.3 deg, all of the article's claim."""
     bench = FakePlatform()
