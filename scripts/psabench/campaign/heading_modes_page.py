@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -108,16 +109,16 @@ def console_lines(found: Mapping[str, Summary]) -> list[str]:
 def draw_picture(errors: Mapping[str, tuple[Floats, Floats]], name: str = NAME) -> str:
     """rms of each row against time; errors: instants, h, and (runs, looks) deg."""
     with plots.drawing(3.4) as (drawn, ax):
-        for (label, (t_h, e)), colour in zip(errors.items(), plots.SERIES, strict=False):
-            ax.plot(t_h, np.sqrt((e**2).mean(axis=0)), color=colour, lw=1.5, label=label)
-            ax.fill_between(t_h, 0.0, np.percentile(np.abs(e), 95.0, axis=0), color=colour, alpha=0.08, lw=0)
-        ax.axhline(CLAIM_DEG, color=plots.MUTED, lw=1.0, ls="--")
+        styles = zip(cycle(plots.SERIES), [*("-" for _ in plots.SERIES), *("--" for _ in plots.SERIES)], strict=False)
+        for (label, (t_h, e)), (colour, dash) in zip(errors.items(), styles, strict=False):
+            ax.plot(t_h, np.sqrt((e**2).mean(axis=0)), color=colour, lw=1.5, ls=dash, label=label)
+        ax.axhline(CLAIM_DEG, color=plots.MUTED, lw=1.0, ls=":")
         ax.set_yscale("log")
         ax.set_ylim(0.03, 6.0)
         ax.set_yticks([0.05, 0.1, 0.3, 1.0, 3.0], ["0.05", "0.1", "0.3", "1", "3"])
         ax.set_xlabel("time of the flight, h")
         ax.set_ylabel("heading error, rms, deg")
-        ax.legend(loc="lower right", ncols=2)
+        ax.legend(loc="lower left", ncols=3, bbox_to_anchor=(0.0, 1.0))
         return plots.svg(drawn, name)
 
 
