@@ -98,7 +98,7 @@ struct options {
     const char *unit; /* whose lines are traced; NULL: the first */
     const char *vcd;
     uint32_t vcd_unit_ns;
-    bool pairs;       /* recordings and the line port have the wires A and B of differential pairs, too */
+    bool pairs; /* recordings and the line port have the wires A and B of differential pairs, too */
     bool vcd_analog;
     const char *line; /* line port: symbolic link, "-" without one; NULL: no line port */
     int64_t line_hz;

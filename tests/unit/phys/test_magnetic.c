@@ -1,6 +1,6 @@
 /* The induction sensor: the field's direction on level ground, its vertical part in a plane that is not level, deviation, noise. */
-#include "platform_rig.h"
 #include "phys/sensor/magnetic.h"
+#include "platform_rig.h"
 
 #include <string.h>
 
