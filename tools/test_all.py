@@ -58,8 +58,8 @@ STEPS: list[Step] = [
     Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
     Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
     Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check", TIER], 1200),
+    # gcc's sanitizers run every C test; clang's run the fuzz targets, and an emulator of `builds` beside the others.
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
-    Step("C tests, clang, sanitizers", [*STRICT, "CC=clang", SANITIZED, "check"], 1200, tiers=REST),
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: all lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 1800, beside=True, builds=["all"], tiers=REST),

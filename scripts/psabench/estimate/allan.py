@@ -11,11 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from psabench.errors import expected
-
-Floats = npt.NDArray[np.float64]
+from psabench.link.signals import Floats
 
 
 def allan_deviation(values: Floats, step_s: float, tau_s: float) -> float:

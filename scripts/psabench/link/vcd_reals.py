@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psabench.errors import expected
+from psabench.link.signals import Floats
 from psabench.link.vcd import Ints, read_vcd
-
-Floats = NDArray[np.float64]
 
 _VAR = re.compile(r"\$var\s+real\s+64\s+(\S+)\s+(\S+)\s+\$end")
 

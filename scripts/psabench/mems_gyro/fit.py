@@ -16,10 +16,11 @@ import numpy.typing as npt
 from psabench.budget.gum import expand_estimate
 from psabench.errors import BenchError, expected
 from psabench.estimate.uncertainty import Component, Correlation, Estimate, correlation, not_identifiable
+from psabench.link.signals import Floats
 from psabench.mems_gyro import model
 from psabench.mems_gyro.noise import NoiseFit, allan_deviations, fit_noise, term_kernels
 from psabench.mems_gyro.params import BLOCK_S, NAME, MemsGyroParams
-from psabench.mems_gyro.plan import Dwell, Floats
+from psabench.mems_gyro.plan import Dwell
 
 NEWTON_ROUNDS = 4
 MEANS = ((1, 100), (10, 60), (30, 1000))  # of the recording at rest: so many blocks each, up to so many times

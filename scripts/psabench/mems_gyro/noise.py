@@ -19,24 +19,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from psabench.estimate.allan import allan_deviation
+from psabench.link.signals import Floats
+
 TERMS = ("N", "B", "K")
 ROUNDS, CLOSE = 30, 1e-3
 LEAST = 1e-9  # of the variance of the readings: a term below is none
 
 
 def allan_deviations(x: Floats, tau0_s: float) -> tuple[Floats, Floats]:
-    """Overlapping, at octaves up to a quarter of the recording."""
-    sums = np.concatenate([[0.0], np.cumsum(x)])
-    taus, found = [], []
-    m = 1
-    while 4 * m <= len(x):
-        means = (sums[m:] - sums[:-m]) / m
-        steps = means[m:] - means[:-m]
-        taus.append(m * tau0_s)
-        found.append(math.sqrt(0.5 * float(np.mean(steps**2))))
-        m *= 2
-    return np.array(taus), np.array(found)
+    """Overlapping, at octaves up to a quarter of the recording: times, deviations."""
+    tau_s: Floats = np.float64(tau0_s) * 2.0 ** np.arange((len(x) // 4).bit_length())
+    return tau_s, np.array([allan_deviation(x, tau0_s, float(tau)) for tau in tau_s])
 
 
 def allan_law(v: Floats, tau_s: Floats) -> Floats:

@@ -10,12 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from psabench.link.signals import Floats
 from psabench.mems_gyro.params import MemsGyroParams
-
-Floats = npt.NDArray[np.float64]
 
 # Angles of the middle and the inner axis, deg: the case's x, y, z down and up.
 ATTITUDES = ((-90.0, 0.0), (90.0, 0.0), (0.0, 90.0), (0.0, -90.0), (0.0, 0.0), (0.0, 180.0))

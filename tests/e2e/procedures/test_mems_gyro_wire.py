@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from psabench import cli
+from psabench.emulator import Emulator
+from psabench.mems_gyro.params import MemsGyroParams
 
 from tests.coverage import mems_gyro as coverage
-from tests.coverage.mems_gyro import MemsGyroParams
 
 pytestmark = pytest.mark.host
 
@@ -55,11 +56,17 @@ def test_a_short_run_finds_the_gyro(tmp_path: Path, capsys: Lines) -> None:
 
 
 def test_the_truth_changes_no_result(tmp_path: Path) -> None:
-    """The same seed twice: the same bytes of the readings."""
-    for name in ("a", "b"):
-        run(tmp_path / name, *SHORT, "--seed", "5")
-    first, again = ((tmp_path / name / "dwells.csv").read_bytes() for name in ("a", "b"))
-    assert first == again
+    """On an emulator without a truth port the same readings, to the byte, and the same estimates."""
+    run(tmp_path / "told", *SHORT, "--seed", "5")
+    with Emulator("mems_gyro", seed=5, scpi=True) as emu:
+        assert run(tmp_path / "blind", *SHORT, "--control", str(emu.control_path)) == 0
+    told, blind = (tmp_path / name for name in ("told", "blind"))
+    assert (told / "dwells.csv").read_bytes() == (blind / "dwells.csv").read_bytes()
+    values = [
+        [e["value"] for e in json.loads((folder / "result.json").read_text())["sections"][0]["estimates"]]
+        for folder in (told, blind)
+    ]
+    assert values[0] == values[1]
 
 
 def test_a_gyro_on_another_channel(tmp_path: Path, capsys: Lines) -> None:

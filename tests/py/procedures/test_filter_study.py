@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from psabench.boards.psa2 import converter_filter
 from psabench.estimate import allan
+from psabench.link.signals import Floats
 from psabench.procedures import filter_study as fs
 
 RATIOS = (8, 32, 128)
@@ -55,7 +56,7 @@ def test_allan_deviation_of_known_processes() -> None:
     dt_s, n = 0.01, 400_000
     white = np.asarray(rng.normal(0.0, 2.0, n), np.float64)
     density = 2.0 / math.sqrt(0.5 / dt_s)
-    walk: allan.Floats = np.cumsum(rng.normal(0.0, 0.3 * math.sqrt(dt_s), n))
+    walk: Floats = np.cumsum(rng.normal(0.0, 0.3 * math.sqrt(dt_s), n))
     t_s = dt_s * np.arange(n, dtype=np.float64)
     sine = np.asarray(0.7 * np.sin(2.0 * np.pi * 0.31 * t_s), np.float64)
     for tau_s in (0.1, 1.0, 10.0):
