@@ -159,15 +159,16 @@ RULES = {
     "loose-modules": Rule(loose_modules, 12, 12),
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
-    "one-word-functions-python": Rule(one_word_functions, 975, 975),
+    "one-word-functions-python": Rule(one_word_functions, 984, 984),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
     # 61,700, 62,300 and 2,050 before the satellite receiver, the filter with it and faults of gyros.
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 64_140, 64_140),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 68_800, 68_800),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_219, 2_219),
+    # 64,140, 68,580 and 2,211 before the articles' last devices: modes of heading, MEMS gyros, pairs of lines, climates.
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_344, 65_344),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 72_756, 72_756),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_302, 2_302),
 }
 
 
