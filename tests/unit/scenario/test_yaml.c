@@ -166,7 +166,7 @@ static const struct {
     {"units: [{temp_degc: [1, 2]}]\n", "dir/s.yaml:1:21: units.a.temp_degc: expected one value or a list of 4 numbers"},
     {"units: [{temp_degc: 200}]\n", "dir/s.yaml:1:21: units.a.temp_degc: expected -60 to 125, got 200"},
     {"units:\n  - axes:\n      x:\n        sensor: gyro\n",
-     "dir/s.yaml:4:17: units.a.axes.x.sensor: expected none, mems, quartz or recorded"},
+     "dir/s.yaml:4:17: units.a.axes.x.sensor: expected none, mems, quartz, recorded or mems_gyro"},
     {"units:\n  - axes: {x: {sensor: quartz}}\n",
      "dir/s.yaml:2:11: units.a.axes: x: expected afe: {input: current} for a quartz sensor"},
     {"units:\n  - axes:\n      x:\n        u0_v: 2,5\n",
@@ -438,12 +438,11 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
     (void)state;
     assert_false(scenario_load("nope", &s, why, sizeof why));
     assert_string_equal(
-        why,
-        "nope: expected a path or a name from proto/scenarios: "
-        "brownout, calibrate, chamber_sweep, converters, fast, faults, fleet1000, fleet64, flight, "
-        "gyrocompass, gyrocompass_ideal, koi_flight, "
-        "multi, quartz_chamber, quartz_run_in, quiet, realistic, receiver, sins_coarse, sins_secondary, sins_table, "
-        "six_positions, stream, table_rate");
+        why, "nope: expected a path or a name from proto/scenarios: "
+             "batch, brownout, calibrate, chamber_sweep, climate, converters, converters_chamber, fast, faults, "
+             "fleet1000, fleet64, flight, gyrocompass, gyrocompass_ideal, heading_modes, koi_flight, mems_gyro, "
+             "multi, quartz_chamber, quartz_run_in, quiet, realistic, receiver, sins_coarse, sins_secondary, "
+             "sins_table, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
     assert_string_equal(why, "./nope.yaml: no such file, or not readable");
 }
