@@ -65,10 +65,9 @@ struct board_type {
     int64_t (*period_ns)(const void *profile); /* of its frames (cycles, readings) */
     /* what is on it */
     const struct board_line *lines;
-    unsigned line_count;
+    unsigned line_count, pair_count, event_count, part_count; /* rows of lines, pairs, events, parts */
     const char *const *port_lines;  /* bits 0.. of the line port's byte, up to 7 names, then NULL */
     const struct board_pair *pairs; /* signals behind its lines: A and B of the first, of the next ...; NULL: none */
-    unsigned pair_count;
     const char *const *pair_port_lines;        /* of the line port with wires; NULL: as without */
     unsigned frame_line;                       /* whose falls begin a frame */
     unsigned pulse_line;                       /* whose pulses have their number in a frame */
@@ -77,10 +76,8 @@ struct board_type {
     double (*code_v)(const struct board *b);  /* a code at the load, V (integrator: a count a second); NULL: 2 uV */
     double (*range_v)(const struct board *b); /* full scale at the load; NULL: 10 V */
     const char *const *events;
-    unsigned event_count;
     const struct board_part *parts; /* [0] is the controller */
-    unsigned part_count;
-    const char *const *temps; /* its temperature sensors whose leads may open, up to NULL; NULL: none */
+    const char *const *temps;       /* its temperature sensors whose leads may open, up to NULL; NULL: none */
     unsigned (*temp_count)(const struct board *b);          /* how many of them it reads, by its profile */
     void (*open_temps)(struct board *b, uint32_t open);     /* bit n: the lead of the n-th, from now on */
     const struct board_controller_fault *controller_faults; /* up to a NULL kind */

@@ -83,9 +83,8 @@ struct trace {
     unsigned room;                                /* TRACE_PENDING_MAX; 0: asleep, it takes no steps before it wakes */
     struct trace_step pending[TRACE_PENDING_MAX]; /* in order of time, then of report, from pending[first] on */
     unsigned first, pending_count;
-    uint64_t gone; /* steps delivered */
-    struct trace_run
-        run[TRACE_RUNS_MAX]; /* of steps pending that need no look at each; one may be forgotten at any time */
+    uint64_t gone;                        /* steps delivered */
+    struct trace_run run[TRACE_RUNS_MAX]; /* of steps pending that need no look at each; may be forgotten */
     unsigned runs;
     int64_t done_ns;  /* delivered up to here */
     uint32_t late;    /* reports behind done_ns: delivered at done_ns, counted; 0 unless a board breaks the window */

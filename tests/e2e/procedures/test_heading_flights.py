@@ -44,9 +44,7 @@ def without_chance(name: str, p: ModeParams, run: int) -> tuple[Trip, np.ndarray
 
 
 @pytest.mark.parametrize(("name", "within_deg"), [("magnetic", 0.02), ("half-compass", 0.012)])
-def test_the_prototype_flies_as_the_algebra_says(
-    name: str, within_deg: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_prototype_flies_as_the_algebra_says(name: str, within_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Sensor, dip, setter, panel, take-off, tilts: at each look, of 0.15 deg and more."""
     monkeypatch.setattr(algebra, "NOISE_UT", 0.0)
     flown, want_deg = without_chance(name, SHORT, 1)

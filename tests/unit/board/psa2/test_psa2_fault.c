@@ -134,7 +134,7 @@ static void assert_dark(void)
 {
     trace_advance(&rig.b.base.trace, rig.s.now_ns);
     assert_int_equal(rig.b.base.trace.level & ~rig.b.base.trace.wires, 0); /* B is the inverse of A, always */
-    assert_true(sched_next_ns(&rig.s) == SCHED_NEVER); /* nothing goes on */
+    assert_true(sched_next_ns(&rig.s) == SCHED_NEVER);                     /* nothing goes on */
     assert_false(psa2_ready(&rig.b));
     assert_int_equal(rig.b.tadc.mode, ADS1256_OFF);
     for (int i = 0; i < 3; i++) assert_false(rig.b.adc[i].alive);
