@@ -73,7 +73,7 @@ static void assert_change(const struct bench *r, unsigned sig, unsigned k, bool 
 static unsigned changes(const struct bench *r, unsigned sig)
 {
     unsigned n = 0;
-    for (unsigned i = 1; i < r->n; i++) n += (r->seen[i].level ^ r->seen[i - 1].level) >> sig & 1;
+    for (unsigned i = 1; i < r->n; i++) n += (unsigned)((r->seen[i].level ^ r->seen[i - 1].level) >> sig & 1);
     return n;
 }
 
