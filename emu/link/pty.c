@@ -73,6 +73,11 @@ static void on_watch(struct link *l, int64_t t_ns)
     }
 }
 
+void pty_take_news(struct pty *p, int64_t t_ns)
+{
+    if (p->watch.fd >= 0) on_watch(&p->watch, t_ns);
+}
+
 /* A client that the kernel knows and we do not has come this very moment, and its event is on the way; or it came together
  * with another, as one event. The second question tells. */
 static void on_ask(struct link *l, int64_t t_ns)

@@ -60,6 +60,7 @@ static void on_readable(struct link *l, int64_t t_ns)
 {
     struct text_link *t = (struct text_link *)l;
     if (t->in_pos < t->in_len || t->eof) return;
+    if (t->pty) pty_take_news(t->pty, t_ns);
     const ssize_t n = read(l->fd, t->in, sizeof t->in);
     if (n < 0 && (errno == EAGAIN || errno == EINTR || t->pty)) return; /* a pty that no program has open */
     if (t->ops->was_read) t->ops->was_read(l->fd);

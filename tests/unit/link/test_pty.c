@@ -2,6 +2,7 @@
 #include "rig.h"
 
 #include "link/pty.h"
+#include "link/text_link.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -136,6 +137,41 @@ static void asking_makes_no_news(void **state)
     pty_close(&r.p);
 }
 
+struct lines_rig {
+    struct text_link t; /* first: as its operations find it */
+    struct pty p;
+    unsigned lines;
+    int openers; /* at the latest line */
+};
+
+static void on_line(struct text_link *t, enum lines_result result, const char *line, size_t len, int64_t t_ns)
+{
+    struct lines_rig *r = (struct lines_rig *)t;
+    (void)result, (void)line, (void)len, (void)t_ns;
+    r->lines++;
+    r->openers = r->p.openers;
+}
+
+/* A poll looked at the watch, then he came and wrote, then it looked at the master: his bytes are served first. */
+static void who_writes_is_known_before_his_bytes(void **state)
+{
+    static const struct text_link_cfg cfg = {.who = "port", .end = '\r', .line_max = 16, .out_max = 64, .out_high = 32};
+    static const struct text_link_ops ops = {.line = on_line};
+    static struct lines_rig r;
+    struct links links = {0};
+    (void)state;
+    assert_int_equal(text_link_open_pty(&r.t, &r.p, &cfg, &ops, &links, NULL), 0);
+    const int fd = open(r.p.path, O_RDWR | O_NOCTTY);
+    assert_int_equal(write(fd, "O\r", 2), 2);
+    struct pollfd master = {.fd = r.t.link.fd, .events = POLLIN};
+    assert_int_equal(poll(&master, 1, NEWS_MS), 1);
+    r.t.link.readable(&r.t.link, 0);
+    assert_int_equal(r.lines, 1);
+    assert_int_equal(r.openers, 1);
+    close(fd);
+    text_link_free(&r.t);
+}
+
 struct visitor {
     const char *path;
     atomic_int visits;
@@ -241,6 +277,7 @@ int main(void)
         cmocka_unit_test(one_who_opens_again_at_once_is_seen),
         cmocka_unit_test(two_who_close_at_once_have_both_left),
         cmocka_unit_test(of_two_who_came_at_once_one_is_left),
+        cmocka_unit_test(who_writes_is_known_before_his_bytes),
         cmocka_unit_test(asking_makes_no_news),
         cmocka_unit_test(who_comes_while_the_kernel_is_asked_is_seen),
         cmocka_unit_test(nobody_inherits_the_settings_of_the_last_client),
