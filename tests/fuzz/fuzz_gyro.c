@@ -70,6 +70,14 @@ static double encoder(void *ctx, int64_t t_ns)
     return ((struct world *)ctx)->angle_rad;
 }
 
+/* Fitted for some of the scripts' angles. */
+static bool magnetic(void *ctx, int64_t t_ns, double *heading_rad)
+{
+    (void)t_ns;
+    *heading_rad = ((struct world *)ctx)->angle_rad;
+    return *heading_rad > 0.0;
+}
+
 static void on_event(void *ctx, unsigned e, int64_t t_ns)
 {
     const struct world *w = ctx;
@@ -221,7 +229,7 @@ static void (*const ops[])(struct world *w, struct script *s) = {
 };
 
 /* Only of the watched board, and no byte of the script: what it does must change nothing. */
-static const struct board_platform_io platform = {torque, reposition, servo, encoder};
+static const struct board_platform_io platform = {torque, reposition, servo, encoder, magnetic};
 
 static void listen(struct world *w, uint8_t how)
 {
