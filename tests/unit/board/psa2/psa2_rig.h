@@ -77,7 +77,7 @@ static inline void rig_change(void *ctx, unsigned sig, bool level, int64_t t_ns)
 
 static inline void rig_steps(void *ctx, const struct trace_step *s, unsigned n)
 {
-    trace_each(s, n, UINT32_MAX, rig_change, ctx);
+    trace_each(s, n, TRACE_FIRST(PSA2_LINES), rig_change, ctx);
 }
 
 static inline struct board_cfg rig_unit(double noise_scale)
