@@ -16,7 +16,7 @@ PAIRS = ("Int", "Data", "CLK")
 LEAST = 20  # edges that a judgement needs
 
 
-@check("pairs", "PSA2-SIG-02", needs={"pins", "wires"}, on_recording="stream")
+@check("pairs", "PSA2-SIG-14", needs={"pins", "wires"}, on_recording="stream")
 def wires_stand_at_their_rest_levels(e: Capture, row: Requirement) -> str:
     """Look at the wires of the pairs where nothing moves on any of the ports."""
     at_ns = quiet_instants(e, row.limit("quiet_us") * 1e3)
