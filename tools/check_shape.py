@@ -167,7 +167,7 @@ RULES = {
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
     # 64,140, 68,580 and 2,211 before the articles' last devices: modes of heading, MEMS gyros, pairs, climates.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_350, 65_350),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 72_756, 72_756),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 72_772, 72_772),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_302, 2_302),
 }
 

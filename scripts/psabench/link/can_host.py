@@ -18,6 +18,7 @@ from operator import length_hint
 from typing import Any, Protocol
 
 import can
+from can.interfaces.slcan import slcanBus
 from can.interfaces.socketcan import SocketcanBus
 
 from psabench.errors import BadInput, LinkError, TimeOut, expected
@@ -79,7 +80,7 @@ class StepClock:
     def __init__(self, control: Control, hosts: Sequence[CanHost] = ()) -> None:
         self._control = control
         self._hosts = list(hosts)
-        first = control.call("frames")
+        first = _frames_of_all(control, self._hosts)
         self._t_ns = first.t_ns
         clients = [*first.result["clients"], first.result["gone"]]
         self._base_tx = sum(int(c["taken"]) for c in clients)
@@ -157,6 +158,20 @@ class StepClock:
         return [reply.rx.get(client, 0) for client in self._mine] or [reply.can_rx]
 
 
+def _frames_of_all(control: Control, hosts: Sequence[CanHost]) -> Reply:
+    """`frames` when the emulator has all these hosts: a serial one joins by bytes that no one waits for.
+
+    Raises LinkError where one does not join.
+    """
+    deadline_s = time.monotonic() + BARRIER_S
+    reply = control.call("frames")
+    while any(h.joins_later for h in hosts) and len(reply.rx) < len(hosts):
+        if time.monotonic() > deadline_s:
+            raise LinkError(expected(f"{len(hosts)} clients within {BARRIER_S:g} s", len(reply.rx), "CAN"))
+        reply = control.call("frames")
+    return reply
+
+
 def _receive_all(host: CanHost, sent: int) -> None:
     """Receive until the host has all frames that the emulator has sent it."""
     while (missing := sent - host.received) > 0:
@@ -178,6 +193,7 @@ class CanHost(AbstractContextManager["CanHost"]):
         self.clock = clock
         self.shared = isinstance(bus, SocketcanBus | LocalUdpBus)
         self.counted = isinstance(bus, SocketcandBus)  # what it delivers are the emulator's frames, and TCP holds many
+        self.joins_later = isinstance(bus, slcanBus)  # its opening is bytes on their way
         self.received = self.sent = 0
         self.listeners: list[Listener] = []
 

@@ -234,6 +234,20 @@ def test_a_step_waits_for_each_bus_of_ours_and_for_nobody_elses(tmp_path: Path) 
     assert [r["args"]["after_tx"] for r in fake.requests[1:]] == [3 + 4 + 1] * 2
 
 
+def test_a_serial_client_is_waited_for_until_the_emulator_knows_it(tmp_path: Path) -> None:
+    """Without it the frames of that bus would never be taken: which client is whose is by their number."""
+    one, both = {"rx": {"1": 0}, "result": IDLE}, {"rx": {"1": 0, "2": 0}, "result": IDLE}
+    serial = FakeBus([frame(1)])
+    with (
+        control(tmp_path, one, one, both, {"rx": {"1": 0, "2": 1}}) as (port, _),
+        CanHost(FakeBus(), WallClock()) as a,
+        CanHost(serial, a.clock) as b,
+    ):
+        b.joins_later = True
+        StepClock(port, [a, b]).command(None, "run", for_s=0.1)
+        assert (a.received, b.received) == (0, 1)
+
+
 def test_in_real_time_the_other_buses_are_received_from_as_well() -> None:
     with CanHost(FakeBus(), WallClock()) as a, CanHost(FakeBus([frame(1), frame(2)]), WallClock()) as b:
         WallClock([a, b]).advance(a, 0.02)
