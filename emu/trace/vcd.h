@@ -1,6 +1,7 @@
 /* Writer of Value Change Dump (IEEE 1364-2005 clause 18): a trace sink that sigrok, PulseView, GTKWave and Surfer open.
  *
- * 1-bit wires, and on request real-valued channels (real.h); no date, so that the same run gives the same bytes. Times are rounded down to the file's unit: order is
+ * 1-bit wires, and on request real-valued channels (real.h); no date, so that the same run gives the same bytes.
+ * Times are rounded down to the file's unit: order is
  * kept and an edge is less than one unit early. The default unit is 10 ns: a half period of CLK (250 ns)
  * is then exact and of SClk (244.14 ns) within 4 %, no datasheet's set-up time (50 ns) collapses into one sample, and
  * sigrok, which makes a sample of every unit, still loads 10 s in seconds (docs/waveforms.md has the figures).

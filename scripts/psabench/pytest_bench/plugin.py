@@ -8,6 +8,7 @@ def test_zero(bench):
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,18 +34,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.fixture
-def bench(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Bench]:
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     """A bench with the scenario of the test's marker; its time moves when the test waits."""
     from psabench.bench import Bench
-    from psabench.pytest_bench.kept import Recording
+    from psabench.pytest_bench.kept import LOG, Recording
 
     name, how = _scenario_of(request)
-    log = tmp_path / "can.log"
-    with Bench.start(name, **{**how, "extra": (*how.get("extra", ()), "--can", f"log:{log}")}) as started:
-        recording = Recording(started, tmp_path, _folder_of(request))
-        request.node.stash[RECORDING] = recording
-        yield started
-    recording.finish()
+    with tempfile.TemporaryDirectory(prefix="psabench-") as work:
+        extra = (*how.pop("extra", ()), "--can", f"log:{Path(work) / LOG}")
+        with Bench.start(name, **how, extra=extra) as started:
+            recording = Recording(started, Path(work), _folder_of(request))
+            request.node.stash[RECORDING] = recording
+            yield started
+        recording.finish()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -64,7 +65,9 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     (folder / "test_it.py").write_text(TESTS)
     (folder / "mine.yaml").write_text(SCENARIO.read_text())
     argv = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "test_it.py"]
-    done = subprocess.run(argv, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT_S)
+    (folder / "tmp").mkdir()
+    env = os.environ | {"TMPDIR": str(folder / "tmp")}
+    done = subprocess.run(argv, cwd=folder, env=env, capture_output=True, text=True, timeout=TIMEOUT_S)
     assert done.returncode == 1, done.stdout + done.stderr
     return Session(folder, done.stdout)
 
@@ -75,6 +78,8 @@ def test_what_passes_leaves_nothing(session: Session) -> None:
     folders = {p.name for p in (session.folder / "bench-failures").iterdir()}
     assert "test_it.py--test_passes" not in folders
     assert "test_it.py--test_with_a_wrong_marker" not in folders
+    assert list((session.folder / "tmp").rglob("*.vcd")) == []
+    assert list((session.folder / "tmp").glob("psabench-*")) == []
 
 
 @HOST
