@@ -161,6 +161,12 @@ static bool do_vcd_start(void *ctx, const char *path, unsigned unit, bool wires,
         snprintf(why, CONTROL_WHY_MAX, "a recording is running; stop it with vcd.stop");
         return false;
     }
+    const struct board_type *type = s->bench->unit[unit].type;
+    if (wires && !type->pairs) {
+        snprintf(why, CONTROL_WHY_MAX, "pairs: expected a board with differential pairs (psa2, bins), got %s",
+                 type->name);
+        return false;
+    }
     struct stat st;
     if (stat(path, &st) == 0 && S_ISFIFO(st.st_mode)) { /* opening it waits for a reader, and the emulator with it */
         snprintf(why, CONTROL_WHY_MAX, "%.100s: expected a file, got a pipe; --vcd takes one", path);

@@ -5,6 +5,7 @@
 #include "board/psa2/internal.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 #define RES_LOW_NS   10000 /* E0: length of the pulse on Res */
@@ -326,8 +327,8 @@ static void add_pairs(struct psa2 *b)
     const struct psa2_profile *p = &b->profile;
     for (unsigned i = 0; i < PSA2_PAIRS; i++) {
         const struct pair_cfg cfg = {.line = psa2_pairs[i].line,
-                                     .rise_ns = (int64_t)p->line_delay_ns[i],
-                                     .fall_ns = (int64_t)(p->line_delay_ns[i] + p->line_skew_ns[i])};
+                                     .rise_ns = llround(p->line_delay_ns[i]),
+                                     .fall_ns = llround(p->line_delay_ns[i] + p->line_skew_ns[i])};
         line_pair_add(&b->base.line, &cfg, psa2_pairs[i].a, psa2_pairs[i].b);
     }
 }

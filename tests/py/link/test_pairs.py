@@ -53,13 +53,13 @@ def test_b_is_the_inverse_of_a_and_no_other_line_changes(tmp_path: Path) -> None
 
 
 def test_receivers_follow_after_delay_and_skew(tmp_path: Path) -> None:
-    delay_ns, skew_ns = [24, 31, 20], 3
+    delay_ns, skew_ns = [24, 31, 19.6], 3  # to the nearest nanosecond
     v = recorded(tmp_path, "--pairs", line_delay_ns=delay_ns, line_skew_ns=skew_ns)
     for name, rise_ns in zip(PAIRS, delay_ns, strict=True):
         for level, due_ns in ((1, rise_ns), (0, rise_ns + skew_ns)):
             sent, came = edges(v, f"{name}_A", level), edges(v, name, level)
             assert len(sent) > 30
-            assert set(came - sent[: len(came)]) == {due_ns}, name
+            assert set(came - sent[: len(came)]) == {round(due_ns)}, name
 
 
 def test_without_wires_in_the_recording_delays_are_the_same(tmp_path: Path) -> None:
@@ -107,6 +107,18 @@ def test_wires_go_on_at_the_drivers(kind: str, tmp_path: Path) -> None:
         at_ns = at_ns[at_ns > v.start_ns]
         due = np.ones(len(at_ns)) if kind == "line.open" else b.at(at_ns)
         assert np.array_equal(line.at(at_ns), due), name
+
+
+def test_a_board_without_pairs_cannot_record_them(tmp_path: Path) -> None:
+    path = tmp_path / "pik.yaml"
+    path.write_text("units: [{name: p, board: pik}]\n")
+    with Emulator(path, cans=["none"]) as emu, Control(emu.directory / "control") as control:
+        with pytest.raises(
+            ControlError, match=r"pairs: expected a board with differential pairs \(psa2, bins\), got pik"
+        ):
+            control.call("vcd.start", path=str(tmp_path / "out.vcd"), pairs=True)
+        assert not (tmp_path / "out.vcd").exists()
+        control.call("vcd.start", path=str(tmp_path / "out.vcd"))
 
 
 def test_a_line_without_a_pair_cannot_be_open(tmp_path: Path) -> None:
