@@ -143,17 +143,30 @@ static int clear_path(const struct sockaddr_un *a, long *owner)
     return 0;
 }
 
+/* A socket that listens, with the name path from then on: who sees the path can connect. */
+static int listen_as(const char *path, int fd)
+{
+    struct sockaddr_un a = {.sun_family = AF_UNIX};
+    snprintf(a.sun_path, sizeof a.sun_path, "%s~", path);
+    unlink(a.sun_path); /* of a process that was killed here */
+    if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0) return -errno;
+    const bool named = listen(fd, LISTENER_BACKLOG) == 0 && link(a.sun_path, path) == 0;
+    const int err = named ? 0 : -errno;
+    unlink(a.sun_path);
+    return err == -EEXIST ? -EADDRINUSE : err; /* another process took the path just now */
+}
+
 int ctl_listen(struct ctl_server *s, const char *path, long *owner)
 {
     struct sockaddr_un a = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof a.sun_path) return -ENAMETOOLONG;
+    if (strlen(path) > CTL_PATH_MAX) return -ENAMETOOLONG;
     strcpy(a.sun_path, path);
     int err = clear_path(&a, owner);
     if (err) return err;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) return -errno;
-    if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0 || listen(fd, LISTENER_BACKLOG) < 0) {
-        err = -errno;
+    err = listen_as(path, fd);
+    if (err) {
         close(fd);
         return err;
     }
@@ -166,6 +179,6 @@ int ctl_listen(struct ctl_server *s, const char *path, long *owner)
 void ctl_close(struct ctl_server *s)
 {
     if (s->listen.link.fd < 0) return;
+    unlink(s->path); /* first: who sees the path can connect */
     listener_close(&s->listen);
-    unlink(s->path);
 }

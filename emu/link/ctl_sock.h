@@ -10,6 +10,7 @@
 
 #define CTL_LINE_MAX    4096u
 #define CTL_CLIENTS_MAX 16u
+#define CTL_PATH_MAX    106u /* bytes; the socket has one more until it listens */
 
 struct ctl_client;
 
@@ -27,7 +28,7 @@ struct ctl_server {
 
 /* The callbacks, ctx and links are filled in by the caller; path is kept by pointer. A socket left behind by a process that
  * has ended is replaced. 0, or -errno: -EADDRINUSE the socket is in use by the process *owner (0: not known), -EEXIST the
- * path is no socket, -ENAMETOOLONG. */
+ * path is no socket, -ENAMETOOLONG. The path appears when a client can connect. */
 int ctl_listen(struct ctl_server *s, const char *path, long *owner);
 void ctl_close(struct ctl_server *s); /* and removes the path */
 
