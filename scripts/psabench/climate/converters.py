@@ -19,7 +19,7 @@ from psabench.bench import Bench
 from psabench.climate.soak import soak_units
 from psabench.errors import expected
 from psabench.link.signals import Floats
-from psabench.procedures.compare_converters import GENERATIONS, SETTLE_S, Track, tracks_of, units_of
+from psabench.procedures.compare_converters import GENERATIONS, SETTLE_S, OfGeneration, Track, tracks_of, units_of
 from psabench.procedures.comparison import PSD1_CODE_V, PSD1_FULL_SCALE_V, PSD1_NOISE_V
 from psabench.procedures.head_bench import Progress
 
@@ -101,21 +101,11 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drift:
+class Drift(OfGeneration):
     """Of one generation: zeros of X, Y, Z at the load, V; scales of X and Z, as parts of the nominal one."""
 
-    name: str
-    quantum_vs: float
     zero_v: tuple[Line, ...]
     scale: tuple[Line, ...]
-
-    @property
-    def title(self) -> str:
-        return GENERATIONS[self.name].title
-
-    @property
-    def ma_v_per_g(self) -> float:
-        return GENERATIONS[self.name].ma_v_per_g
 
     @property
     def worst_zero(self) -> Line:

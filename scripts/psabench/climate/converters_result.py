@@ -174,7 +174,7 @@ def result_dict(c: ChamberComparison) -> dict[str, object]:
                 "name": d.name,
                 "title": d.title,
                 "ma_v_per_g": d.ma_v_per_g,
-                "quantum_mps": quantum_mps(d),
+                "quantum_mps": d.quantum_mps(G_MPS2),
                 "article": ARTICLE[d.name].drift,
                 "size": ARTICLE[d.name].size,
                 "coefficients": ARTICLE[d.name].coefficients,
@@ -186,10 +186,6 @@ def result_dict(c: ChamberComparison) -> dict[str, object]:
 
 
 # ---- as text
-
-
-def quantum_mps(d: Drift) -> float:
-    return d.quantum_vs * G_MPS2 / d.ma_v_per_g
 
 
 def _as_ug(volts: float, d: Drift) -> float:
@@ -209,7 +205,7 @@ def drift_table(c: ChamberComparison) -> Table:
             *(1e6 * x for x in (scale.worst, scale.drift_expanded_u, scale.per_k, scale.per_k_expanded_u)),
         )
         texts = (f"{x:.2g}" if k % 2 else f"{x:+.3g}" for k, x in enumerate(figures))
-        rows.append((d.title, f"{quantum_mps(d):.3g}", *texts))
+        rows.append((d.title, f"{d.quantum_mps(G_MPS2):.3g}", *texts))
     return rows
 
 
@@ -246,7 +242,7 @@ def console_table(c: ChamberComparison) -> str:
 
 def order_of_resolution(drifts: Sequence[Drift]) -> float:
     """How many times finer PSA-2 is than the finest before it."""
-    of = {d.name: quantum_mps(d) for d in drifts}
+    of = {d.name: d.quantum_mps(G_MPS2) for d in drifts}
     return min(v for k, v in of.items() if k not in ("psa1", "psa2")) / of["psa2"]
 
 
