@@ -22,7 +22,7 @@ from psabench.procedures.result import LIMIT_CI, made_params
 from psabench.procedures.run import Measurement, RunOptions, accuracy_of, facts_of, measure_on, open_bench
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration
-from psabench.report.grading import aligned, with_ci, within_limits
+from psabench.report.grading import aligned, as_ratio, finite_or_none, with_ci, within_limits
 from psabench.report.page import section, table
 
 CLIMATE = Condition(label="", scenario="climate", average=16, g_mps2=SITE_G_MPS2)
@@ -97,7 +97,7 @@ def _course_dict(c: Course) -> Mapping[str, object]:
         "expanded_u": c.slope.ci_half,
         "budget": {x.name: x.u for x in c.slope.budget},
         "truth_per_k": c.truth_per_k,
-        "en": c.en,
+        "en": finite_or_none(c.en),
         "within_limits": c.within,
     }
 
@@ -112,8 +112,7 @@ def course_table(points: tuple[Point, ...], found: tuple[Course, ...]) -> list[t
         values = (with_ci(g.estimate.value, g.estimate.ci_half)[0] for g in c.found)
         truth = "" if c.truth_per_k is None else f"{c.truth_per_k * 1e6:.3f}"
         slope, u = with_ci(c.slope.value * 1e6, c.slope.ci_half * 1e6)
-        en = "" if c.en is None else f"{c.en:+.2f}"
-        rows.append((c.found[0].estimate.name, c.found[0].estimate.unit, *values, slope, u, truth, en))
+        rows.append((c.found[0].estimate.name, c.found[0].estimate.unit, *values, slope, u, truth, as_ratio(c.en, 2)))
     return rows
 
 
