@@ -239,7 +239,7 @@ def console_table(c: ChamberComparison) -> str:
     )
 
 
-def order_of_resolution(drifts: Sequence[Drift]) -> float:
+def times_finer(drifts: Sequence[Drift]) -> float:
     """How many times finer PSA-2 is than the finest before it."""
     of = {d.name: d.quantum_mps(G_MPS2) for d in drifts}
     return min(v for k, v in of.items() if k not in ("psa1", "psa2")) / of["psa2"]
@@ -254,5 +254,5 @@ def verdict_of_drifts(c: ChamberComparison) -> str:
         return f"{out} of {len(ens)} temperature coefficients are not within {LIMIT_CI:g} U of the true ones; {beyond}."
     return (
         f"All {len(ens)} temperature coefficients are within {LIMIT_CI:g} U of the true ones, {beyond}. "
-        f"PSA-2 resolves {order_of_resolution(c.drifts):.0f} times finer than all before it."
+        f"PSA-2 resolves {times_finer(c.drifts):.0f} times finer than all before it."
     )
