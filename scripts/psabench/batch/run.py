@@ -80,6 +80,8 @@ def run_batch(options: RunOptions, progress: Progress) -> BatchRun:
         raise BadInput(expected("all channels, no --axis", params.axis, "turns --batch"))
     if params.search_deg:
         raise BadInput(expected("no --search-deg", f"{params.search_deg:g}", "turns --batch"))
+    if options.average == 0:
+        raise BadInput(expected("an --average of 1 or more: samples of all channels", 0, "turns --batch"))
     options = replace(options, scenario=options.scenario or Path(BATCH.scenario))
     options.out.mkdir(parents=True, exist_ok=True)
     with open_bench(BATCH, options, every_unit=True) as bench:
@@ -99,8 +101,7 @@ def _measure_all(
     units = {name: unit for name, unit in bench.units.items() if isinstance(unit, Psa2)}
     if not units:
         raise BadInput(expected("units with a PSA-2", "none", "turns --batch"))
-    average = options.average or BATCH.average
-    g_mps2 = BATCH.g_mps2 if options.g_mps2 is None else options.g_mps2
+    average, g_mps2 = options.average_for(BATCH), options.gravity_for(BATCH)
     on_head = BatchBench(units, bench.head, average=average, g_mps2=g_mps2)
     first = turns(on_head, params, Watch(progress=progress)).readings
     accuracy, truth = accuracy_of({}, options), bench.truth()["units"] if bench.truth_path else {}
@@ -112,7 +113,7 @@ def _measure_all(
             for r in readings:
                 recorder(r)
         of_unit = truth.get(place.unit)
-        known = axis_truth({"units": {place.unit: of_unit}}, place.channel) if of_unit else None
+        known = axis_truth(of_unit, place.channel) if of_unit else None
         sections[place] = section_of(place, readings, params, accuracy, g_mps2, known)
     return serials, sections
 

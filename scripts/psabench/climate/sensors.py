@@ -72,8 +72,7 @@ def _measure_at(
     bench: Bench, degc: float, procedure: Procedure, params: Any, options: RunOptions, progress: Progress
 ) -> Point:
     shown = soak_units(bench, degc, SOAK_S, START_S)
-    average = CLIMATE.average if options.average is None else options.average
-    g_mps2 = CLIMATE.g_mps2 if options.g_mps2 is None else options.g_mps2
+    average, g_mps2 = options.average_for(CLIMATE), options.gravity_for(CLIMATE)
     known = accuracy_of({}, options)
     m = Measurement(
         procedure=procedure,
