@@ -13,9 +13,11 @@ import numpy as np
 from psabench.batch.bench import BatchBench, Place
 from psabench.bench import Bench
 from psabench.boards.psa2.device import CODE_V, Psa2
+from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.influences import expand_result
 from psabench.errors import BadInput, expected
+from psabench.options import refuse_beside
 from psabench.passport.entry import runs_of_result
 from psabench.passport.store import PassportStore
 from psabench.procedures.command_line.offered import SITE_G_MPS2, Condition
@@ -31,7 +33,6 @@ from psabench.report.grading import Section, aligned, grade, verdict, with_ci, w
 from psabench.report.page import section, table, verdict_line, whole_page, write_report
 
 BATCH = Condition(label="", scenario="batch", average=16, g_mps2=SITE_G_MPS2)
-REFUSED = ("record", "replay", "passport", "can", "head")  # they are of one sensor
 STORE = "passports.sqlite"
 TYPE = "mems"  # of the units in the store
 TITLE = "Test turns of a batch"
@@ -72,9 +73,8 @@ class BatchRun:
 
 def run_batch(options: RunOptions, progress: Progress) -> BatchRun:
     """Measure all sensors; writes a passport of each and the report. Raises BadInput, BenchError."""
-    for name in REFUSED:
-        if getattr(options, name):
-            raise BadInput(expected(f"no --{name} beside --batch", getattr(options, name), "run"))
+    options.refuse_one_bench("--batch")
+    refuse_beside("--batch", {"--node": None if options.node == DBC_NODE else options.node}, "run")
     params = made_params(TurnsParams, "turns", options.params or {})
     if params.axis != "x":
         raise BadInput(expected("all channels, no --axis", params.axis, "turns --batch"))

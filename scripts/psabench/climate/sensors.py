@@ -14,7 +14,6 @@ from typing import Any
 from psabench.bench import Bench
 from psabench.climate.coefficients import REFERENCE_DEGC, Course, Point, at_temperature, courses_of
 from psabench.climate.soak import soak_units
-from psabench.errors import BadInput, expected
 from psabench.procedures.command_line.offered import SITE_G_MPS2, Condition
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.registry import PROCEDURES, Procedure
@@ -29,7 +28,6 @@ CLIMATE = Condition(label="", scenario="climate", average=16, g_mps2=SITE_G_MPS2
 POINTS_DEGC = (-40.0, 0.0, 25.0, 60.0, 85.0)
 SOAK_S = 1200.0  # after the air is there: 20 time constants of the scenario's unit
 START_S = 2.0  # from power-on until the board is set up
-REFUSED = ("record", "replay", "passport", "can", "head")  # a chamber is in none of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,9 +50,7 @@ class ClimateRun:
 
 def run_climate(options: RunOptions, progress: Progress) -> ClimateRun:
     """One procedure at every temperature; writes the report. Raises BadInput, BenchError."""
-    for name in REFUSED:
-        if getattr(options, name):
-            raise BadInput(expected(f"no --{name} beside --climate", getattr(options, name), "run"))
+    options.refuse_one_bench("--climate")  # a chamber is in none of them
     (name,) = options.procedures
     procedure, options = PROCEDURES[name], replace(options, scenario=options.scenario or Path(CLIMATE.scenario))
     params = made_params(procedure.params, name, options.params or {})

@@ -22,6 +22,7 @@ from psabench.emulator import read_resolved
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
+from psabench.options import refuse_beside
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
@@ -62,6 +63,11 @@ class RunOptions:
 
     def gravity_for(self, c: Condition) -> float:
         return c.g_mps2 if self.g_mps2 is None else self.g_mps2
+
+    def refuse_one_bench(self, way: str) -> None:
+        """A recording, a passport or addresses of one sensor on a head, beside another way to run. Raises BadInput."""
+        names = ("record", "replay", "passport", "can", "head")
+        refuse_beside(way, {f"--{name}": getattr(self, name) for name in names}, "run")
 
 
 def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section], Nominal | None]:

@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import of_fields
+from psabench.options import of_fields, refuse_beside
 from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
 
@@ -143,9 +143,8 @@ def _compare_in_chamber(args: argparse.Namespace) -> int:
     from psabench.climate import converters_page, converters_result
     from psabench.climate.converters import ChamberParams
 
-    for option, given in (("--record", args.record), ("--replay", args.replay)):
-        if given:  # table, chamber and supply are not in a recording
-            raise BadInput(expected(f"no {option} beside --chamber", given, "compare-converters"))
+    # table, chamber and supply are not in a recording
+    refuse_beside("--chamber", {"--record": args.record, "--replay": args.replay}, "compare-converters")
     c = converters_result.compare_in_chamber(args.out, ChamberParams(), Bar(), scenario=args.scenario, seed=args.seed)
     page = converters_page.write_page(args.out, c)
     if args.verbose:
