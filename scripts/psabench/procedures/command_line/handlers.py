@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from psabench.estimate.uncertainty import Estimate
     from psabench.procedures.head_bench import Progress
     from psabench.procedures.run import RunOptions
+    from psabench.report.grading import Section
 
 
 def _params(args: argparse.Namespace) -> dict[str, Any]:
@@ -52,8 +53,7 @@ def run_on_head(args: argparse.Namespace) -> int:
         return _run_in_climate(args, options)
     with progress_of(args) as followers:
         page, sections, nominal = run.run(options, followers.progress)
-        for s in sections:
-            followers.result(s.result.procedure, s.label, s.result.estimates, report.within_limits([s]))
+        followers.show_sections(sections)
     if args.verbose:
         for section in sections:
             print(report.console_table(section))
@@ -69,8 +69,7 @@ def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
 
     with progress_of(args) as followers:
         r = sensors.run_climate(options, followers.progress)
-        for s in r.sections:
-            followers.result(s.result.procedure, s.label, s.result.estimates, grading.within_limits([s]))
+        followers.show_sections(r.sections)
     if args.verbose:
         print("\n".join(grading.console_table(s) for s in r.sections))
     print(sensors.console_table(r))
@@ -86,7 +85,8 @@ def _run_batch(args: argparse.Namespace, options: RunOptions) -> int:
 
     with progress_of(args) as followers:
         r = batch.run_batch(options, followers.progress)
-    sections = list(r.sections.values())
+        sections = list(r.sections.values())
+        followers.show_sections(sections)
     if args.verbose:
         print("\n".join(grading.console_table(s) for s in sections))
     print(batch.console_table(r))
@@ -102,6 +102,13 @@ class Followers:
 
     progress: Progress
     result: Callable[[str, str, Sequence[Estimate], bool], None]
+
+    def show_sections(self, sections: Sequence[Section]) -> None:
+        """Results of a calibration, each with whether it is within its limits."""
+        from psabench.report import grading
+
+        for s in sections:
+            self.result(s.result.procedure, s.label, s.result.estimates, grading.within_limits([s]))
 
 
 @contextmanager
