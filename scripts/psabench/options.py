@@ -6,7 +6,7 @@ import argparse
 import difflib
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -89,6 +89,13 @@ def of_fields(kind: type[Options], args: argparse.Namespace, **others: Any) -> O
     """A dataclass of options: each field the argument of its name, and others."""
     named = {k: v for k, v in vars(args).items() if k in kind.__dataclass_fields__}  # type: ignore[attr-defined]
     return kind(**{**named, **others})
+
+
+def refuse_beside(way: str, given: Mapping[str, object], where: str) -> None:
+    """given: options that an option `way` excludes, None: it was not given. Raises BadInput."""
+    for option, value in given.items():
+        if value is not None:
+            raise BadInput(expected(f"no {option} beside {way}", value, where))
 
 
 def yes_no(text: str) -> bool:

@@ -13,9 +13,11 @@ import numpy as np
 from psabench.batch.bench import BatchBench, Place
 from psabench.bench import Bench
 from psabench.boards.psa2.device import CODE_V, Psa2
+from psabench.boards.registry import DBC_NODE
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.budget.influences import expand_result
 from psabench.errors import BadInput, expected
+from psabench.options import refuse_beside
 from psabench.passport.entry import runs_of_result
 from psabench.passport.store import PassportStore
 from psabench.procedures.command_line.offered import SITE_G_MPS2, Condition
@@ -31,7 +33,6 @@ from psabench.report.grading import Section, aligned, grade, verdict, with_ci, w
 from psabench.report.page import section, table, verdict_line, whole_page, write_report
 
 BATCH = Condition(label="", scenario="batch", average=16, g_mps2=SITE_G_MPS2)
-REFUSED = ("record", "replay", "passport", "can", "head")  # they are of one sensor
 STORE = "passports.sqlite"
 TYPE = "mems"  # of the units in the store
 TITLE = "Test turns of a batch"
@@ -72,14 +73,15 @@ class BatchRun:
 
 def run_batch(options: RunOptions, progress: Progress) -> BatchRun:
     """Measure all sensors; writes a passport of each and the report. Raises BadInput, BenchError."""
-    for name in REFUSED:
-        if getattr(options, name):
-            raise BadInput(expected(f"no --{name} beside --batch", getattr(options, name), "run"))
+    options.refuse_one_bench("--batch")
+    refuse_beside("--batch", {"--node": None if options.node == DBC_NODE else options.node}, "run")
     params = made_params(TurnsParams, "turns", options.params or {})
     if params.axis != "x":
         raise BadInput(expected("all channels, no --axis", params.axis, "turns --batch"))
     if params.search_deg:
         raise BadInput(expected("no --search-deg", f"{params.search_deg:g}", "turns --batch"))
+    if options.average == 0:
+        raise BadInput(expected("an --average of 1 or more: samples of all channels", 0, "turns --batch"))
     options = replace(options, scenario=options.scenario or Path(BATCH.scenario))
     options.out.mkdir(parents=True, exist_ok=True)
     with open_bench(BATCH, options, every_unit=True) as bench:
@@ -99,8 +101,7 @@ def _measure_all(
     units = {name: unit for name, unit in bench.units.items() if isinstance(unit, Psa2)}
     if not units:
         raise BadInput(expected("units with a PSA-2", "none", "turns --batch"))
-    average = options.average or BATCH.average
-    g_mps2 = BATCH.g_mps2 if options.g_mps2 is None else options.g_mps2
+    average, g_mps2 = options.average_for(BATCH), options.gravity_for(BATCH)
     on_head = BatchBench(units, bench.head, average=average, g_mps2=g_mps2)
     first = turns(on_head, params, Watch(progress=progress)).readings
     accuracy, truth = accuracy_of({}, options), bench.truth()["units"] if bench.truth_path else {}
@@ -112,7 +113,7 @@ def _measure_all(
             for r in readings:
                 recorder(r)
         of_unit = truth.get(place.unit)
-        known = axis_truth({"units": {place.unit: of_unit}}, place.channel) if of_unit else None
+        known = axis_truth(of_unit, place.channel) if of_unit else None
         sections[place] = section_of(place, readings, params, accuracy, g_mps2, known)
     return serials, sections
 

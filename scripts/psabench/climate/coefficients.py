@@ -17,7 +17,7 @@ from psabench.report.grading import Graded, Section, grade, ratio_of
 REFERENCE_DEGC = 25.0  # at which a sensor's parameters and a chain's tolerances are given
 TEMPERATURE = "temperature"  # component of psabench.budget.influences that grows with the distance from there
 CONSTANT = ("chain gain", "chain zero", "circle")  # the same at all temperatures: not in a slope
-SCALED = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g")  # parameters that go with the temperature of a MEMS sensor
+SENSITIVITIES = ("kx_v_per_g", "ky_v_per_g", "kz_v_per_g")  # parameters that go with the temperature of a MEMS sensor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ def at_temperature(truth: Mapping[str, float], degc: float) -> dict[str, float]:
     """A MEMS sensor's true parameters at the temperature of its element."""
     off_k = degc - REFERENCE_DEGC
     by = 1.0 + truth.get("k_tc_ppm_per_k", 0.0) * 1e-6 * off_k
-    warm = {name: truth[name] * by for name in SCALED if name in truth}
+    warm = {name: truth[name] * by for name in SENSITIVITIES if name in truth}
     return {**truth, **warm, "u0_v": truth["u0_v"] + truth.get("u0_tc_v_per_k", 0.0) * off_k}
 
 

@@ -16,17 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.bench import Bench
+from psabench.climate.coefficients import weights_per_k
 from psabench.climate.soak import soak_units
 from psabench.errors import expected
 from psabench.link.signals import Floats
-from psabench.procedures.compare_converters import GENERATIONS, SETTLE_S, Track, tracks_of, units_of
-from psabench.procedures.comparison import PSD1_CODE_V, PSD1_FULL_SCALE_V, PSD1_NOISE_V
+from psabench.procedures.compare_converters import GENERATIONS, SETTLE_S, OfGeneration, Track, tracks_of, units_of
+from psabench.procedures.comparison import COVERAGE_K, PSD1_CODE_V, PSD1_FULL_SCALE_V, PSD1_NOISE_V
 from psabench.procedures.head_bench import Progress
 
 SCENARIO = "converters_chamber"
 ANGLES_DEG = (0.0, 90.0, 180.0, 270.0)  # of the table, about the level axis y: Z down, X up, Z up, X down
 SCALED = (0, 2)  # axes that gravity comes along: X, Z; Y stays level, so that of it there is a zero alone
-COVERAGE_K = 2.0
 BLOCKS = 10  # parts of a recording, whose scatter says how much its mean scatters
 REST_S = 0.5  # after a turn: filters settle
 
@@ -101,21 +101,11 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drift:
+class Drift(OfGeneration):
     """Of one generation: zeros of X, Y, Z at the load, V; scales of X and Z, as parts of the nominal one."""
 
-    name: str
-    quantum_vs: float
     zero_v: tuple[Line, ...]
     scale: tuple[Line, ...]
-
-    @property
-    def title(self) -> str:
-        return GENERATIONS[self.name].title
-
-    @property
-    def ma_v_per_g(self) -> float:
-        return GENERATIONS[self.name].ma_v_per_g
 
     @property
     def worst_zero(self) -> Line:
@@ -268,6 +258,5 @@ def _line_of(degc: Floats, values: Floats, u: float, *, second_order: bool) -> L
     """second_order: of a ratio of parts that drift, whose square the straight line leaves."""
     if second_order:
         u = math.hypot(u, float(np.max(np.abs(values - values[0]))) ** 2)
-    off_k = degc - degc.mean()
-    spread_k2 = float(off_k @ off_k)
-    return Line(values=values, u=u, per_k=float(off_k @ values) / spread_k2, per_k_u=u / math.sqrt(spread_k2))
+    w = weights_per_k(degc)
+    return Line(values=values, u=u, per_k=float(w @ values), per_k_u=u * math.sqrt(float(w @ w)))

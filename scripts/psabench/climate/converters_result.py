@@ -15,6 +15,7 @@ from psabench.boards.pik.device import Pik
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psd1.device import Psd1
 from psabench.boards.unit import Unit
+from psabench.budget.gum import COVERAGE
 from psabench.climate import converters as measured
 from psabench.climate.converters import SCALED, ChamberParams, Drift, Line, Soak
 from psabench.emulator import read_resolved
@@ -22,7 +23,7 @@ from psabench.procedures.compare_converters import GENERATIONS, NAME
 from psabench.procedures.comparison import ARTICLE, G_MPS2
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.result import LIMIT_CI
-from psabench.report.grading import aligned
+from psabench.report.grading import aligned, finite_or_none, ratio_of
 
 AXES = "XYZ"
 Table = list[tuple[str, ...]]
@@ -56,9 +57,7 @@ def _psa_truth(unit: Mapping[str, Any]) -> TrueDrift:
     chains = [unit["axes"][a]["afe"] for a in "xyz"]
     return TrueDrift(
         zero_v_per_k=tuple(c["buffer_offset_tc_v_per_k"] for c in chains),
-        scale_per_k=tuple(
-            1e-6 * (c["load_tc_ppm_per_k"] - c["divider_tc_ppm_per_k"]) for c in (chains[i] for i in SCALED)
-        ),
+        scale_per_k=tuple(1e-6 * (chains[i]["load_tc_ppm_per_k"] - chains[i]["divider_tc_ppm_per_k"]) for i in SCALED),
     )
 
 
@@ -90,7 +89,7 @@ class Compared:
         """Error over U."""
         if self.truth_per_k is None:
             return None
-        return (self.line.per_k - self.truth_per_k) / self.line.per_k_expanded_u
+        return ratio_of(self.line.per_k - self.truth_per_k, self.line.per_k_expanded_u)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +156,7 @@ def _line_dict(c: Compared) -> dict[str, object]:
         "per_k": c.line.per_k,
         "per_k_expanded_u": c.line.per_k_expanded_u,
         "truth_per_k": c.truth_per_k,
-        "en": c.en,
+        "en": finite_or_none(c.en),
     }
 
 
@@ -174,7 +173,7 @@ def result_dict(c: ChamberComparison) -> dict[str, object]:
                 "name": d.name,
                 "title": d.title,
                 "ma_v_per_g": d.ma_v_per_g,
-                "quantum_mps": quantum_mps(d),
+                "quantum_mps": d.quantum_mps(G_MPS2),
                 "article": ARTICLE[d.name].drift,
                 "size": ARTICLE[d.name].size,
                 "coefficients": ARTICLE[d.name].coefficients,
@@ -186,10 +185,6 @@ def result_dict(c: ChamberComparison) -> dict[str, object]:
 
 
 # ---- as text
-
-
-def quantum_mps(d: Drift) -> float:
-    return d.quantum_vs * G_MPS2 / d.ma_v_per_g
 
 
 def _as_ug(volts: float, d: Drift) -> float:
@@ -209,7 +204,7 @@ def drift_table(c: ChamberComparison) -> Table:
             *(1e6 * x for x in (scale.worst, scale.drift_expanded_u, scale.per_k, scale.per_k_expanded_u)),
         )
         texts = (f"{x:.2g}" if k % 2 else f"{x:+.3g}" for k, x in enumerate(figures))
-        rows.append((d.title, f"{quantum_mps(d):.3g}", *texts))
+        rows.append((d.title, f"{d.quantum_mps(G_MPS2):.3g}", *texts))
     return rows
 
 
@@ -244,20 +239,20 @@ def console_table(c: ChamberComparison) -> str:
     )
 
 
-def order_of_resolution(drifts: Sequence[Drift]) -> float:
+def times_finer(drifts: Sequence[Drift]) -> float:
     """How many times finer PSA-2 is than the finest before it."""
-    of = {d.name: quantum_mps(d) for d in drifts}
+    of = {d.name: d.quantum_mps(G_MPS2) for d in drifts}
     return min(v for k, v in of.items() if k not in ("psa1", "psa2")) / of["psa2"]
 
 
 def verdict_of_drifts(c: ChamberComparison) -> str:
     """What was compared with what, and how it came out."""
     ens = c.ens
-    beyond = f"{sum(abs(en) > 1.0 for en in ens)} are beyond U (expected: {0.0455 * len(ens):.1f})"
+    beyond = f"{sum(abs(en) > 1.0 for en in ens)} are beyond U (expected: {(1.0 - COVERAGE) * len(ens):.1f})"
     out = sum(abs(en) > LIMIT_CI for en in ens)
     if out:
         return f"{out} of {len(ens)} temperature coefficients are not within {LIMIT_CI:g} U of the true ones; {beyond}."
     return (
         f"All {len(ens)} temperature coefficients are within {LIMIT_CI:g} U of the true ones, {beyond}. "
-        f"PSA-2 resolves {order_of_resolution(c.drifts):.0f} times finer than all before it."
+        f"PSA-2 resolves {times_finer(c.drifts):.0f} times finer than all before it."
     )

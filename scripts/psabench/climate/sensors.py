@@ -14,7 +14,6 @@ from typing import Any
 from psabench.bench import Bench
 from psabench.climate.coefficients import REFERENCE_DEGC, Course, Point, at_temperature, courses_of
 from psabench.climate.soak import soak_units
-from psabench.errors import BadInput, expected
 from psabench.procedures.command_line.offered import SITE_G_MPS2, Condition
 from psabench.procedures.head_bench import Progress
 from psabench.procedures.registry import PROCEDURES, Procedure
@@ -22,14 +21,13 @@ from psabench.procedures.result import LIMIT_CI, made_params
 from psabench.procedures.run import Measurement, RunOptions, accuracy_of, facts_of, measure_on, open_bench
 from psabench.procedures.wire_bench import WireBench
 from psabench.report import calibration
-from psabench.report.grading import aligned, with_ci, within_limits
+from psabench.report.grading import aligned, as_ratio, finite_or_none, with_ci, within_limits
 from psabench.report.page import section, table
 
 CLIMATE = Condition(label="", scenario="climate", average=16, g_mps2=SITE_G_MPS2)
 POINTS_DEGC = (-40.0, 0.0, 25.0, 60.0, 85.0)
 SOAK_S = 1200.0  # after the air is there: 20 time constants of the scenario's unit
 START_S = 2.0  # from power-on until the board is set up
-REFUSED = ("record", "replay", "passport", "can", "head")  # a chamber is in none of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,9 +50,7 @@ class ClimateRun:
 
 def run_climate(options: RunOptions, progress: Progress) -> ClimateRun:
     """One procedure at every temperature; writes the report. Raises BadInput, BenchError."""
-    for name in REFUSED:
-        if getattr(options, name):
-            raise BadInput(expected(f"no --{name} beside --climate", getattr(options, name), "run"))
+    options.refuse_one_bench("--climate")  # a chamber is in none of them
     (name,) = options.procedures
     procedure, options = PROCEDURES[name], replace(options, scenario=options.scenario or Path(CLIMATE.scenario))
     params = made_params(procedure.params, name, options.params or {})
@@ -72,8 +68,7 @@ def _measure_at(
     bench: Bench, degc: float, procedure: Procedure, params: Any, options: RunOptions, progress: Progress
 ) -> Point:
     shown = soak_units(bench, degc, SOAK_S, START_S)
-    average = CLIMATE.average if options.average is None else options.average
-    g_mps2 = CLIMATE.g_mps2 if options.g_mps2 is None else options.g_mps2
+    average, g_mps2 = options.average_for(CLIMATE), options.gravity_for(CLIMATE)
     known = accuracy_of({}, options)
     m = Measurement(
         procedure=procedure,
@@ -97,7 +92,7 @@ def _course_dict(c: Course) -> Mapping[str, object]:
         "expanded_u": c.slope.ci_half,
         "budget": {x.name: x.u for x in c.slope.budget},
         "truth_per_k": c.truth_per_k,
-        "en": c.en,
+        "en": finite_or_none(c.en),
         "within_limits": c.within,
     }
 
@@ -112,8 +107,7 @@ def course_table(points: tuple[Point, ...], found: tuple[Course, ...]) -> list[t
         values = (with_ci(g.estimate.value, g.estimate.ci_half)[0] for g in c.found)
         truth = "" if c.truth_per_k is None else f"{c.truth_per_k * 1e6:.3f}"
         slope, u = with_ci(c.slope.value * 1e6, c.slope.ci_half * 1e6)
-        en = "" if c.en is None else f"{c.en:+.2f}"
-        rows.append((c.found[0].estimate.name, c.found[0].estimate.unit, *values, slope, u, truth, en))
+        rows.append((c.found[0].estimate.name, c.found[0].estimate.unit, *values, slope, u, truth, as_ratio(c.en, 2)))
     return rows
 
 

@@ -73,17 +73,11 @@ GENERATIONS: Mapping[str, Generation] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Track:
-    """What a unit told of the motion: integral of each input over time, from its first reading on."""
+class OfGeneration:
+    """What was found of a unit, in volts at its load; the generation gives the scale."""
 
     name: str  # of GENERATIONS
     quantum_vs: float  # smallest step of the integral
-    t_s: Floats  # (n,) of the readings, s of the bench; the first is where the integral is 0
-    s_vs: Floats  # (n, 3) V s of X, Y, Z
-    note: str = ""
-    # Standard uncertainties from the scatter of the unit's own calibrations, 0: it makes none.
-    gain_u: float = 0.0  # relative
-    zero_u_v: float = 0.0  # at the load
 
     @property
     def title(self) -> str:
@@ -93,12 +87,24 @@ class Track:
     def ma_v_per_g(self) -> float:
         return GENERATIONS[self.name].ma_v_per_g
 
+    def quantum_mps(self, g_mps2: float) -> float:
+        return self.quantum_vs * g_mps2 / self.ma_v_per_g
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track(OfGeneration):
+    """What a unit told of the motion: integral of each input over time, from its first reading on."""
+
+    t_s: Floats  # (n,) of the readings, s of the bench; the first is where the integral is 0
+    s_vs: Floats  # (n, 3) V s of X, Y, Z
+    note: str = ""
+    # Standard uncertainties from the scatter of the unit's own calibrations, 0: it makes none.
+    gain_u: float = 0.0  # relative
+    zero_u_v: float = 0.0  # at the load
+
     def velocity_mps(self, g_mps2: float) -> Floats:
         """Shape (n, 3)."""
         return self.s_vs * (g_mps2 / self.ma_v_per_g)
-
-    def quantum_mps(self, g_mps2: float) -> float:
-        return self.quantum_vs * g_mps2 / self.ma_v_per_g
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

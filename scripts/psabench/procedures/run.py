@@ -22,6 +22,7 @@ from psabench.emulator import read_resolved
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.logs.call_log import check_procedure, refuse_beside_replay
+from psabench.options import refuse_beside
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2, Condition
 from psabench.procedures.head_bench import HeadBench, Progress, Watch
 from psabench.procedures.recorded_head import HeadRecorder, RecordedHead
@@ -57,6 +58,17 @@ class RunOptions:
     passport: Path | None = None  # nominal values of the sensor
     params: Mapping[str, Any] | None = None  # fields of the procedures' parameters, by name
 
+    def average_for(self, c: Condition) -> int:
+        return c.average if self.average is None else self.average
+
+    def gravity_for(self, c: Condition) -> float:
+        return c.g_mps2 if self.g_mps2 is None else self.g_mps2
+
+    def refuse_one_bench(self, way: str) -> None:
+        """A recording, a passport or addresses of one sensor on a head, beside another way to run. Raises BadInput."""
+        names = ("record", "replay", "passport", "can", "head")
+        refuse_beside(way, {f"--{name}": getattr(self, name) for name in names}, "run")
+
 
 def run(options: RunOptions, progress: Progress) -> tuple[Path, list[Section], Nominal | None]:
     """Every procedure under every condition; writes the report. Raises BenchError; Ctrl-C keeps the readings taken.
@@ -87,8 +99,7 @@ def measure_section(procedure: Procedure, condition: Condition, options: RunOpti
     """One procedure on one bench, with its budget; stores the readings and the resolved scenario. Raises BenchError."""
     params = made_params(procedure.params, procedure.name, options.params or {})
     accuracy = accuracy_of(EXACT if condition.exact else {}, options)
-    average = condition.average if options.average is None else options.average
-    g_mps2 = condition.g_mps2 if options.g_mps2 is None else options.g_mps2
+    average, g_mps2 = options.average_for(condition), options.gravity_for(condition)
     stem = "-".join(x for x in (procedure.name, condition.label) if x)
     with ExitStack() as stack:
         bench = stack.enter_context(open_bench(condition, options))
@@ -129,7 +140,7 @@ def measure_on(bench: Bench, head: HeadBench, m: Measurement, progress: Progress
         zero = ZeroWatch(recorder, lambda: bench.time_s, lambda: _zero_moved_v(bench, m.params.axis))
         watched = zero if bench.truth_path else recorder
         result = m.procedure.run(head, m.params, Watch(progress=progress, record=watched))
-    truth = axis_truth(bench.truth(), m.params.axis) if bench.truth_path else None
+    truth = axis_truth(next(iter(bench.truth()["units"].values())), m.params.axis) if bench.truth_path else None
     moved_v = zero.moved_v(result.readings) if truth else ()
     result = expand_result(result, m.procedure, m.params, m.accuracy, _step_v(m.average))
     return Section(label=m.label, result=result, truth=truth, zero_moved_v=moved_v)
@@ -203,10 +214,9 @@ def nominal_of(options: RunOptions, axis: str) -> Nominal | None:
     return nominal_of_scenario(resolved, axis, options.node, Path(condition.scenario).name)
 
 
-def axis_truth(truth: Mapping[str, Any], axis: str) -> Mapping[str, float]:
-    first = next(iter(truth["units"].values()))
-    sensor = first["axes"][axis]
-    return {k: float(v) for k, v in sensor.items() if isinstance(v, int | float)}
+def axis_truth(unit: Mapping[str, Any], axis: str) -> Mapping[str, float]:
+    """Of a unit's truth, the numbers of one sensor."""
+    return {k: float(v) for k, v in unit["axes"][axis].items() if isinstance(v, int | float)}
 
 
 def _zero_moved_v(bench: Bench, axis: str) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,7 +13,45 @@ from psabench.instruments import Head
 from psabench.procedures.command_line.offered import G_MPS2
 
 
-class WireBench:
+class WireHead:
+    """Moves and clock of a `procedures.head_bench.HeadBench`: units on one bus, and the head that turns them."""
+
+    def __init__(self, units: Sequence[Psa2], head: Head, *, g_mps2: float) -> None:
+        self.g_mps2 = g_mps2
+        self._host = units[0].host
+        self._head = head
+        for unit in units:
+            unit.wait_ready()
+        self._period_s = max(1.0 / unit.data_hz for unit in units)
+        self._settled_at_s = self.t_s
+
+    @property
+    def t_s(self) -> float:
+        return self._host.clock.now_s()
+
+    def turn(self, angle_deg: float) -> float:
+        """Head to angle_deg; the time it takes to get there passes. Returns its scale, deg."""
+        return self._rested(self._head.turn(angle_deg))
+
+    def mount(self, face: Face) -> None:
+        """Put the units on the head's mount with this face."""
+        self._rested(self._head.mount(face))
+
+    def _rested(self, scale_deg: float) -> float:
+        """The head has come to rest just now: the filters settle from here."""
+        self._settled_at_s = self.t_s + SETTLE_PERIODS * self._period_s
+        return scale_deg
+
+    def wait(self, dwell_s: float) -> None:
+        if dwell_s > 0.0:
+            self._host.advance(dwell_s)
+
+    def wait_settled(self) -> None:
+        """Until the filters have settled since the head's last move."""
+        self.wait(self._settled_at_s - self.t_s)
+
+
+class WireBench(WireHead):
     """A `procedures.head_bench.HeadBench` of a unit and the head that it is mounted on.
 
     average: settled samples in one reading, from the stream of 24-bit codes; 0: one whole 32-bit conversion word by
@@ -19,40 +59,14 @@ class WireBench:
     """
 
     def __init__(self, unit: Psa2, head: Head, *, average: int = 1, g_mps2: float = G_MPS2) -> None:
-        self.g_mps2 = g_mps2
+        super().__init__([unit], head, g_mps2=g_mps2)
         self._unit = unit
-        self._head = head
         self._average = average
-        unit.wait_ready()
-        self._period_s = 1.0 / unit.data_hz
         self.filter_gain = unit.filter_gain
-        self._settle_s = SETTLE_PERIODS * self._period_s
-        self._settled_at_s = self.t_s
-
-    @property
-    def t_s(self) -> float:
-        return self._unit.host.clock.now_s()
-
-    def turn(self, angle_deg: float) -> float:
-        """Head to angle_deg; the time it takes to get there passes. Returns its scale, deg."""
-        return self._rested(self._head.turn(angle_deg))
-
-    def mount(self, face: Face) -> None:
-        """Put the unit on the head's mount with this face."""
-        self._rested(self._head.mount(face))
-
-    def _rested(self, scale_deg: float) -> float:
-        """The head has come to rest just now: the filters settle from here."""
-        self._settled_at_s = self.t_s + self._settle_s
-        return scale_deg
-
-    def wait(self, dwell_s: float) -> None:
-        if dwell_s > 0.0:
-            self._unit.host.advance(dwell_s)
 
     def read(self, axis: str, readings: int) -> npt.NDArray[np.float64]:
         """Settled readings, each the mean of `average` samples (or one whole word), volts at the load."""
-        self.wait(self._settled_at_s - self.t_s)
+        self.wait_settled()
         return self._read_v(axis, readings) / self.filter_gain
 
     def _read_v(self, axis: str, readings: int) -> npt.NDArray[np.float64]:

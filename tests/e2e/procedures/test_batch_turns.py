@@ -7,11 +7,15 @@ from pathlib import Path
 
 import pytest
 from psabench import cli
+from psabench.lcm.event_log import read_events
+from psabench.lcm.progress import RESULT
 from psabench.passport.store import PassportStore
 
 
 def test_a_batch_in_one_pass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["run", "turns", "--batch", "--out", str(tmp_path)]) == 0
+    log = tmp_path / "lcm.log"
+    assert cli.main(["run", "turns", "--batch", "--lcm", f"file://{log}", "--out", str(tmp_path)]) == 0
+    assert sum(e.channel == RESULT for e in read_events(log)) == 12
     told = capsys.readouterr().out
     assert "12 sensors in one pass" in told
     assert "72 numbers are within 2 U of the sensor's true parameters" in told

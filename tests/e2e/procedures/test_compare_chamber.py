@@ -38,7 +38,7 @@ def test_the_zero_of_psa_drifts_less_than_that_of_pik(found: result.ChamberCompa
     for name in ("pmka", "psd1"):
         zero = of(found, name).worst_zero
         assert abs(zero.worst) < 2.0 * zero.drift_expanded_u
-    assert result.order_of_resolution(found.drifts) > 10.0
+    assert result.times_finer(found.drifts) > 10.0
 
 
 def test_the_rom_ends_at_its_points(found: result.ChamberComparison) -> None:

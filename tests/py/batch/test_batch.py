@@ -112,8 +112,10 @@ def test_spread_is_of_what_each_sensor_determines() -> None:
     ("words", "why"),
     [
         (["--record", "x.log"], "run: expected no --record beside --batch, got x.log"),
+        (["--node", "6"], "run: expected no --node beside --batch, got 6"),
         (["--axis", "y"], "turns --batch: expected all channels, no --axis, got y"),
         (["--search-deg", "1"], "turns --batch: expected no --search-deg, got 1"),
+        (["--average", "0"], "turns --batch: expected an --average of 1 or more: samples of all channels, got 0"),
         (["--climate"], "turns: expected one of --climate and --batch, got both"),
     ],
 )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +115,9 @@ def test_a_coefficient_is_graded_against_the_true_one(tmp_path: Path) -> None:
     assert "1 of 5 temperature coefficients are not within 2 U" in result.verdict_of_drifts(bad)
     assert "All 5 temperature coefficients are within 2 U" in result.verdict_of_drifts(good)
     assert comparison(result.NO_LINE).ens == []
+    exact = replace(good.drifts[0].zero_v[0], per_k_u=0.0)
+    assert result.Compared(what="zero X", line=exact, truth_per_k=exact.per_k).en == 0.0
+    assert result.Compared(what="zero X", line=exact, truth_per_k=0.0).en == math.inf
     page = converters_page.write_page(tmp_path, good)
     assert page.read_text(encoding="utf-8").count("<svg") == 1
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["within_limits"] is True

@@ -13,14 +13,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import of_fields
+from psabench.options import of_fields, refuse_beside
 from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from psabench.estimate.uncertainty import Estimate
     from psabench.procedures.head_bench import Progress
     from psabench.procedures.run import RunOptions
+    from psabench.report.grading import Section
 
 
 def _params(args: argparse.Namespace) -> dict[str, Any]:
@@ -52,8 +55,7 @@ def run_on_head(args: argparse.Namespace) -> int:
         return _run_in_climate(args, options)
     with progress_of(args) as followers:
         page, sections, nominal = run.run(options, followers.progress)
-        for s in sections:
-            followers.result(s.result.procedure, s.label, s.result.estimates, report.within_limits([s]))
+        followers.show_sections(sections)
     if args.verbose:
         for section in sections:
             print(report.console_table(section))
@@ -69,8 +71,7 @@ def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
 
     with progress_of(args) as followers:
         r = sensors.run_climate(options, followers.progress)
-        for s in r.sections:
-            followers.result(s.result.procedure, s.label, s.result.estimates, grading.within_limits([s]))
+        followers.show_sections(r.sections)
     if args.verbose:
         print("\n".join(grading.console_table(s) for s in r.sections))
     print(sensors.console_table(r))
@@ -86,7 +87,8 @@ def _run_batch(args: argparse.Namespace, options: RunOptions) -> int:
 
     with progress_of(args) as followers:
         r = batch.run_batch(options, followers.progress)
-    sections = list(r.sections.values())
+        sections = list(r.sections.values())
+        followers.show_sections(sections)
     if args.verbose:
         print("\n".join(grading.console_table(s) for s in sections))
     print(batch.console_table(r))
@@ -103,6 +105,13 @@ class Followers:
     progress: Progress
     result: Callable[[str, str, Sequence[Estimate], bool], None]
 
+    def show_sections(self, sections: Sequence[Section]) -> None:
+        """Results of a calibration, each with whether it is within its limits."""
+        from psabench.report import grading
+
+        for s in sections:
+            self.result(s.result.procedure, s.label, s.result.estimates, grading.within_limits([s]))
+
 
 @contextmanager
 def progress_of(args: argparse.Namespace) -> Iterator[Followers]:
@@ -115,6 +124,15 @@ def progress_of(args: argparse.Namespace) -> Iterator[Followers]:
 
     with publisher(args.lcm) as out:
         yield Followers(progress=LcmProgress(out, args.procedure, Bar()), result=partial(publish_result, out))
+
+
+def _show_end(args: argparse.Namespace, table: Callable[[], str], verdict: str, page: Path, *, within: bool) -> int:
+    """What a run prints last; returns the exit status."""
+    if args.verbose:
+        print(table())
+    print(verdict)
+    print(f"report: {page}")
+    return 0 if within else 1
 
 
 def compare_units(args: argparse.Namespace) -> int:
@@ -132,27 +150,19 @@ def compare_units(args: argparse.Namespace) -> int:
     else:
         c = comparison.compare(args.out, p, Bar(), scenario=args.scenario, seed=args.seed, record=args.record)
     page = comparison_page.write(args.out, c)
-    if args.verbose:
-        print(comparison.console_table(c))
-    print(comparison.verdict(c))
-    print(f"report: {page}")
-    return 0 if c.within else 1
+    return _show_end(args, lambda: comparison.console_table(c), comparison.verdict(c), page, within=c.within)
 
 
 def _compare_in_chamber(args: argparse.Namespace) -> int:
     from psabench.climate import converters_page, converters_result
     from psabench.climate.converters import ChamberParams
 
-    for option, given in (("--record", args.record), ("--replay", args.replay)):
-        if given:  # table, chamber and supply are not in a recording
-            raise BadInput(expected(f"no {option} beside --chamber", given, "compare-converters"))
+    # table, chamber and supply are not in a recording
+    refuse_beside("--chamber", {"--record": args.record, "--replay": args.replay}, "compare-converters")
     c = converters_result.compare_in_chamber(args.out, ChamberParams(), Bar(), scenario=args.scenario, seed=args.seed)
     page = converters_page.write_page(args.out, c)
-    if args.verbose:
-        print(converters_result.console_table(c))
-    print(converters_result.verdict_of_drifts(c))
-    print(f"report: {page}")
-    return 0 if c.within else 1
+    verdict = converters_result.verdict_of_drifts(c)
+    return _show_end(args, lambda: converters_result.console_table(c), verdict, page, within=c.within)
 
 
 def run_on_platform(args: argparse.Namespace) -> int:
@@ -187,11 +197,8 @@ def run_in_chamber(args: argparse.Namespace) -> int:
         truth = thermal_grading.read_truth(done.folder, done.result.recordings)
         report = thermal_grading.graded_report(done.result, truth, done.facts)
         page = thermal_page.write_page(done.folder.path, report)
-    if args.verbose:
-        print(thermal_grading.console_lines(report))
-    print(thermal_grading.state_verdict(report))
-    print(f"report: {page}")
-    return 0 if thermal_grading.within_limits(report) else 1
+    verdict, within = thermal_grading.state_verdict(report), thermal_grading.within_limits(report)
+    return _show_end(args, lambda: thermal_grading.console_lines(report), verdict, page, within=within)
 
 
 def calibrate_sins(args: argparse.Namespace) -> int:
@@ -204,12 +211,9 @@ def calibrate_sins(args: argparse.Namespace) -> int:
     options = of_fields(SinsOptions, args, params=_params(args))
     done = run_calibration(options, Bar(), lambda lines: print(*lines, sep="\n", flush=True) if lines else None)
     page = calibration_page.write_page(args.out, done)
-    if args.verbose:
-        print("\n".join(aligned(calibration_page.table_rows(done))))
-    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
-    print(calibration_page.verdict_words(done))
-    print(f"report: {page}")
-    return 0 if done.within else 1
+    verdict = "\n".join([*(f"DOUBT: {d}" for d in done.result.doubts), calibration_page.verdict_words(done)])
+    rows = calibration_page.table_rows(done)
+    return _show_end(args, lambda: "\n".join(aligned(rows)), verdict, page, within=done.within)
 
 
 def calibrate_gyro(args: argparse.Namespace) -> int:
@@ -221,12 +225,9 @@ def calibrate_gyro(args: argparse.Namespace) -> int:
 
     done = run_gyro(of_fields(MemsGyroOptions, args, params=_params(args)), Bar())
     page = gyro_page.write_page(args.out, done)
-    if args.verbose:
-        print("\n".join(aligned(gyro_page.table_rows(done))))
-    print("".join(f"DOUBT: {d}\n" for d in done.result.doubts), end="")
-    print(verdict_words(done))
-    print(f"report: {page}")
-    return 0 if done.within else 1
+    verdict = "\n".join([*(f"DOUBT: {d}" for d in done.result.doubts), verdict_words(done)])
+    rows = gyro_page.table_rows(done)
+    return _show_end(args, lambda: "\n".join(aligned(rows)), verdict, page, within=done.within)
 
 
 def predict_sins(args: argparse.Namespace) -> int:
