@@ -98,6 +98,37 @@ def refuse_beside(way: str, given: Mapping[str, object], where: str) -> None:
             raise BadInput(expected(f"no {option} beside {way}", value, where))
 
 
+def option_name(parameter: str) -> str:
+    return f"--{parameter.replace('_', '-')}"
+
+
+def add_parameter(group: Any, name: str, f: Any, others: Mapping[str, Any]) -> None:
+    """The option of a procedure's parameter, a dataclass field made by `psabench.procedures.result.option`.
+
+    others: defaults that have a label. `given_parameters` reads it.
+    """
+    unit = f.metadata["unit"]
+    kind = type(f.default) if f.default is not None else float
+    metavar = unit.upper() or {bool: "YES|NO", int: "N", float: "X", str: "WORD"}[kind]
+    defaults = " ".join(x for x in (_default(f.default), unit) if x)
+    defaults += "".join(f"; {label} {_default(value)}" for label, value in others.items())
+    text = f"{f.metadata['help']} ({defaults})".replace("%", "%%")
+    group.add_argument(
+        option_name(name), dest=f"param_{name}", type=yes_no if kind is bool else kind, metavar=metavar, help=text
+    )
+
+
+def _default(value: Any) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: "none", True: "yes", False: "no"}[value]
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def given_parameters(args: argparse.Namespace) -> dict[str, Any]:
+    """The parameters that were given."""
+    return {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
+
+
 def yes_no(text: str) -> bool:
     if text.lower() in ("1", "yes", "true", "on"):
         return True

@@ -30,7 +30,6 @@ PARKED_DEG = (2.0, -1.5)  # pitch and roll on the runway
 ALPHA0_DEG = -33.0  # where the platform was left: the prototype keeps it there
 HORIZONTAL_UT, NOISE_UT, DIP_DEG, DIP_SLOPE = 20.0, 0.1, 66.0, 0.6
 DRIFT_DEGPH = 25.0
-ALIGN_LOOKS = 10
 # Of an instrument, standard deviations (E0): no article gives them.
 PASSPORT_SD_DEGPH = 0.5  # drift of this start against the workshop's
 DEVIATION_SD_DEG = 0.5  # each coefficient, A to E, that is left after compensation
@@ -76,9 +75,13 @@ class Row:
     turned_deg: tuple[float, ...] = ()  # alpha of the platform in each, heading 0; the last holds in flight
 
 
-# Windows of a run as the unit goes through it, then 60 s of calibration: seconds before navigation begins.
-ARTICLE_WINDOWS = ((-143.3, 10.0), (-112.8, 10.0), (-82.4, 10.0), (-61.2, 60.0))
-IMPROVED_WINDOWS = (*((-492.0 + 17.9 * k, 5.0) for k in range(24)), (-61.2, 60.0))
+# Windows of a run as the unit goes through it, then 60 s of calibration: seconds before navigation begins, which a run's
+# settling moves by half a second. The improved run turns by 180 and 90 deg by turns.
+ARTICLE_WINDOWS = ((-141.7, 10.0), (-111.2, 10.0), (-80.8, 10.0), (-60.3, 60.0))
+IMPROVED_WINDOWS = (
+    *((-496.3 + 73.6 * k + turned_s, 5.0) for k in range(6) for turned_s in (0.0, 20.9, 36.8, 57.7)),
+    (-60.5, 60.0),
+)
 ARTICLE_TURNS = (0.0, 90.0, 180.0, 180.0)
 IMPROVED_TURNS = (*((0.0, 180.0, 90.0, 270.0) * 6), 270.0)
 
@@ -264,7 +267,7 @@ def _by_sensor(p: ModeParams, drawn: Instruments, t_s: Floats, noise: Floats) ->
 
 
 def _aligned_rad(p: ModeParams, drawn: Instruments) -> Floats:
-    noise = np.array([np.random.default_rng([int(s), 2]).standard_normal(ALIGN_LOOKS).mean() for s in drawn.seeds])
+    noise = np.array([np.random.default_rng([int(s), 2]).standard_normal(p.align_looks).mean() for s in drawn.seeds])
     return np.asarray(_by_sensor(p, drawn, np.zeros(1), noise[:, np.newaxis])[:, 0])
 
 

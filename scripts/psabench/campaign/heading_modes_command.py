@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural
+from psabench.options import Parser, add_parameter, given_parameters, natural
 
 if TYPE_CHECKING:
     from psabench.procedures.heading_modes import ModeParams
@@ -31,6 +32,8 @@ Exit status: 0 done, 2 bad input, 3 an emulated run failed, 130 ended by Ctrl-C.
 CHAINS = ("algebra", "emulated")
 MOST_RUNS, MOST_SEED = 100_000, 2**31
 RUNS, SEED, HOURS, OUT = 200, 1, 4.0, Path("build/heading-modes")
+# Of ModeParams: what does not belong to the shipped scenario, which has the place, its field and the drift.
+OFFERED = ("speed_kmh", "fix_s", "panel_step_deg", "setter_step_deg", "align_s", "slave_s", "slave_limit_dpm")
 LEAST_H, MOST_H = 0.2, 5.5  # beyond it the flight comes near the pole
 
 
@@ -43,19 +46,30 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--hours", type=float, default=HOURS, help="time of the flight, h (%(default)s)")
     p.add_argument("--chain", choices=CHAINS, default=CHAINS[0], help="how a run is computed (%(default)s)")
     p.add_argument("--out", type=Path, default=OUT, help="folder of the report (%(default)s)")
+    _add_parameters(p)
     return p.parse_args(words)
+
+
+def _add_parameters(p: Parser) -> None:
+    from psabench.procedures.heading_modes import ModeParams
+
+    group = p.add_argument_group("the flight and the crew")
+    of = {f.name: f for f in fields(ModeParams)}
+    for name in OFFERED:
+        add_parameter(group, name, of[name], {})
 
 
 def _run_command(args: argparse.Namespace) -> int:
     from psabench.campaign import heading_modes_page as page
     from psabench.campaign.heading_modes import ROWS
     from psabench.procedures.heading_modes import ModeParams
+    from psabench.procedures.result import made_params
     from psabench.report import provenance
 
     _check_limits(args)
-    facts = {"runs": args.runs, "seed": args.seed, "hours": args.hours, "chain": args.chain}
+    p = made_params(ModeParams, page.NAME, {"hours": args.hours, **given_parameters(args)})
+    facts = {"runs": args.runs, "seed": args.seed, "hours": args.hours, "chain": args.chain, **given_parameters(args)}
     provenance.note_digest(page.NAME, args.seed, facts)
-    p = ModeParams(hours=args.hours)
     fly = _emulated_flight(args) if args.chain == "emulated" else _algebra_flight(args)
     errors = {name: fly(name, p) for name in ROWS}
     timed = {name: (page.look_hours(p, e.shape[1]), e) for name, e in errors.items()}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +108,8 @@ def console_lines(found: Mapping[str, Summary]) -> list[str]:
 def draw_picture(errors: Mapping[str, tuple[Floats, Floats]], name: str = NAME) -> str:
     """rms of each row against time; errors: instants, h, and (runs, looks) deg."""
     with plots.drawing(3.4) as (drawn, ax):
-        styles = zip(cycle(plots.SERIES), [*("-" for _ in plots.SERIES), *("--" for _ in plots.SERIES)], strict=False)
+        colours = (*plots.SERIES, plots.INK)
+        styles = ((colour, dash) for dash in ("-", "--") for colour in colours)
         for (label, (t_h, e)), (colour, dash) in zip(errors.items(), styles, strict=False):
             ax.plot(t_h, np.sqrt((e**2).mean(axis=0)), color=colour, lw=1.5, ls=dash, label=label)
         ax.axhline(CLAIM_DEG, color=plots.MUTED, lw=1.0, ls=":")

@@ -52,9 +52,12 @@ class ModeParams:
     drift2_degph: float = option(25.0, "deg/h", "drift about z that the workshop compensated")
 
     def __post_init__(self) -> None:
-        for name in ("hours", "look_s", "fix_s", "align_s", "slave_s", "accel_mps2"):
+        for name in ("hours", "speed_kmh", "look_s", "fix_s", "align_s", "slave_s", "accel_mps2"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(expected("a number above 0", getattr(self, name), name))
+        for name in ("panel_step_deg", "setter_step_deg", "slave_limit_dpm"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(expected("a number from 0 on", getattr(self, name), name))
         if not (self.latitude_deg >= -80.0 and self.farthest_deg <= 80.0):
             raise ValueError(expected("a flight within -80 to 80 deg of latitude", f"{self.farthest_deg:.1f}", NAME))
 
@@ -66,6 +69,10 @@ class ModeParams:
     def looks_s(self) -> Floats:
         """Instants of the readings since the flight began, the first at its beginning."""
         return np.asarray(np.arange(round(self.hours * 3600.0 / self.look_s) + 1) * self.look_s, dtype=np.float64)
+
+    @property
+    def align_looks(self) -> int:
+        return max(1, round(self.align_s / ALIGN_LOOK_S))
 
     @property
     def farthest_deg(self) -> float:
@@ -171,7 +178,7 @@ def _self_orienting(
 def align_heading(bench: ModeBench, p: ModeParams) -> float:
     """Heading by the induction sensor and the setter: the mean direction over the averaging time, rad."""
     east = north = 0.0
-    for _ in range(max(1, round(p.align_s / ALIGN_LOOK_S))):
+    for _ in range(p.align_looks):
         bench.wait(ALIGN_LOOK_S)
         shown_rad = bench.magnetic_rad()
         east, north = east + math.sin(shown_rad), north + math.cos(shown_rad)

@@ -15,7 +15,7 @@ from psabench.bench import Bench
 from psabench.campaign import heading_modes as algebra
 from psabench.campaign.emulated import resolved
 from psabench.campaign.heading_modes import ROWS, errors_deg
-from psabench.campaign.heading_modes_emulated import Scenario, Trip, fly_run, run_scenario
+from psabench.campaign.heading_modes_emulated import Scenario, Trip, compass_params, fly_run, run_scenario
 from psabench.errors import LinkError
 from psabench.native.nav import DEGPH
 from psabench.procedures import gyrocompass
@@ -61,6 +61,25 @@ def test_the_article_s_hold_flies_as_the_algebra_says() -> None:
     assert abs(flown.error_deg[0]) < 0.2
     assert flown.flown.ready_s == pytest.approx(159.6, abs=1.0)
     assert flown.flown.doubts == ()
+
+
+@pytest.mark.parametrize("name", ["literal", "improved"])
+def test_the_windows_of_the_algebra_are_those_of_a_run(name: str, tmp_path: Path) -> None:
+    """When each window was before the flight, how long, and where the platform stood."""
+    row, path = ROWS[name], tmp_path / "run.yaml"
+    path.write_text(json.dumps(run_scenario(row, 1, 1)), encoding="utf-8")
+    with Bench.start(path) as b:
+        platform = WirePlatform(b)
+        p = compass_params(row, ModeParams())
+        windows = gyrocompass.measure(platform, p, Silent())
+        end_s = platform.t_s
+    first_rad = windows[0].set_rad
+    lengths_s = [w.step_s * len(w.beta_rad) for w in windows]
+    begun_s = [w.t_mid_s - 0.5 * length_s - end_s for w, length_s in zip(windows, lengths_s, strict=True)]
+    assert begun_s == pytest.approx([b for b, _ in row.windows_s], abs=0.6)
+    assert lengths_s == pytest.approx([length_s for _, length_s in row.windows_s], abs=0.05)
+    turned_deg = [math.degrees(w.set_rad - first_rad) % 360.0 for w in windows]
+    assert turned_deg == pytest.approx(row.turned_deg, abs=0.1)
 
 
 def test_magnetic_modes_need_the_sensor() -> None:

@@ -147,12 +147,40 @@ def test_the_command_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "stay within" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_each_option_of_the_crew_moves_its_modes_and_no_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of `end_rms_deg`; a speed moves all of them."""
+    magnetic, prototype = {"magnetic"}, {"magnetic", "half-compass"}
+    moved = {
+        "--speed-kmh=100": set(ROWS),
+        "--fix-s=60": prototype,
+        "--panel-step-deg=0": prototype,
+        "--setter-step-deg=0": prototype,
+        "--align-s=1": prototype,
+        "--slave-s=3000": magnetic,
+        "--slave-limit-dpm=0.01": magnetic,
+    }
+
+    def ends(*options: str) -> dict[str, float]:
+        assert cli.main(["campaign", "heading-modes", "--runs", "3", *options, "--out", str(tmp_path)]) == 0
+        rows = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["rows"]
+        return {name: row["end_rms_deg"][0] for name, row in rows.items()}
+
+    plain = ends()
+    found = {option: {name for name, value in ends(option).items() if value != plain[name]} for option in moved}
+    capsys.readouterr()
+    assert found == moved
+
+
 @pytest.mark.parametrize(
     ("option", "words"),
     [
         (("--runs", "0"), "--runs: expected 1 to 100000, got 0"),
         (("--hours", "8"), "--hours: expected 0.2 to 5.5, got 8.0"),
         (("--chain", "wire"), "--chain"),
+        (("--fix-s", "0"), "fix_s: expected a number above 0, got 0.0"),
+        (("--panel-step-deg", "-1"), "panel_step_deg: expected a number from 0 on, got -1.0"),
     ],
 )
 def test_mistakes_are_one_line(option: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:

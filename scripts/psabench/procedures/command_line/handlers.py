@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import of_fields, refuse_beside
+from psabench.options import given_parameters, of_fields, refuse_beside
 from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
 
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from psabench.procedures.head_bench import Progress
     from psabench.procedures.run import RunOptions
     from psabench.report.grading import Section
-
-
-def _params(args: argparse.Namespace) -> dict[str, Any]:
-    """The parameters that were given."""
-    return {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
 
 
 def run_on_head(args: argparse.Namespace) -> int:
@@ -44,7 +39,7 @@ def run_on_head(args: argparse.Namespace) -> int:
         procedures=list(PROCEDURES) if args.procedure == ALL else [args.procedure],
         conditions=list(CONDITIONS) if args.condition == "both" else [args.condition],
         g_mps2=args.gravity,
-        params=_params(args),
+        params=given_parameters(args),
     )
     ways = [way for way in ("climate", "batch") if getattr(args, way, False)]
     if len(ways) > 1:
@@ -170,7 +165,7 @@ def run_on_platform(args: argparse.Namespace) -> int:
     from psabench.procedures import gyro_run
     from psabench.report import gyro_grading, gyro_page
 
-    options = of_fields(gyro_run.GyroOptions, args, params=_params(args))
+    options = of_fields(gyro_run.GyroOptions, args, params=given_parameters(args))
     with progress_of(args) as followers:
         sections = gyro_run.run(options, followers.progress)
         for s in sections:
@@ -192,7 +187,7 @@ def run_in_chamber(args: argparse.Namespace) -> int:
     from psabench.report import thermal_grading, thermal_page
     from psabench.thermal import run as thermal_run
 
-    options = of_fields(thermal_run.ThermalOptions, args, params=_params(args))
+    options = of_fields(thermal_run.ThermalOptions, args, params=given_parameters(args))
     with thermal_run.run_thermal(options, Bar()) as done:
         truth = thermal_grading.read_truth(done.folder, done.result.recordings)
         report = thermal_grading.graded_report(done.result, truth, done.facts)
@@ -208,7 +203,7 @@ def calibrate_sins(args: argparse.Namespace) -> int:
     from psabench.sins.calibration_params import SinsOptions
     from psabench.sins.calibration_run import run_calibration
 
-    options = of_fields(SinsOptions, args, params=_params(args))
+    options = of_fields(SinsOptions, args, params=given_parameters(args))
     done = run_calibration(options, Bar(), lambda lines: print(*lines, sep="\n", flush=True) if lines else None)
     page = calibration_page.write_page(args.out, done)
     verdict = "\n".join([*(f"DOUBT: {d}" for d in done.result.doubts), calibration_page.verdict_words(done)])
@@ -223,7 +218,7 @@ def calibrate_gyro(args: argparse.Namespace) -> int:
     from psabench.mems_gyro.run import run_gyro, verdict_words
     from psabench.report.grading import aligned
 
-    done = run_gyro(of_fields(MemsGyroOptions, args, params=_params(args)), Bar())
+    done = run_gyro(of_fields(MemsGyroOptions, args, params=given_parameters(args)), Bar())
     page = gyro_page.write_page(args.out, done)
     verdict = "\n".join([*(f"DOUBT: {d}" for d in done.result.doubts), verdict_words(done)])
     rows = gyro_page.table_rows(done)
@@ -235,7 +230,9 @@ def predict_sins(args: argparse.Namespace) -> int:
     from psabench.procedures.result import made_params
     from psabench.sins import covariance_run
 
-    study = covariance_run.run_study(made_params(covariance_run.CovarianceParams, args.procedure, _params(args)))
+    study = covariance_run.run_study(
+        made_params(covariance_run.CovarianceParams, args.procedure, given_parameters(args))
+    )
     print(covariance_run.console_lines(study))
     print(f"report: {covariance_run.write_page(args.out, study)}")
     return 0
@@ -245,7 +242,7 @@ def fly_snake(args: argparse.Namespace) -> int:
     from psabench.procedures.result import made_params
     from psabench.sins import snake, snake_page
 
-    found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, _params(args)))
+    found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, given_parameters(args)))
     print("\n".join(snake_page.console_lines(found)))
     print(snake_page.verdict_words(found))
     print(f"report: {snake_page.write_page(args.out, found)}")
@@ -258,7 +255,7 @@ def calibrate_secondary(args: argparse.Namespace) -> int:
     from psabench.sins.secondary import page as secondary_page
     from psabench.sins.secondary import run as secondary_run
 
-    params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, _params(args))
+    params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, given_parameters(args))
     found = secondary_run.run_secondary(params, of_fields(secondary_run.SecondaryOptions, args), Bar())
     print("\n".join(secondary_page.console_lines(found)))
     print(secondary_page.verdict_words(found))
@@ -272,7 +269,7 @@ def fly_koi(args: argparse.Namespace) -> int:
     from psabench.koi.wire.params import KoiOptions
     from psabench.koi.wire.run import run_flight
 
-    done = run_flight(of_fields(KoiOptions, args, params=_params(args)), Bar())
+    done = run_flight(of_fields(KoiOptions, args, params=given_parameters(args)), Bar())
     page = flight_page.write_page(args.out, done)
     print("\n".join(flight_page.console_lines(done, verbose=args.verbose)))
     print(f"report: {page}")
@@ -284,7 +281,7 @@ def fly_season(args: argparse.Namespace) -> int:
     from psabench.koi.wire import season_page
     from psabench.koi.wire.season import SeasonOptions, run_season
 
-    season = run_season(of_fields(SeasonOptions, args, params=_params(args)), Bar())
+    season = run_season(of_fields(SeasonOptions, args, params=given_parameters(args)), Bar())
     page = season_page.write_page(args.out, season)
     print("\n".join(season_page.console_lines(season)))
     print(f"report: {page}")

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, add_json, did_you_mean, print_json, yes_no
+from psabench.options import Parser, add_json, add_parameter, did_you_mean, option_name, print_json
 from psabench.procedures.command_line.bench_options import EVERY
 from psabench.procedures.command_line.commands import COMMANDS, Command
 from psabench.shell import command_line
@@ -87,31 +87,13 @@ def _parser_of(command: Command) -> Parser:
         group = p.add_argument_group(f"parameters of {command.name}")
         for name, f in taken.fields.items():
             others = {label: changed.get(name, f.default) for label, changed in taken.defaults.items()}
-            _add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
+            add_parameter(group, name, f, {k: v for k, v in others.items() if v != f.default})
     group = p.add_argument_group("the bench and the report")
     for option, how in command.own.items():
         group.add_argument(option, **how)
     for option in command.common:
         group.add_argument(*(["-v"] if option == "--verbose" else []), option, **EVERY[option])
     return p
-
-
-def _add_parameter(group: Any, name: str, f: Any, others: Mapping[str, Any]) -> None:
-    unit = f.metadata["unit"]
-    kind = type(f.default) if f.default is not None else float
-    metavar = unit.upper() or {bool: "YES|NO", int: "N", float: "X", str: "WORD"}[kind]
-    defaults = " ".join(x for x in (_default(f.default), unit) if x)
-    defaults += "".join(f"; {label} {_default(value)}" for label, value in others.items())
-    text = f"{f.metadata['help']} ({defaults})".replace("%", "%%")
-    group.add_argument(
-        _option(name), dest=f"param_{name}", type=yes_no if kind is bool else kind, metavar=metavar, help=text
-    )
-
-
-def _default(value: Any) -> str:
-    if value is None or isinstance(value, bool):
-        return {None: "none", True: "yes", False: "no"}[value]
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _table() -> str:
@@ -123,10 +105,6 @@ def _table() -> str:
     return "\n".join(["procedures:", *filled])
 
 
-def _option(parameter: str) -> str:
-    return f"--{parameter.replace('_', '-')}"
-
-
 def _without_procedure(args: argparse.Namespace) -> int:
     if args.list and args.json:
         print_json([_command_dict(c) for c in COMMANDS.values()])
@@ -134,7 +112,7 @@ def _without_procedure(args: argparse.Namespace) -> int:
     if args.list:
         for c in COMMANDS.values():
             print(f"{c.name}: {c.summary}")
-            print(f"  {' '.join([*map(_option, c.parameters.fields), *c.common])}")
+            print(f"  {' '.join([*map(option_name, c.parameters.fields), *c.common])}")
         return 0
     known = f"{', '.join(COMMANDS)} or {SCRIPT}"
     if args.procedure is None:
@@ -145,7 +123,7 @@ def _without_procedure(args: argparse.Namespace) -> int:
 def _command_dict(c: Command) -> dict[str, Any]:
     """Of JSON's types: parameters with their defaults, and the options of the bench and the report."""
     taken = [
-        {"option": _option(name), "unit": f.metadata["unit"], "default": f.default, "help": f.metadata["help"]}
+        {"option": option_name(name), "unit": f.metadata["unit"], "default": f.default, "help": f.metadata["help"]}
         for name, f in c.parameters.fields.items()
     ]
     return {"name": c.name, "summary": c.summary, "parameters": taken, "options": [*c.own, *c.common]}
