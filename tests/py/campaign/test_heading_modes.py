@@ -147,9 +147,7 @@ def test_the_command_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "stay within" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-def test_each_option_of_the_crew_moves_its_modes_and_no_others(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_each_option_of_the_crew_moves_its_modes_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of `end_rms_deg`; a speed moves all of them."""
     magnetic, prototype = {"magnetic"}, {"magnetic", "half-compass"}
     moved = {
