@@ -358,7 +358,7 @@ LIGHT: list[tuple[str, set[str]]] = [  # a command line, and what reading it may
     ("campaign --help", set()),
     ("campaign quartz-deformation --elements 3", set()),
     ("campaign run-in --units 3", set()),
-    ("campaign heading-modes --runs 3", set()),
+    ("campaign heading-modes --runs 3", {"numpy"}),
     ("campaign sins-methods --units 3", set()),
     ("campaign sins-plan --plans 3", set()),
     ("report diff build/a build/b", set()),
