@@ -11,9 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
-from psabench.errors import BadInput, BenchError, output_error
+from psabench.errors import BadInput, BenchError, expected, output_error
 from psabench.options import Parser
 from psabench.report import provenance
+from psabench.report.language import reports_in, take_option
 
 # Module and help line of each command. The module and its libraries are loaded when the command is called (`parse`).
 COMMANDS: Mapping[str, tuple[str, str]] = {
@@ -53,8 +54,9 @@ examples:
   psabench campaign gyrocompass     Monte-Carlo study; report: build/campaign/report.html
   psabench conform device --board psa2   check a board; report: build/conform/psa2-article/report.html
 
-psabench COMMAND --help lists the options. Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input,
-3 the bench or a link failed, 130 ended by Ctrl-C.
+psabench COMMAND --help lists the options. --lang ru with any command: its report in Russian.
+Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the bench or a link failed, 130 ended by
+Ctrl-C.
 """
 
 
@@ -72,10 +74,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: files are closed, the emulator ended
     kept = ""  # what the command leaves behind when it is interrupted
     try:
-        args = parse(words)
+        rest, language = take_option(words)
+        if not rest:
+            raise BadInput(expected("a command", "none", "psabench"))
+        args = parse(rest)
         kept = getattr(args, "kept", "")
         handler: Callable[[argparse.Namespace], int] = args.handler
-        with provenance.command_run(["psabench", *words]):
+        with reports_in(language), provenance.command_run(["psabench", *words]):
             status = handler(args)
         sys.stdout.flush()
         return status

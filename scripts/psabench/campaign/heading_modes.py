@@ -75,8 +75,8 @@ class Row:
     turned_deg: tuple[float, ...] = ()  # alpha of the platform in each, heading 0; the last holds in flight
 
 
-# Windows of a run as the unit goes through it, then 60 s of calibration: seconds before navigation begins, which a run's
-# settling moves by half a second. The improved run turns by 180 and 90 deg by turns.
+# Windows of a run as the unit goes through it, then 60 s of calibration: seconds before navigation begins, which the
+# settling of a run moves by half a second. The improved run turns by 180 and 90 deg by turns.
 ARTICLE_WINDOWS = ((-141.7, 10.0), (-111.2, 10.0), (-80.8, 10.0), (-60.3, 60.0))
 IMPROVED_WINDOWS = (
     *((-496.3 + 73.6 * k + turned_s, 5.0) for k in range(6) for turned_s in (0.0, 20.9, 36.8, 57.7)),

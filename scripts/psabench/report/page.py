@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.link.own import replace_file
+from psabench.report.language import localised
 from psabench.report.provenance import KEY, provenance_of_run
 from psabench.report.quantities import page_words, symbol_html
 
@@ -56,7 +57,8 @@ thead th { color: var(--muted); font-weight: 500; font-size: .85rem; } tbody th 
 .off .num { color: var(--muted); } .mark { font-size: .85rem; white-space: nowrap; }
 .est thead th:not(:first-child) { text-align: right; } .est thead th:nth-child(4) { text-align: left; } .none
   { color: var(--muted); }
-figure { margin: 1rem 0 0; } figure svg { width: 100%; height: auto; max-width: 52rem; display: block; }
+figure { margin: 1rem 0 0; } figure svg { width: 100%; height: auto; max-width: 52rem; display: block;
+  overflow: visible; }
 details { margin-top: .8rem; } summary { cursor: pointer; color: var(--muted); } .notes { font-size: .9rem; }
 sub { font-size: .72em; line-height: 0; }
 .v-passed { color: var(--good); } .v-failed { color: var(--bad); font-weight: 650; }
@@ -64,7 +66,9 @@ sub { font-size: .72em; line-height: 0; }
 td.id { white-space: nowrap; font-weight: 600; } .orig { color: var(--muted);
   font-size: .85em; } .sign td { height: 3.2rem; min-width: 14rem; vertical-align: bottom; }
 footer { color: var(--muted); font-size: .85rem; margin-top: 1.6rem; } footer td { overflow-wrap: anywhere; }
-@media print { body { max-width: none; } section { break-inside: avoid; } }
+@media print { @page { margin: 15mm; } body { max-width: none; padding: 0; }
+  figure, tr, .verdict { break-inside: avoid; } h2 { break-after: avoid; }
+  figure svg { max-height: 220mm; } .scroll { overflow: visible; } table { font-size: .8rem; } }
 </style></head><body>
 @BODY@
 </body></html>
@@ -80,7 +84,7 @@ def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: st
     origin = provenance_of_run()
     whole = {**data, KEY: origin}
     replace_file(folder / json_name, json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    replace_file(folder / PAGE_NAME, page.replace("</body>", f"{provenance_foot(origin)}\n</body>"))
+    replace_file(folder / PAGE_NAME, localised(page.replace("</body>", f"{provenance_foot(origin)}\n</body>")))
     return folder / PAGE_NAME
 
 

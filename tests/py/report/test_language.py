@@ -1,0 +1,98 @@
+"""Reports in Russian: every text of a calibration, the same numbers, a catalogue without slips."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import polib
+import pytest
+from command_line import mistake_line
+from psabench.errors import BadInput
+from psabench.report import calibration, language
+from psabench.report.language import Language, key_of, load, localised, reports_in, take_option
+from psabench.report.nominal import ARTICLE
+from report_sections import TRUTH, sections
+
+CATALOGUE = polib.pofile(str(language.LOCALE / "ru.po"))
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def russian() -> Language:
+    found = load("ru")
+    assert found is not None
+    return found
+
+
+def bare_numbers(page: str) -> Counter[str]:
+    """Those of the texts: a picture's geometry is in attributes."""
+    return Counter(NUMBER.findall(re.sub(r"<style.*?</style>|<[^>]*>|&[^;]*;", " ", page, flags=re.DOTALL)))
+
+
+@pytest.mark.parametrize("truth", [TRUTH, None])
+def test_a_calibration_is_russian_throughout_with_the_same_numbers(truth: dict[str, float] | None) -> None:
+    page = calibration.html_page(sections(truth), {"seed": "7", "procedure": "reversal", "bench": "quiet, x"}, ARTICLE)
+    ru = russian()
+    translated = ru.page(page)
+    assert ru.missing == set()
+    assert "<html lang=ru>" in translated
+    assert "Калибровка акселерометра" in translated
+    assert "процедура <b>реверс</b>" in translated
+    assert "стенд <b>quiet, x</b>" in translated  # a name that is not known stays whole
+    assert bare_numbers(translated) == bare_numbers(page)
+    assert Counter(re.findall(r"<\w+", translated)) == Counter(re.findall(r"<\w+", page))
+
+
+def test_what_the_catalogue_lacks_stays_english_and_is_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = "<html lang=en><p>error</p><p>a text of 3 words</p><footer><p>error</p></footer>"
+    with reports_in("ru"):
+        assert localised(page) == (
+            "<html lang=ru><p>погрешность</p><p>a text of 3 words</p><footer><p>error</p></footer>"
+        )
+    assert capsys.readouterr().err == "psabench: --lang ru: 1 of 2 texts are English\n"
+    assert localised(page) == page
+
+
+def test_numbers_may_change_places() -> None:
+    ru = Language(name="ru", texts={"{} of {}": "из {1} — {0}"})
+    assert ru.page("<td>3 of -4.5e-06</td>") == "<td>из -4.5e-06 — 3</td>"
+
+
+def test_indices_and_names_are_no_numbers() -> None:
+    assert key_of(" k2 of PSA-2 in 1.5 s, v0.3 ") == "k2 of PSA-2 in {} s, v0.3"
+
+
+@pytest.mark.parametrize("entry", CATALOGUE, ids=lambda e: e.msgid[:40])
+def test_an_entry_has_the_numbers_and_the_markup_of_its_text(entry: polib.POEntry) -> None:
+    places = re.findall(r"\{\d*\}", entry.msgstr)
+    assert len(places) == entry.msgid.count("{}")
+    assert len(set(places)) == (len(places) if "{0}" in places else min(len(places), 1))
+    tag = re.compile(r"<[^>]*>")
+    assert sorted(tag.findall(entry.msgstr)) == sorted(tag.findall(entry.msgid))
+    assert entry.msgid == key_of(entry.msgid)
+
+
+def test_no_entry_is_there_twice() -> None:
+    assert [k for k, n in Counter(e.msgid for e in CATALOGUE).items() if n > 1] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "left", "name"),
+    [
+        (["run", "turns", "--lang", "ru", "-v"], ["run", "turns", "-v"], "ru"),
+        (["--lang=ru", "run", "turns"], ["run", "turns"], "ru"),
+        (["run", "turns"], ["run", "turns"], "en"),
+    ],
+)
+def test_the_option_stands_anywhere(words: list[str], left: list[str], name: str) -> None:
+    assert take_option(words) == (left, name)
+
+
+def test_mistakes_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(BadInput, match="--lang: expected a value, got none"):
+        take_option(["run", "--lang"])
+    assert mistake_line(["run", "turns", "--lang", "xx"], capsys).endswith("--lang: expected en, ru, got 'xx'\n")
+    assert mistake_line(["--lang", "ru"], capsys).endswith("psabench: expected a command, got none\n")
