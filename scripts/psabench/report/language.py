@@ -1,6 +1,6 @@
 """Reports in another language: the texts of a finished page, looked up in a gettext catalogue.
 
-A text is what stands between two tags of a block (heading, cell, paragraph, label of a picture), its numbers taken out:
+A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers taken out:
 "residual <b>{} µV</b> rms". So each report is translated in one place, where it is written, and procedures know of no
 language. Numbers keep their decimal point, as in result.json. locale/LANG.po: docs/tools/languages.md
 """
