@@ -23,6 +23,7 @@ _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of f
 _SEPARATOR = re.compile(r"( · |<br>)")
 _NUMBER = re.compile(r"(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
+_DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
 # What has no words: tags, indices, functions, units and symbols that are the same in each language.
 _SYMBOLS = re.compile(r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b(?:sin|cos|atan|hypot|En|[mµn]V)\b")
@@ -37,7 +38,7 @@ class Language:
     found: set[str] = field(default_factory=set)
     missing: set[str] = field(default_factory=set)
 
-    def page(self, page: str) -> str:
+    def translate_page(self, page: str) -> str:
         """A page in this language; what the catalogue does not have stays English, and is in `missing`."""
         foot = _FOOT.search(page)
         end = foot.start() if foot else len(page)
@@ -49,6 +50,8 @@ class Language:
         return found[1] + "".join(x if i % 2 else self._text(x) for i, x in enumerate(parts)) + found[4]
 
     def _text(self, text: str) -> str:
+        if wrapped := _DOUBT.fullmatch(text):
+            return wrapped[1] + self._text(wrapped[2]) + wrapped[3]
         found = self._known(text) or self._fact(text) or self._joined(text, ": ") or self._joined(text, ", ")
         if found is None and _WORD.search(_SYMBOLS.sub("", text)):
             self.missing.add(key_of(text))
@@ -87,7 +90,7 @@ _current: list[Language] = []  # of this run of a command; none: English
 @contextmanager
 def reports_in(name: str) -> Iterator[None]:
     """Reports that are written inside it are in this language; at its end one line says what of them is not."""
-    found = load(name)
+    found = load_language(name)
     _current[:] = [found] if found else []
     try:
         yield
@@ -98,9 +101,9 @@ def reports_in(name: str) -> Iterator[None]:
             print(f"psabench: --lang {name}: {len(found.missing)} of {looked_up} texts are English", file=sys.stderr)
 
 
-def localised(page: str) -> str:
+def localised_page(page: str) -> str:
     """A finished page as it is written."""
-    return _current[0].page(page) if _current else page
+    return _current[0].translate_page(page) if _current else page
 
 
 def take_option(words: Sequence[str]) -> tuple[list[str], str]:
@@ -116,14 +119,14 @@ def take_option(words: Sequence[str]) -> tuple[list[str], str]:
     return left, name
 
 
-def languages() -> Sequence[str]:
+def known_languages() -> Sequence[str]:
     return (ENGLISH, *sorted(p.stem for p in LOCALE.glob("*.po")))
 
 
-def load(name: str) -> Language | None:
+def load_language(name: str) -> Language | None:
     """None: English, which needs no catalogue. Raises BadInput."""
-    if name not in languages():
-        raise BadInput(expected(", ".join(languages()), repr(name), OPTION))
+    if name not in known_languages():
+        raise BadInput(expected(", ".join(known_languages()), repr(name), OPTION))
     if name == ENGLISH:
         return None
     import polib  # of who asks for a translation

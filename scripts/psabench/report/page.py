@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from psabench.link.own import replace_file
-from psabench.report.language import localised
+from psabench.report.language import localised_page
 from psabench.report.provenance import KEY, provenance_of_run
 from psabench.report.quantities import page_words, symbol_html
 
@@ -84,7 +84,7 @@ def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: st
     origin = provenance_of_run()
     whole = {**data, KEY: origin}
     replace_file(folder / json_name, json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    replace_file(folder / PAGE_NAME, localised(page.replace("</body>", f"{provenance_foot(origin)}\n</body>")))
+    replace_file(folder / PAGE_NAME, localised_page(page.replace("</body>", f"{provenance_foot(origin)}\n</body>")))
     return folder / PAGE_NAME
 
 

@@ -21,7 +21,7 @@ from psabench.procedures.heading_hold import Held, HoldParams, HoldResult, hold
 from psabench.procedures.platform_bench import Floats, Look
 from psabench.report import gyro_grading, gyro_page
 from psabench.report.gyro_grading import GyroSection, HeldTruth
-from psabench.report.language import load
+from psabench.report.language import load_language
 
 
 def start(bench: FakePlatform, reading: str = "improved", **given: object) -> GyrocompassResult:
@@ -269,8 +269,8 @@ def test_its_report_is_russian_throughout() -> None:
     s = section(FakePlatform(), hold_error_deg=0.1)
     bare = replace(s, label="article", article=False, truth=None, hold=None, hold_truth=None)
     doubtful = replace(bare, result=replace(s.result, doubts=("only 3 of 24 windows count",)))
-    ru = load("ru")
+    ru = load_language("ru")
     assert ru is not None
     for shown in ([s, bare], [bare], [doubtful]):
-        ru.page(gyro_page.html_page(shown, {"seed": "7"}))
+        ru.translate_page(gyro_page.html_page(shown, {"seed": "7"}))
     assert ru.missing == set()

@@ -11,7 +11,7 @@ import pytest
 from command_line import mistake_line
 from psabench.errors import BadInput
 from psabench.report import calibration, language
-from psabench.report.language import Language, key_of, load, localised, reports_in, take_option
+from psabench.report.language import Language, key_of, load_language, localised_page, reports_in, take_option
 from psabench.report.nominal import ARTICLE
 from report_sections import TRUTH, sections
 
@@ -20,7 +20,7 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def russian() -> Language:
-    found = load("ru")
+    found = load_language("ru")
     assert found is not None
     return found
 
@@ -34,7 +34,7 @@ def bare_numbers(page: str) -> Counter[str]:
 def test_a_calibration_is_russian_throughout_with_the_same_numbers(truth: dict[str, float] | None) -> None:
     page = calibration.html_page(sections(truth), {"seed": "7", "procedure": "reversal", "bench": "quiet, x"}, ARTICLE)
     ru = russian()
-    translated = ru.page(page)
+    translated = ru.translate_page(page)
     assert ru.missing == set()
     assert "<html lang=ru>" in translated
     assert "Калибровка акселерометра" in translated
@@ -49,16 +49,16 @@ def test_what_the_catalogue_lacks_stays_english_and_is_counted(
 ) -> None:
     page = "<html lang=en><p>error</p><p>a text of 3 words</p><footer><p>error</p></footer>"
     with reports_in("ru"):
-        assert localised(page) == (
+        assert localised_page(page) == (
             "<html lang=ru><p>погрешность</p><p>a text of 3 words</p><footer><p>error</p></footer>"
         )
     assert capsys.readouterr().err == "psabench: --lang ru: 1 of 2 texts are English\n"
-    assert localised(page) == page
+    assert localised_page(page) == page
 
 
 def test_numbers_may_change_places() -> None:
     ru = Language(name="ru", texts={"{} of {}": "из {1} — {0}"})
-    assert ru.page("<td>3 of -4.5e-06</td>") == "<td>из -4.5e-06 — 3</td>"
+    assert ru.translate_page("<td>3 of -4.5e-06</td>") == "<td>из -4.5e-06 — 3</td>"
 
 
 def test_indices_and_names_are_no_numbers() -> None:
