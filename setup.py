@@ -51,7 +51,16 @@ def install(bundle: Path) -> None:
     env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DESTDIR")}
     jobs = f"-j{os.cpu_count() or 1}"
     subprocess.run(
-        ["make", "--no-print-directory", jobs, f"PY={sys.executable}", "DESTDIR=", f"PREFIX={bundle}", "install"],
+        [
+            "make",
+            "--no-print-directory",
+            jobs,
+            f"PY={sys.executable}",
+            "CLI=",
+            "DESTDIR=",
+            f"PREFIX={bundle}",
+            "install",
+        ],
         cwd=ROOT,
         env=env,
         check=True,
