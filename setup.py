@@ -27,6 +27,8 @@ class BuildPy(build_py):
     """The Python files, and beside them the bundle."""
 
     def run(self) -> None:
+        if not self.editable_mode:
+            check_build_tools()
         super().run()
         if not self.editable_mode:
             install(Path(self.build_lib).resolve() / "psabench" / "bundle")
@@ -44,6 +46,13 @@ class BinaryDistribution(Distribution):
 
     def has_ext_modules(self) -> bool:
         return True
+
+
+def check_build_tools() -> None:
+    """Before anything is compiled: one line that names what is not there."""
+    missing = subprocess.run(["tools/setup", "missing"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    if packages := missing.strip():
+        sys.exit(f"psabench: build: expected {', '.join(packages.split())}, got none; apt-get install {packages}")
 
 
 def install(bundle: Path) -> None:
