@@ -44,7 +44,7 @@ psabench decode bus.log | head -n 2
 echo "== first frame ms: $((($(date +%s%N) - began) / 1000000))"
 kill $emulator; wait $emulator || true
 psabench --version
-printf 'head.turn 30\nquit\n' > turn.psa
+printf 'start quiet\nhead.turn 30\n' > turn.psa
 psabench run script turn.psa
 echo "== library"
 printf '%s\n' '#include <psabench.h>' '#include <stdio.h>' \
@@ -95,16 +95,16 @@ def test_each_dependency_of_the_project_is_debians_or_carried(package: Path) -> 
 def test_it_is_installed_used_and_removed(package: Path, tmp_path: Path) -> None:
     if os.geteuid() != 0:
         pytest.skip("an overlay of the root needs root")
-    for part in ("upper", "work", "root", "empty"):
+    for part in ("upper", "root"):
         (tmp_path / part).mkdir()
-    hide = "\n".join(f"[ ! -d '{root}{d}' ] || mount -t tmpfs none '{root}{d}'" for d in HIDDEN for root in ["$root"])
+    hide = "\n".join(f'[ ! -d "$root{d}" ] || mount -t tmpfs none "$root{d}"' for d in HIDDEN)
     script = f"""
 set -eu
 root={tmp_path}/root
 mount -t tmpfs none {tmp_path}/upper
 mkdir {tmp_path}/upper/u {tmp_path}/upper/w
 mount -t overlay none -o lowerdir=/,upperdir={tmp_path}/upper/u,workdir={tmp_path}/upper/w "$root"
-{hide.replace("'", '"')}
+{hide}
 mount --rbind /dev "$root/dev"
 mount -t proc none "$root/proc"
 exec chroot "$root" sh -c "$SCRIPT"
