@@ -35,7 +35,7 @@ def modules_of(requirements: list[str]) -> set[str]:
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Top module of each import of a file, wherever it stands."""
+    """Top module of each import of a file, wherever it is."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name.partition(".")[0] for alias in node.names)

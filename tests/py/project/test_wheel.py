@@ -135,7 +135,17 @@ def test_the_sdist_has_the_sources_of_what_make_installs(sdist: Path) -> None:
 
 
 def test_a_build_from_the_sdist_names_what_is_missing_in_one_line(sdist: Path, tmp_path: Path) -> None:
-    command = [UV, "build", "--wheel", "--no-build-isolation", "--offline", "--python", sys.executable, "-o", tmp_path]
+    command: list[str | Path] = [
+        UV,
+        "build",
+        "--wheel",
+        "--no-build-isolation",
+        "--offline",
+        "--python",
+        sys.executable,
+        "-o",
+        tmp_path,
+    ]
     env = ENV | {"PKG_CONFIG_LIBDIR": str(tmp_path)}  # no library is known there
     done = subprocess.run([*command, sdist], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60)
     assert done.returncode != 0
