@@ -70,10 +70,11 @@ BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants mutate fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install uninstall foreign wheel clean help lock
+.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants mutate fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install cli uninstall foreign wheel deb clean help lock
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emulator build/psa-emu and the libraries (CC=clang: in build-clang, SAN=address,undefined: in build-san)
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
-$(BUILD)/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
+$(BUILD)/deb/psa-emu: RPATH :=
+$(BUILD)/psa-emu $(BUILD)/deb/psa-emu: $(filter-out $(API_OBJ),$(OBJ))
 	$(call say,LINK)
 	$(Q)$(LINK) $(RPATH) -o $@ $^ $(LIBS)
 
@@ -192,14 +193,19 @@ docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, req
 	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua && $(PY) -m psabench.logs.sessions
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
-install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions under $(DESTDIR)$(PREFIX)
-	@$(INSTALL) install
+CLI ?= $(BUILD)/cli#   manual pages and completion; empty: without
+install: all $(if $(CLI),cli) ## psa-emu, libraries, protocol files, manual pages, completion, sigrok decoders under $(DESTDIR)$(PREFIX)
+	@CLI='$(CLI)' $(INSTALL) install
+cli: all
+	@PSA_EMU='$(CURDIR)/$(BUILD)/psa-emu' $(PY) tools/gen_cli.py --out $(CLI)
 uninstall: ; @$(INSTALL) uninstall ## remove what install put there
 foreign: all ; @tools/foreign ## MAVProxy on a unit's MAVLink link, by hand; says how to install it (docs/tools/mavlink.md)
 wheel: all ## build/dist/psabench-*.whl, the Python package with emulator, library and data files in it
 	.venv/bin/uv build -q --wheel --no-build-isolation --offline --python $(PY) -o build/dist
 compile_commands.json: Makefile $(SRC) $(GEN_SRC) ## how each file is compiled, for editors and clang-tidy
 	@python3 tools/compile_commands.py '$(COMPILE)' $(SRC) $(GEN_SRC) -- '$(COMPILE) -I. -Itests/unit' $(UNIT) > $@
+deb: $(BUILD)/deb/psa-emu cli ## build/psabench_VERSION_ARCHITECTURE.deb, for Debian 12
+	@$(INSTALL:tools/install=CLI='$(CLI)' PY='$(PY)' tools/deb)
 lock: $(PY) ; tools/lock ## pin requirements*.in in requirements*.lock
 clean: ; rm -rf build build-* compile_commands.json ## remove everything that was built; .venv stays
 help: ## this list

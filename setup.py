@@ -27,6 +27,8 @@ class BuildPy(build_py):
     """The Python files, and beside them the bundle."""
 
     def run(self) -> None:
+        if not self.editable_mode:
+            check_build_tools()
         super().run()
         if not self.editable_mode:
             install(Path(self.build_lib).resolve() / "psabench" / "bundle")
@@ -46,12 +48,28 @@ class BinaryDistribution(Distribution):
         return True
 
 
+def check_build_tools() -> None:
+    """Before anything is compiled: one line that names what is not there."""
+    missing = subprocess.run(["tools/setup", "missing"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    if packages := missing.strip():
+        sys.exit(f"psabench: build: expected {', '.join(packages.split())}, got none; apt-get install {packages}")
+
+
 def install(bundle: Path) -> None:
     # A make that called us must not pass its flags on.
     env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DESTDIR")}
     jobs = f"-j{os.cpu_count() or 1}"
     subprocess.run(
-        ["make", "--no-print-directory", jobs, f"PY={sys.executable}", "DESTDIR=", f"PREFIX={bundle}", "install"],
+        [
+            "make",
+            "--no-print-directory",
+            jobs,
+            f"PY={sys.executable}",
+            "CLI=",
+            "DESTDIR=",
+            f"PREFIX={bundle}",
+            "install",
+        ],
         cwd=ROOT,
         env=env,
         check=True,

@@ -13,6 +13,7 @@ from typing import Any
 
 from psabench.errors import BadInput, BenchError, expected, output_error
 from psabench.options import Parser
+from psabench.places import need_extra, no_package
 from psabench.report import provenance
 from psabench.report.language import reports_in, take_option
 
@@ -79,6 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise BadInput(expected("a command", "none", "psabench"))
         args = parse(rest)
         kept = getattr(args, "kept", "")
+        if needed := getattr(args, "needs", ""):
+            need_extra(needed, words[0])
         handler: Callable[[argparse.Namespace], int] = args.handler
         with reports_in(language), provenance.command_run(["psabench", *words]):
             status = handler(args)
@@ -87,6 +90,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BenchError as e:
         print(f"psabench: {e}", file=sys.stderr)
         return e.exit_status
+    except ModuleNotFoundError as e:
+        if (e.name or "").partition(".")[0] == "psabench":  # an error of ours
+            raise
+        print(f"psabench: {no_package(e, words[0])}", file=sys.stderr)
+        return BadInput.exit_status
     except BrokenPipeError:  # `| head` has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -100,7 +108,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
-    """Reads the command line; `handler` of the result carries it out; `kept`: see options.KEPT. Raises BadInput."""
+    """Reads the command line; `handler` of the result carries it out; `kept`: see options.KEPT; `needs`: an extra.
+
+    Raises BadInput.
+    """
     if words[0] not in COMMANDS:  # an option, or no command: the parser says so
         return parser().parse_args(words)
     module, _ = COMMANDS[words[0]]

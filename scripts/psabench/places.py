@@ -1,14 +1,18 @@
-"""Where the parts of psabench lie that are not Python: emulator, library, protocol files.
+"""Where the parts of psabench lie that are not Python: emulator, library, protocol files; which packages are there.
 
 An environment variable names one place and no other. Without it: `bundle/` in this package, which a wheel brings and
 which is laid out like an installation (bin, lib, include, share/psabench); the checkout around this file; the system.
+
+The extras are those of pyproject.toml, read from the metadata of the installation (docs/tools/packages.md).
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 from psabench.errors import BadInput, expected
@@ -16,6 +20,9 @@ from psabench.errors import BadInput, expected
 PACKAGE = Path(__file__).resolve().parent
 BUNDLE = PACKAGE / "bundle"
 CHECKOUT = PACKAGE.parents[1]
+_REQUIREMENT = re.compile(r"([\w.-]+).*\bextra\s*==\s*['\"]([\w-]+)['\"]")
+# Distributions whose module has another name than theirs.
+_MODULES = {"dask": "distributed", "ipython": "IPython", "foxglove-sdk": "foxglove", "mcap-ros2-support": "mcap_ros2"}
 
 
 def own_emulators() -> list[Path]:
@@ -67,3 +74,40 @@ def _find(what: str, variable: str, ours: Sequence[Path], more: Sequence[Path], 
             return place
     where = f"{variable}={named}" if named else f"{' or '.join(str(p) for p in ours)} or on the PATH"
     raise BadInput(expected(f"a file at {where} (make builds it)", "none", what))
+
+
+def need_extra(extra: str, where: object) -> None:
+    """For a command, before it starts. Raises BadInput where a package is not installed; loads none of them."""
+    from importlib import util  # it and metadata take longer to load than most commands need for --help
+
+    for name, module in extra_packages():
+        if name == extra and util.find_spec(module) is None:
+            raise _missing_extra(extra, where)
+
+
+def no_package(e: ImportError, where: object) -> BadInput:
+    """The error of a command that could not load a package of others."""
+    module = (e.name or "").partition(".")[0]
+    extra = next((name for name, of_it in extra_packages() if of_it == module), "")
+    return _missing_extra(extra, where) if extra else BadInput(expected(f"the Python package {e.name}", "none", where))
+
+
+def _missing_extra(extra: str, where: object) -> BadInput:
+    return BadInput(f"{expected(f'the extra {extra!r}', 'none', where)}; pip install 'psabench[{extra}]'")
+
+
+@cache
+def extra_packages() -> Sequence[tuple[str, str]]:
+    """Extra and module of each package of an extra; none where psabench is not installed."""
+    from importlib import metadata
+
+    try:
+        return tuple(_of_extras(metadata.requires("psabench") or ()))
+    except metadata.PackageNotFoundError:
+        return ()
+
+
+def _of_extras(requirements: Sequence[str]) -> Iterator[tuple[str, str]]:
+    for text in requirements:
+        if m := _REQUIREMENT.match(text):
+            yield m[2], _MODULES.get(m[1].lower(), m[1].replace("-", "_"))

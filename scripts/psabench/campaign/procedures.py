@@ -51,7 +51,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         return make_parser().parse_args(words)
     module, _ = CAMPAIGNS[name]
     read: Callable[[Sequence[str]], argparse.Namespace] = import_module(f"psabench.{module}").parse
-    return read(rest)
+    args = read(rest)
+    args.needs = "campaigns"
+    return args
 
 
 def split_name(words: Sequence[str]) -> tuple[str, list[str]]:

@@ -22,6 +22,7 @@ from can.io.logger import MESSAGE_WRITERS
 from psabench.errors import BadInput, BenchError, expected, output_error
 from psabench.lcm.can_io import LcmWriter
 from psabench.link.own import OutputFile, Owned, sqlite_error
+from psabench.places import no_package
 
 
 class LogFile:
@@ -39,7 +40,7 @@ class LogFile:
             self._writer = _open_writer(path, boards)
         except ImportError as e:
             self._owned.release()
-            raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
+            raise no_package(e, path) from e
         except NotImplementedError as e:
             self._owned.release()
             raise BadInput(f"{path}: {e}") from e

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, add_board, node_of, positive
+from psabench.places import no_package
 
 EPILOG = """\
 examples:
@@ -70,7 +71,7 @@ def _convert_imu(args: argparse.Namespace) -> int:
     try:
         from psabench.logs.ros2 import write_imu
     except ImportError as e:
-        raise BadInput(expected(f"the Python package {e.name}", "none", "--ros2-imu")) from e
+        raise no_package(e, "--ros2-imu") from e
     if args.out.suffix != ".mcap":
         raise BadInput(expected("the ending .mcap for --ros2-imu", args.out.suffix or "none", args.out))
     if args.board != "psa2":

@@ -12,6 +12,7 @@ import can
 from can.io.player import MESSAGE_READERS
 
 from psabench.errors import BadInput, expected
+from psabench.places import no_package
 
 READERS: Mapping[str, str] = {  # module and function; text logs: read_text
     ".blf": "psabench.logs.python_can:read_blf",
@@ -62,7 +63,7 @@ def reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:
     try:
         function: Callable[[Path], Iterator[can.Message]] = getattr(import_module(module), name)
     except ImportError as e:
-        raise BadInput(expected(f"the Python package {e.name}", "none", path)) from e
+        raise no_package(e, path) from e
     return function
 
 

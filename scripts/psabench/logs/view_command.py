@@ -6,8 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from psabench.errors import BadInput, expected
+from psabench.errors import expected
 from psabench.options import CAN_HELP, Parser, add_board, node_of, positive
+from psabench.places import no_package
 
 PORT = 8765  # what Foxglove offers
 
@@ -44,7 +45,7 @@ def _view_bus(args: argparse.Namespace) -> int:
     try:
         from psabench.logs.view import view
     except ImportError as e:
-        raise BadInput(expected(f"the Python package {e.name}", "none", "view")) from e
+        raise no_package(e, "view") from e
 
     def ready(address: str) -> None:
         print(f"ready {address}", flush=True)

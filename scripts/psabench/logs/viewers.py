@@ -13,7 +13,7 @@ from pathlib import Path
 from psabench.errors import BadInput, expected, output_error
 from psabench.link.own import replace_file
 from psabench.options import Parser
-from psabench.places import BUNDLE, CHECKOUT
+from psabench.places import BUNDLE, CHECKOUT, no_package
 from psabench.shell.units import number
 
 EPILOG = """\
@@ -158,7 +158,7 @@ def install_dissectors(folder: Path) -> list[Path]:
     try:
         from psabench.logs import plugins  # pymavlink, the generator of one of them
     except ImportError as e:
-        raise BadInput(expected(f"the Python package {e.name}", "none", "--wireshark")) from e
+        raise no_package(e, "--wireshark") from e
     return plugins.install_dissectors(shipped_folder("share") / "wireshark", folder)
 
 

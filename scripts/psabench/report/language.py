@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from psabench.errors import BadInput, expected
+from psabench.places import need_extra
 
 ENGLISH, OPTION = "en", "--lang"
 LOCALE = Path(__file__).with_name("locale")
@@ -129,6 +130,7 @@ def load_language(name: str) -> Language | None:
         raise BadInput(expected(", ".join(known_languages()), repr(name), OPTION))
     if name == ENGLISH:
         return None
+    need_extra("languages", OPTION)
     import polib  # of who asks for a translation
 
     catalogue = polib.pofile(str(LOCALE / f"{name}.po"))

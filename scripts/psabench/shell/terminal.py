@@ -23,6 +23,7 @@ from prompt_toolkit.output import Output
 from prompt_toolkit.shortcuts import CompleteStyle
 
 from psabench.errors import BenchError, expected
+from psabench.places import no_package
 from psabench.shell.complete import argument, candidates
 from psabench.shell.grammar import describe
 from psabench.shell.lexer import Wrong
@@ -196,8 +197,11 @@ class Terminal:
 
     def _python(self) -> None:
         """The bench itself, in Python: what is done there is not in the transcript."""
-        import IPython
-        from traitlets.config import Config
+        try:
+            import IPython
+            from traitlets.config import Config
+        except ImportError as e:
+            raise no_package(e, "python") from e
 
         config = Config()
         config.TerminalInteractiveShell.banner1 = "bench: psabench.Bench; dut: Psa2. Not in the transcript.\n"

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 ENV = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-INTERNAL = {"FORCE", "alarms", "bench-bin", "e2e-vcan", "e2e-slc0", "fuzz-bin", "fuzz-each"}  # parts of others
+INTERNAL = {"cli", "FORCE", "alarms", "bench-bin", "e2e-vcan", "e2e-slc0", "fuzz-bin", "fuzz-each"}  # parts of others
 
 
 def make(*args: str) -> str:

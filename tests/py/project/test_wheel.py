@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -110,3 +111,47 @@ def test_python_uses_its_own_emulator_library_and_files(programs: Path, tmp_path
     *places, moved = run([programs / "python", "-c", script], tmp_path).splitlines()
     assert moved == "True"
     assert [p for p in places if not Path(p).is_relative_to(programs.parent)] == []
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The unpacked sdist."""
+    out = tmp_path_factory.mktemp("sdist")
+    # Of an earlier build, whose files setuptools would pack again.
+    (ROOT / "scripts/psabench.egg-info/SOURCES.txt").unlink(missing_ok=True)
+    run(
+        [UV, "build", "-q", "--sdist", "--no-build-isolation", "--offline", "--python", sys.executable, "-o", out], ROOT
+    )
+    (archive,) = out.glob("psabench-*.tar.gz")
+    shutil.unpack_archive(archive, out, filter="data")
+    return out / archive.name.removesuffix(".tar.gz")
+
+
+def test_the_sdist_has_the_sources_of_what_make_installs(sdist: Path) -> None:
+    folders = ["decoders", "emu", "nav", "proto", "share", "tools", "scripts/psabench"]
+    kept = run(["git", "ls-files", *folders], ROOT).split()
+    assert {f for f in kept if not (sdist / f).exists()} == set()
+    settings = [f"PY={sys.executable}", "CLI=", "DESTDIR=", f"PREFIX={sdist}/usr"]
+    # Generates the sources, says the rest: what is missing to compile is an error.
+    assert "emu/app/main.c" in run(["make", "-n", *settings, "install"], sdist)
+
+
+def test_a_build_from_the_sdist_names_what_is_missing_in_one_line(sdist: Path, tmp_path: Path) -> None:
+    command: list[str | Path] = [
+        UV,
+        "build",
+        "--wheel",
+        "--no-build-isolation",
+        "--offline",
+        "--python",
+        sys.executable,
+        "-o",
+        tmp_path,
+    ]
+    env = ENV | {"PKG_CONFIG_LIBDIR": str(tmp_path)}  # no library is known there
+    done = subprocess.run([*command, sdist], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60)
+    assert done.returncode != 0
+    lines = [line.strip() for line in done.stderr.splitlines() if "psabench: " in line]
+    libraries = "libcjson-dev libfyaml-dev libeigen3-dev"
+    listed = libraries.replace(" ", ", ")
+    assert lines == [f"psabench: build: expected {listed}, got none; apt-get install {libraries}"]

@@ -81,7 +81,7 @@ def _parser_of(command: Command) -> Parser:
         description=f"{command.summary[0].upper()}{command.summary[1:]}.",
         epilog=f"examples:\n{command.examples}{command.notes}",
     )
-    p.set_defaults(handler=command.handler, procedure=command.name, kept=command.kept)
+    p.set_defaults(handler=command.handler, procedure=command.name, kept=command.kept, needs="reports")
     taken = command.parameters
     if taken.fields:
         group = p.add_argument_group(f"parameters of {command.name}")
