@@ -292,7 +292,7 @@ def test_its_lock_adds_to_the_other_one() -> None:
 def test_set_up_installs_it_when_its_lock_changes(stamp: str, installs: int, tmp_path: Path) -> None:
     """tools/setup's own function, with a uv that notes how it was called."""
     lines = (ROOT / "tools/setup").read_text().splitlines()
-    begin = lines.index("mf4_env() {")
+    begin = lines.index("folder_env() { # NAME WHAT")
     body = "\n".join(lines[begin : lines.index("}", begin) + 1])
     for name in ("requirements-mf4.lock", ".venv/bin/uv"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -303,7 +303,7 @@ def test_set_up_installs_it_when_its_lock_changes(stamp: str, installs: int, tmp
     script = f"set -euo pipefail\nuv_version=1\n{body}\n"
 
     def set_up() -> None:
-        subprocess.run(["bash", "-c", f"{script}mf4_env"], cwd=tmp_path, check=True, timeout=60, capture_output=True)
+        subprocess.run(["bash", "-c", f"{script}folder_env mf4 asammdf"], cwd=tmp_path, check=True, timeout=60, capture_output=True)
 
     set_up()
     left_over = tmp_path / ".venv/mf4/left_over"
