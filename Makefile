@@ -193,7 +193,7 @@ docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, req
 notebooks: all ## run examples/notebooks/*.py and write the .ipynb with their outputs (some: make notebooks NOTEBOOKS=first_frame)
 	@tools/setup site && $(PY) tools/notebooks.py $(NOTEBOOKS)
 site: all ## all pages, the notebooks and the reference of the interfaces as a site with search, build/site (docs/tools/site.md)
-	@tools/setup site && $(PY) tools/site/build.py
+	@tools/setup site && $(PY) tools/sitegen/build.py
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 install: all ## psa-emu, libraries, protocol files, sigrok decoders and sessions under $(DESTDIR)$(PREFIX)
