@@ -3,6 +3,7 @@
 
 Usage:
     build.py [--out DIR]    default build/site; exit 1 with Sphinx's warnings if there is one
+    build.py --check PAGE ... [--out DIR]   resolve every link of all pages, write these alone
 
 Pages stay where they are. They are copied to build/site-src beside what is made for the site alone: the start page and the
 navigation (navigation.yaml), lists of folders that a page links to, the reference of libraries and of the Python package.
@@ -35,6 +36,7 @@ SOURCE, OUT = ROOT / "build/site-src", ROOT / "build/site"
 NAVIGATION = HERE / "navigation.yaml"
 PAGE = (".md", ".ipynb")
 NOTEBOOKS = "examples/notebooks/"
+OVERVIEW = "Overview"
 TITLE = re.compile(r"^#\s+(.+?)\s*$", re.MULTILINE)
 
 
@@ -51,7 +53,9 @@ class Pages:
         return sorted(p.rpartition(".")[0] for p in self.texts)
 
     def title(self, name: str) -> str:
-        """The first heading."""
+        """The first heading; README has that of the project."""
+        if name == "README":
+            return OVERVIEW
         text = next(self.texts[name + e] for e in PAGE if name + e in self.texts)
         found = TITLE.search(text.replace('"# ', "\n# ").replace('\\n"', "\n"))
         return re.sub(r"[`*]", "", found[1]) if found else name
@@ -135,9 +139,14 @@ def start_page(entries: Sequence[Mapping[str, Any]], pages: Pages) -> str:
         lines += ["", f"## {e['title']}", "", e["text"], ""]
         lines += [f"- [{pages.title(n)}](/{n})" for n in e["first"]]
     for e, names in zip(entries, placed(entries, pages.names), strict=True):
-        lines += ["", "```{toctree}", ":hidden:", f":caption: {e['title']}", "", *names, "```"]
+        lines += ["", "```{toctree}", ":hidden:", f":caption: {e['title']}", "", *map(_entry, names), "```"]
     lists = [n for n in pages.names if n.endswith("/index")]
     return "\n".join([*lines, "", "```{toctree}", ":hidden:", ":caption: Folders", "", *lists, "```", ""])
+
+
+def _entry(name: str) -> str:
+    """Of a navigation."""
+    return f"{OVERVIEW} <{name}>" if name == "README" else name
 
 
 # ---- the site
@@ -160,7 +169,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Command line; see the module's text. Returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the site (build/site)")
-    out = parser.parse_args(argv).out
+    parser.add_argument("--check", nargs="+", metavar="PAGE", help="pages to write: index, docs/links, ...")
+    args = parser.parse_args(argv)
     if not PACKAGES.is_dir():
         print(f"{PACKAGES.relative_to(ROOT)}: expected packages, got none: tools/setup site", file=sys.stderr)
         return 2
@@ -168,11 +178,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     from sphinx.cmd.build import build_main
 
     assemble(ROOT, SOURCE)
-    shutil.rmtree(out, ignore_errors=True)
-    words = ["-q", "-W", "-b", "html", "-c", str(HERE), "-d", f"{SOURCE}-doctrees", "-E", str(SOURCE), str(out)]
-    status = int(build_main(words))
+    trees = Path(f"{SOURCE}-doctrees")
+    for folder in (args.out, trees):
+        shutil.rmtree(folder, ignore_errors=True)
+    common = ["-q", "-c", str(HERE), "-d", str(trees), str(SOURCE)]
+    if args.check:
+        unread = int(build_main(["-W", "-b", "dummy", *common, f"{trees}/none"]))
+        paths = [str(next(SOURCE / (p + e) for e in PAGE if (SOURCE / (p + e)).is_file())) for p in args.check]
+        # Not strict: a search index of some pages is a warning.
+        return unread or int(build_main(["-b", "html", *common, str(args.out), *paths]))
+    status = int(build_main(["-W", "-b", "html", *common, str(args.out)]))
     if status == 0:
-        print(f"site: {out}/index.html")
+        print(f"site: {args.out}/index.html")
     return status
 
 
