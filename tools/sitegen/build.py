@@ -30,6 +30,9 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 import check_links  # noqa: E402 - of tools/
 
+from sitegen.c_pages import c_pages  # noqa: E402
+from sitegen.python_pages import python_pages  # noqa: E402
+
 HERE = Path(__file__).parent
 PACKAGES = ROOT / ".venv/site"
 SOURCE, OUT = ROOT / "build/site-src", ROOT / "build/site"
@@ -74,6 +77,8 @@ def collect(root: Path) -> Pages:
         inside = sorted(f for f in known if posixpath.dirname(f) == folder)
         made.texts[f"{folder}/index.md"] = _folder_page(folder, inside)
         made.files |= {f for f in inside if not _is_page(f)}
+    written = frozenset(texts)
+    made.texts |= c_pages(root, written) | python_pages(root, written)
     return made
 
 
