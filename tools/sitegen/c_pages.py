@@ -41,8 +41,10 @@ def header_page(path: str, text: str, pages: Collection[str]) -> str:
     if not m:
         raise ValueError(f"{path}: expected a comment at its beginning, got {text[:20]!r}")
     parts = [f"# {Path(path).name}", markdown(_comment(m[1]), "c", pages)]
+    level = "##"
     for block in _blocks(_declarations(text[m.end() :])):
-        parts += _block_parts(block, pages)
+        level = "###" if SECTION.match(block) else level
+        parts += _block_parts(block, level, pages)
     return "\n\n".join(parts) + "\n"
 
 
@@ -56,14 +58,14 @@ def _blocks(text: str) -> Iterator[str]:
     yield from (b.strip("\n") for b in re.split(r"\n\s*\n", text) if b.strip())
 
 
-def _block_parts(block: str, pages: Collection[str]) -> Iterator[str]:
+def _block_parts(block: str, level: str, pages: Collection[str]) -> Iterator[str]:
     """A heading of what it declares, its comment as text, its declarations as code."""
     if m := SECTION.match(block):
         yield f"## {m[1]}"
         block = block[m.end() :]
     names = [_name(m) for m in NAMES.finditer(block)]
     if names:
-        yield f"### {', '.join(names[:4])}{', …' if len(names) > 4 else ''}"
+        yield f"{level} {', '.join(names[:4])}{', …' if len(names) > 4 else ''}"
     if m := TEXT.match(block):
         yield markdown(_comment(m[1]), "c", pages)
         block = block[m.end() :]

@@ -59,7 +59,7 @@ def test_an_address_of_the_network_is_found(text: str, found: list[str]) -> None
 @WITH_SITE
 def test_every_link_of_every_page_leads_somewhere_and_nothing_comes_from_the_network(tmp_path: Path) -> None:
     """All pages are read, some are written: the templates are the same. Raw HTML of the others is searched, too."""
-    command = [sys.executable, ROOT / "tools/sitegen/build.py", "--out", tmp_path, "--check", *SAMPLE]
+    command = [sys.executable, str(ROOT / "tools/sitegen/build.py"), "--out", str(tmp_path), "--check", *SAMPLE]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     for page in SAMPLE:
@@ -148,7 +148,7 @@ typedef void a_fn(void *ctx);
 
 def test_a_header_becomes_a_page() -> None:
     page = header_page("nav/a.h", HEADER, ())
-    parts = ["# a.h", "A library. More.", "### `A_MOST`", "```c\n#define A_MOST 3 /* of them */\n```", "## Parts"]
+    parts = ["# a.h", "A library. More.", "## `A_MOST`", "```c\n#define A_MOST 3 /* of them */\n```", "## Parts"]
     parts += ["### `a_new()`, `a_fn`", "Makes one.", "```c\nint a_new(int n); /* NULL: no */"]
     assert page == "\n\n".join(parts) + "\ntypedef void a_fn(void *ctx);\n```\n"
 
