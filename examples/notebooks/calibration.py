@@ -26,14 +26,14 @@ print(f"{len(measured.readings)} readings in {measured.duration_s:.0f} s of benc
 # %% [markdown]
 # ## What was read
 #
-# Voltage against the angle of the head. The line is what the sine of the angle predicts; the scatter is a thousand
-# times smaller.
+# Voltage against the angle of the head; below what is left of each reading after the fit, a thousand times smaller.
 
 # %%
 fig, axes = plt.subplots(2, 1, figsize=(8, 5), sharex=True)
 for s in measured.series:
-    axes[0].plot(s.alpha_deg % 360, s.u_v, ".", ms=4, label=f"face {s.face.value}")
-    axes[1].plot(s.alpha_deg % 360, 1e3 * s.residual_v, ".", ms=3)
+    alpha_deg = (s.alpha_deg + 45) % 360 - 45
+    axes[0].plot(alpha_deg, s.u_v, ".", ms=4, label=f"face {s.face.value}")
+    axes[1].plot(alpha_deg, 1e3 * s.residual_v, ".", ms=3)
 axes[0].set_ylabel("output, V")
 axes[0].legend()
 axes[1].set_ylabel("residual, mV")

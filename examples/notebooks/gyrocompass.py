@@ -32,7 +32,7 @@ print(f"{len(windows)} windows, {result.duration_s:.0f} s of simulated time; dou
 run = windows[:3]
 fig, ax = plt.subplots(figsize=(8, 3.5))
 for w in run:
-    t_s = w.t_mid_s - run[0].t_mid_s + w.step_s * (np.arange(len(w.beta_rad)) - len(w.beta_rad) / 2)
+    t_s = w.t_mid_s - run[0].t_mid_s + w.step_s * np.arange(len(w.beta_rad))  # from the first window's begin
     ax.plot(t_s, w.u1_radps / DEGPH, lw=0.5, label=f"gimbal at {np.degrees(w.set_rad):.0f} deg")
 ax.set_xlabel("time, s")
 ax.set_ylabel("levelling rate, deg/h")

@@ -50,7 +50,8 @@ fig.tight_layout()
 # ## Zero against temperature
 #
 # Against the temperature of the case the sweep makes a loop: the element is somewhere else. Against that of the
-# element, whose lag the fit finds, both legs are one curve.
+# element, whose lag the fit finds, the loop is nearly closed. What remains is the effect of the difference between case
+# and element, which the fit has as a column of its own.
 
 # %%
 QUANTITY = "zero_x_ug"
@@ -69,7 +70,7 @@ for ax, at_c, name in ((axes[0], sweep.points.case_c, "case"), (axes[1], element
 axes[0].set_ylabel("zero of X, µg")
 axes[0].legend()
 fig.tight_layout()
-print(f"lag of the element behind the case: {lag.tau_s:.1f} s")
+print(f"lag of the element behind the case: {lag.tau_s:.1f} s, effect of their difference {lag.per_k:+.2f} ug/K")
 
 # %% [markdown]
 # ## The numbers of a passport

@@ -87,7 +87,7 @@ def _is_page(path: str) -> bool:
 
 
 def _with_lists(page: str, text: str, known: frozenset[str], files: set[str], folders: set[str]) -> str:
-    """The text; notes files and folders that it links to. Raises ValueError for a link that leads nowhere."""
+    """The text; notes files and folders that it links to. A link that leads nowhere stays, for Sphinx to find."""
     for _, target in set(check_links.targets(text)):
         path = target.partition("#")[0]
         if not path or check_links.OUTSIDE.match(target):
@@ -95,7 +95,7 @@ def _with_lists(page: str, text: str, known: frozenset[str], files: set[str], fo
         place = posixpath.normpath(posixpath.join(posixpath.dirname(page), unquote(path)))
         if place in known:
             files |= set() if _is_page(place) else {place}
-        else:
+        elif any(f.startswith(f"{place}/") for f in known):
             folders.add(place)
             text = text.replace(f"]({target})", f"]({path.rstrip('/')}/index.md)")
     return text
