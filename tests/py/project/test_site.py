@@ -34,6 +34,11 @@ FETCHED = re.compile(
 )
 
 
+@pytest.fixture(scope="module")
+def pages() -> build.Pages:
+    return build.collect(ROOT)
+
+
 def fetched(text: str) -> list[str]:
     """Addresses of the network in a page, a style or a script."""
     return ["".join(m.groups(default="")) for m in FETCHED.finditer(text)]
@@ -72,10 +77,9 @@ def test_every_link_of_every_page_leads_somewhere_and_nothing_comes_from_the_net
     }
 
 
-def test_each_page_has_one_place() -> None:
+def test_each_page_has_one_place(pages: build.Pages) -> None:
     """Of the checkout; `placed` refuses else."""
     entries = build.navigation()
-    pages = build.collect(ROOT)
     flat = [name for names in build.placed(entries, pages.names) for name in names]
     assert len(flat) == len(set(flat)) > 100
 
@@ -97,8 +101,7 @@ def test_a_page_without_a_place_is_named(names: list[str], more: list[dict[str, 
         build.placed([ENTRY, *more], names)
 
 
-def test_a_folder_that_a_page_links_to_becomes_a_list() -> None:
-    pages = build.collect(ROOT)
+def test_a_folder_that_a_page_links_to_becomes_a_list(pages: build.Pages) -> None:
     assert "](docs/chips/index.md)" in pages.texts["README.md"]
     assert "[ads1282.md](ads1282.md)" in pages.texts["docs/chips/index.md"]
     assert "emu/chip/ads1282/regs.c" not in pages.texts
@@ -154,10 +157,10 @@ def test_a_header_becomes_a_page() -> None:
 
 
 @pytest.mark.parametrize("page", ["psabench", "nav", "nav_mc", "kf", "sins", "koi"])
-def test_every_function_of_a_public_header_is_on_its_page(page: str) -> None:
+def test_every_function_of_a_public_header_is_on_its_page(page: str, pages: build.Pages) -> None:
     """Headers and pages, by two ways of finding a declaration."""
     path = ROOT / ("emu/api/psabench.h" if page == "psabench" else f"nav/{page}.h")
-    shown = build.collect(ROOT).texts[f"api/c/{page}.md"]
+    shown = pages.texts[f"api/c/{page}.md"]
     declared = re.findall(r"_API [\w *]*?\b((?:psabench|nav)_\w+)\(", path.read_text())
     assert len(declared) > 4
     blocks = "".join(re.findall(r"```c\n(.*?)```", shown, re.DOTALL))
