@@ -70,7 +70,7 @@ BENCH_BIN := $(patsubst tests/bench/%.c,$(BUILD)/bench/%,$(sort $(wildcard tests
 
 .SECONDARY:
 .DELETE_ON_ERROR:
-.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants mutate fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs prove install cli uninstall foreign wheel deb clean help lock
+.PHONY: FORCE all lib setup run quick test test-all bench bench-bin mutants mutate fault-matrix false-positives check pytest builds e2e e2e-san e2e-vcan e2e-slc0 uml soak fuzz fuzz-check fuzz-long fuzz-bin fuzz-each lint format golden docs notebooks site prove install cli uninstall foreign wheel deb clean help lock
 all: $(if $(MAIN),$(BUILD)/psa-emu,$(LIB_OBJ)) $(if $(API_OBJ),lib) ## the emulator build/psa-emu and the libraries (CC=clang: in build-clang, SAN=address,undefined: in build-san)
 lib: $(foreach l,psabench psabench-nav,$(BUILD)/lib$(l).so $(BUILD)/lib$(l).a $(BUILD)/$(l).pc) ## libpsabench and libpsabench-nav, shared and static, and their pkg-config files
 $(BUILD)/deb/psa-emu: RPATH :=
@@ -139,7 +139,7 @@ quick: ## build and the tests nearest to what changed since the last commit, wit
 test: ## set-up, build, and the tests of tier `test` (tests/tiers.toml), ten minutes; ends with one line of counts
 	@tools/setup test && python3 tools/test_all.py test
 test-all: ## set-up, and every test: all compilers, sanitizers, links, pages, fuzz corpus, long runs
-	@tools/setup test && python3 tools/test_all.py all
+	@tools/setup all && python3 tools/test_all.py all
 check: $(TESTS:%=$(BUILD)/tests/%) ## the C unit tests (one: make check T=test_sched; under ASan and UBSan: make check SAN=address,undefined)
 	@python3 tools/run_c_tests.py $^
 PYTESTS = $(if $(T),$(foreach t,$(T),$(or $(shell find tests -name '$(t).py'),$(error no file $(t).py in tests))),tests/py tests/conform tests/golden)
@@ -191,6 +191,10 @@ format: ## rewrite C and Python in the project's format
 	$(PY) -m ruff format .
 docs: all ## generated files that are kept in git: DBC, EDS, protocol pages, requirements, tables of the pages, FIDELITY.md
 	$(foreach t,proto docs commands requirements fault_matrix fidelity,$(PY) tools/gen_$(t).py && )$(PY) tools/fuzz_long.py --docs && $(PY) -m psabench.logs.wireshark > share/wireshark/psabench.lua && $(PY) -m psabench.logs.sessions
+notebooks: all ## run examples/notebooks/*.py and write the .ipynb with their outputs (some: make notebooks NOTEBOOKS=first_frame)
+	@tools/setup site && $(PY) tools/notebooks.py $(NOTEBOOKS)
+site: all ## all pages, the notebooks and the reference of the interfaces as a site with search, build/site (docs/tools/site.md)
+	@tools/setup site && $(PY) tools/sitegen/build.py
 prove: all ## run the proofs of the models whose sources have changed (or GROUP=psa2, GROUP=all), docs/evidence.md
 	@$(PY) tools/evidence.py --prove $(GROUP); rc=$$?; $(PY) tools/gen_fidelity.py && exit $$rc
 CLI ?= $(BUILD)/cli#   manual pages and completion; empty: without
