@@ -35,7 +35,7 @@ class Start:
     words: Sequence[str]
     environment: Mapping[str, str] = field(default_factory=dict)
 
-    def text(self) -> str:
+    def command_line(self) -> str:
         """As a shell takes it."""
         return " ".join([*(f"{k}={shlex.quote(v)}" for k, v in self.environment.items()), shlex.join(self.words)])
 
@@ -47,9 +47,9 @@ def view_file(file: Path, program: str | None, *, show: bool) -> int:
     """
     _check_kind(file)
     program = program or _first_installed()
-    start = PROGRAMS[program](file, _sessions(file))
+    start = PROGRAMS[program](file, _ensure_sessions(file))
     if show:
-        print(start.text())
+        print(start.command_line())
         return 0
     if not shutil.which(program):
         raise BadInput(expected(f"{program} (apt-get install {program})", "none", "view"))
@@ -76,20 +76,23 @@ def _first_installed() -> str:
     return next(filter(shutil.which, PROGRAMS), "pulseview")
 
 
-def _sessions(vcd: Path) -> Mapping[str, Path]:
-    """Session files beside the recording, by ending: those that are there, perhaps changed by their user, or new ones."""
+def _ensure_sessions(vcd: Path) -> Mapping[str, Path]:
+    """Session files beside the recording, by ending: those that are there, which users may have changed, or new."""
     kept = [path for ending in (".pvs", ".gtkw") if (path := vcd.with_suffix(ending)).is_file()]
     return {path.suffix: path for path in [*write_sessions(vcd, keep=kept), *kept]}
 
 
-def _pulseview(vcd: Path, sessions: Mapping[str, Path]) -> Start:
+def _start_pulseview(vcd: Path, sessions: Mapping[str, Path]) -> Start:
     """-c: without the sessions that were open before. The file of the same base name it finds by itself."""
     decoders = {"SIGROKDECODE_DIR": str(shipped_folder("decoders"))}
     return Start(["pulseview", "-c", "-i", str(vcd), "-I", "vcd"], decoders)
 
 
-def _gtkwave(vcd: Path, sessions: Mapping[str, Path]) -> Start:
+def _start_gtkwave(vcd: Path, sessions: Mapping[str, Path]) -> Start:
     return Start(["gtkwave", str(vcd), str(sessions[".gtkw"])])
 
 
-PROGRAMS: Mapping[str, Callable[[Path, Mapping[str, Path]], Start]] = {"pulseview": _pulseview, "gtkwave": _gtkwave}
+PROGRAMS: Mapping[str, Callable[[Path, Mapping[str, Path]], Start]] = {
+    "pulseview": _start_pulseview,
+    "gtkwave": _start_start_gtkwave,
+}

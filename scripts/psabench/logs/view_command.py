@@ -23,8 +23,8 @@ examples:
   psabench view --can socketcand:127.0.0.1:29536          then open ws://127.0.0.1:8765 in Foxglove
   psabench view --can slcan:/dev/ttyACM0 --board psd1 --port 9000
 
-With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there. Without: serves until
---for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
+With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there. Without: serves
+until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
 """
 
 
@@ -36,7 +36,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         description="Open a recording of lines in a viewer, or serve a CAN bus live as a Foxglove WebSocket.",
         epilog=EPILOG,
     )
-    p.set_defaults(handler=_view)
+    p.set_defaults(handler=_run_view)
     file = p.add_argument_group("a recording of lines")
     file.add_argument("file", type=Path, nargs="?", metavar="FILE", help="VCD file of psa-emu --vcd or probe.start")
     file.add_argument("--with", dest="program", choices=["pulseview", "gtkwave"], help="(the first that is installed)")
@@ -65,7 +65,7 @@ def _view_port(text: str) -> int:
     return int(text)
 
 
-def _view(args: argparse.Namespace) -> int:
+def _run_view(args: argparse.Namespace) -> int:
     if args.file is None:
         return _view_bus(args)
     from psabench.logs.vcd_view import view_file

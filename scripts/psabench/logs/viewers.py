@@ -101,7 +101,7 @@ def shipped_folder(folder: str) -> Path:
 
 
 def write_sessions(vcd: Path, keep: Sequence[Path] = ()) -> list[Path]:
-    """Session files beside a VCD, of the board that its scope names, but those to keep. Raises BadInput, OutputError."""
+    """Sessions beside a VCD, of the board that its scope names, less those to keep. Raises BadInput, OutputError."""
     head = read_head(vcd).partition(b"$enddefinitions")[0]
     scope, lines = SCOPE.search(head), [name.decode() for name in LINE.findall(head)]
     if not scope or not lines:
@@ -115,7 +115,7 @@ def write_sessions(vcd: Path, keep: Sequence[Path] = ()) -> list[Path]:
 
 
 def board_texts(board: str, span: Span) -> dict[str, str]:
-    """Of the viewers, by ending: they begin where the board's sessions do, or at the first edge of a recording without it.
+    """By ending: they begin where the board's sessions do, or at the first edge of a recording without that instant.
 
     PulseView counts from a recording's first instant on, GTKWave from power-on.
     """

@@ -1,4 +1,4 @@
-"""`psabench view FILE`: which program is started, how, on what session; a fake one stands for it on the path."""
+"""`psabench view FILE`: which program is started, how, on what session; a fake program is on the path.
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_a_recording_from_power_on_is_shown_where_its_board_begins(board: str) -
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_pulseview_draws_as_many_lines_as_leave_room_for_the_decoded_rows(board: str) -> None:
-    """Seen in PulseView 0.4.2 at 1000 x 720: a line takes its height and 16, a row 24.5, a stack one row more than it has."""
+    """In PulseView 0.4.2, 1000 x 720: a line takes its height and 16 px, a row 24.5, a stack one more row."""
     shown, session = shown_lines(board), SESSIONS[board]
     text = board_texts(board, Span(0, 10, 10**9))[".pvs"]
     hidden = re.findall(r"^\[(\w+)\]\nname=\1\nenabled=false$", text, re.MULTILINE)
