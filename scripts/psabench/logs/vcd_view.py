@@ -94,5 +94,5 @@ def _start_gtkwave(vcd: Path, sessions: Mapping[str, Path]) -> Start:
 
 PROGRAMS: Mapping[str, Callable[[Path, Mapping[str, Path]], Start]] = {
     "pulseview": _start_pulseview,
-    "gtkwave": _start_start_gtkwave,
+    "gtkwave": _start_gtkwave,
 }

@@ -1,4 +1,4 @@
-"""`psabench view FILE`: which program is started, how, on what session; a fake program is on the path.
+"""`psabench view FILE`: which program is started, how, on what session; a fake program is on the path."""
 
 from __future__ import annotations
 
