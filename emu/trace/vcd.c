@@ -46,8 +46,8 @@ static void end_at_limit(struct vcd *v)
     const uint64_t room = v->max_bytes - LIMIT_RESERVE > v->bytes ? v->max_bytes - LIMIT_RESERVE - v->bytes : 0;
     size_t end = next_time(v, 0);
     for (size_t at = end; at < v->len && at <= room; at = next_time(v, at + 1)) end = at;
-    while (end < v->len && v->buf[end++] != '\n') {}
-    v->len = end;
+    for (; end < v->len && v->buf[end] != '\n'; end++) continue;
+    v->len = end < v->len ? end + 1 : end;
     put_out(v);
     v->limited = true;
     vcd_fail(v, EFBIG);
