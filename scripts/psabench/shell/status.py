@@ -13,7 +13,7 @@ EVERY_S = 0.25  # real time between two looks
 
 
 def line(s: Status, t_ns: int | None) -> str:
-    """`1.2 s wall | table 10.0000 deg 1.000 deg/s | 25.00 degC | frames 1000 | late 0 | lost 0 | vcd 1.2 of 1000 MB`."""
+    """`1.2 s wall | table 10.0 deg 1.0 deg/s | 25.00 degC | frames 1000 | late 0 | lost 0 | vcd 1.2 of 1000 MB`."""
     parts = ["real bench" if t_ns is None else f"{t_ns / 1e9:.3f} s {s.pace}"]
     if s.angle_deg is not None:
         rate = "" if s.rate_dps is None else f" {s.rate_dps:.4f} deg/s"
