@@ -140,6 +140,7 @@ def test_the_viewer_shows_the_stream(transport: str, make_rig: MakeRig) -> None:
         screen.wait_for(r"(?s)\A(?=.*185 +8 )(?=.*285 +8 )")  # in the order of their first coming
         screen.type("\x1b")
         assert screen.wait_end() == 0
+        assert "incomplete" not in screen.text
 
 
 @pytest.mark.host
