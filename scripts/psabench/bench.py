@@ -55,7 +55,7 @@ class GrowingFile:
 
     kind: str  # vcd, can log, truth log
     size_bytes: int
-    max_bytes: int  # at which it ends; 0: none
+    max_bytes: int = 0  # at which it ends; 0: none
     error: str  # why it has ended early; "": it has not
 
 
