@@ -56,6 +56,7 @@ static void end_vcd(struct service *s)
     describe_reason(&s->bench->vcd, reason);
     describe_stored(s, stored);
     service_report_file("VCD file", s->vcd_path, reason, stored);
+    control_file_ended(&s->control, s->vcd_path, s->bench->vcd.bytes, reason, s->bench->sched.now_ns);
     snprintf(s->vcd_why, sizeof s->vcd_why, "%.100s: %s; %.80s", s->vcd_path, reason, stored);
     if (!s->bench->vcd.limited) s->incomplete = true;
 }

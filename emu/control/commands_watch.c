@@ -91,7 +91,7 @@ static const struct control_command rows[] = {
       {"count", CONTROL_COUNT, true, NULL, 1, CONTROL_COUNT_MAX, .what = "number of events to wait for; default: 1", .def = 1},
       {"limit_s", CONTROL_REAL, true, "s", 0, 86400, .what = "timeout; default: 60", .def = 60},
       {"after_tx", CONTROL_COUNT, true, NULL, 0, CONTROL_COUNT_MAX, .what = "as in run"}), .run = do_until, .check = check_until},
-    {"subscribe", "Subscribes this client to events, faults or status.",
+    {"subscribe", "Subscribes this client to events, faults, status, or ends of files.",
      CONTROL_ARGS({"what", CONTROL_CHOICE, .what = "topic", .choices = control_topics},
       {"every_s", CONTROL_REAL, true, "s", 1e-3, 3600, .what = "interval of status in simulated time; default: 0.1", .def = 0.1}), .run = do_subscribe},
     {"unsubscribe", "Ends this client's subscription to one topic, or to all.",

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-const char *const control_topics[] = {"status", "events", "faults", NULL};
+const char *const control_topics[] = {"status", "events", "faults", "files", NULL};
 _Static_assert(sizeof control_topics / sizeof *control_topics == CONTROL_TOPICS + 1, "one name for each topic");
 
 enum { PUSH_MAX = 2048 };
@@ -67,6 +67,18 @@ void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns)
     cJSON_AddStringToObject(event, "point", f->name);
     cJSON_AddStringToObject(event, "state", fault_state_name(f->state));
     notify_topic(c, CONTROL_FAULTS, event);
+}
+
+void control_file_ended(struct control *c, const char *path, uint64_t bytes, const char *why, int64_t t_ns)
+{
+    if (!has_subscriber(c, CONTROL_FILES)) return;
+    cJSON *event = cJSON_CreateObject();
+    cJSON_AddStringToObject(event, "event", "file");
+    cJSON_AddNumberToObject(event, "t_ns", (double)t_ns);
+    cJSON_AddStringToObject(event, "path", path);
+    cJSON_AddNumberToObject(event, "bytes", (double)bytes);
+    cJSON_AddStringToObject(event, "ended", why);
+    notify_topic(c, CONTROL_FILES, event);
 }
 
 /* ---- the boards' events */

@@ -3,6 +3,7 @@
  *   {"event":"DRD_A","unit":"a","t_ns":20000000}
  *   {"event":"status","t_ns":20000000,"pace":"wall",...}
  *   {"event":"fault","t_ns":20000000,"id":1,"kind":"line.stuck","point":"a.line.INT","state":"active"}
+ *   {"event":"file","t_ns":20000000,"path":"run.vcd","bytes":999999984,"ended":"its limit of 1000 MB is reached"}
  *
  * Boards compute events only while somebody listens; listening changes nothing else. One thread. */
 #ifndef PSABENCH_CONTROL_WATCH_H
@@ -16,7 +17,7 @@
 struct control;
 struct fault_kind;
 
-enum control_topic { CONTROL_STATUS, CONTROL_EVENTS, CONTROL_FAULTS, CONTROL_TOPICS };
+enum control_topic { CONTROL_STATUS, CONTROL_EVENTS, CONTROL_FAULTS, CONTROL_FILES, CONTROL_TOPICS };
 
 extern const char *const control_topics[]; /* their names, up to NULL */
 
@@ -74,6 +75,9 @@ void control_unsubscribe(struct control *c, void *client, enum control_topic top
 /* For fault_engine.changed; ctx is the control. */
 struct fault;
 void control_fault_changed(void *ctx, const struct fault *f, int64_t t_ns);
+
+/* A file that the emulator wrote has ended before it was closed; why: its limit, a full disk. */
+void control_file_ended(struct control *c, const char *path, uint64_t bytes, const char *why, int64_t t_ns);
 
 /* The client has gone: its subscriptions and its run with it. */
 void control_gone(struct control *c, void *client);

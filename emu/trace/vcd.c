@@ -10,6 +10,8 @@
 #define UNIT_FAST_MAX 100000u /* ns */
 
 /* Time; level, code and newline of each line; and what put_word() writes beyond the last. */
+enum { LIMIT_RESERVE = 512 }; /* of a file with a limit: a step that began in an earlier block, and the closing time */
+
 enum { STEP_MAX_LEN = sizeof((struct vcd_chunk *)0)->prefix + 5 + 3 * TRACE_SIGNALS_MAX + 5 };
 
 static char code_of(unsigned sig)
@@ -22,16 +24,39 @@ static char code_of_real(unsigned channel)
     return code_of(TRACE_SIGNALS_MAX + channel);
 }
 
-static void write_out(struct vcd *v)
+static void put_out(struct vcd *v)
 {
     errno = 0;
-    if (!v->error && v->max_bytes && v->bytes + v->len > v->max_bytes) {
-        v->limited = true;
-        vcd_fail(v, EFBIG);
-    }
     if (!v->error && v->len > 0 && fwrite(v->buf, 1, v->len, v->out) != v->len) v->error = errno ? errno : EIO;
     v->bytes += v->error ? 0 : v->len;
     v->len = 0;
+}
+
+/* Where the next line with a time begins, from `at` on; len: there is none. A line's code may be '#', too, behind a level. */
+static size_t next_time(const struct vcd *v, size_t at)
+{
+    for (; at < v->len; at++)
+        if (v->buf[at] == '#' && (at == 0 || v->buf[at - 1] == '\n')) return at;
+    return v->len;
+}
+
+/* The last time within the room of the file closes it: all edges before it are there. */
+static void end_at_limit(struct vcd *v)
+{
+    const uint64_t room = v->max_bytes - LIMIT_RESERVE > v->bytes ? v->max_bytes - LIMIT_RESERVE - v->bytes : 0;
+    size_t end = next_time(v, 0);
+    for (size_t at = end; at < v->len && at <= room; at = next_time(v, at + 1)) end = at;
+    for (; end < v->len && v->buf[end] != '\n'; end++) continue;
+    v->len = end < v->len ? end + 1 : end;
+    put_out(v);
+    v->limited = true;
+    vcd_fail(v, EFBIG);
+}
+
+static void write_out(struct vcd *v)
+{
+    if (!v->error && v->max_bytes && v->bytes + v->len > v->max_bytes - LIMIT_RESERVE) end_at_limit(v);
+    else put_out(v);
 }
 
 static void put_text(struct vcd *v, const char *text)

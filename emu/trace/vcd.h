@@ -26,7 +26,7 @@ struct vcd_cfg {
     const char *scope;  /* no spaces; sigrok drops it, viewers show it */
     uint32_t unit_ns;   /* 1, 10, 100, 1000 ..., 100000000 */
     uint64_t mask;      /* bit i: signal i; the signals must have been added before */
-    uint64_t max_bytes; /* a longer file ends with EFBIG; 0: any length */
+    uint64_t max_bytes; /* a longer file ends with EFBIG, at a time before which it is whole; 0: any length */
     int64_t from_ns;    /* the file begins here, or at the trace's done_ns when later: see vcd_open() */
     bool reals;         /* with the real-valued channels of the trace, if it has any */
 };

@@ -55,6 +55,7 @@ class GrowingFile:
 
     kind: str  # vcd, can log, truth log
     size_bytes: int
+    max_bytes: int = 0  # at which it ends; 0: none
     error: str  # why it has ended early; "": it has not
 
 
@@ -437,7 +438,12 @@ class Bench(AbstractContextManager["Bench"]):
             late=counters.get("pace", {}).get("late"),
             lost=sum(u.frames.counters.lost for u in self.units.values()),
             files=tuple(
-                GrowingFile(kind=f["kind"], size_bytes=int(f["bytes"]), error=f.get("error", ""))
+                GrowingFile(
+                    kind=f["kind"],
+                    size_bytes=int(f["bytes"]),
+                    max_bytes=int(f.get("max_bytes", 0)),
+                    error=f.get("error", ""),
+                )
                 for f in counters.get("files", ())
             ),
         )

@@ -26,7 +26,10 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "record": ("link.record_command", "record the CAN bus to a log file"),
     "convert": ("logs.convert_command", "convert a CAN log to another format, or to a ROS 2 bag"),
     "decode": ("boards.decode_command", "convert a log or a line capture to CSV in SI units"),
-    "view": ("logs.view_command", "show the CAN bus live in Foxglove, Lichtblick or PlotJuggler"),
+    "view": (
+        "logs.view_command",
+        "open a recording of lines in PulseView or GTKWave, or show the CAN bus live in Foxglove",
+    ),
     "tap": ("logs.tap_command", "record what is on a serial port, for Wireshark"),
     "waveform": ("logs.viewers", "write viewer files and pictures of a VCD file, install decoders and dissectors"),
     "campaign": ("campaign.procedures", "run a procedure on thousands of virtual instruments"),

@@ -208,7 +208,7 @@ def add_selection(p: Any, beginning: str, out: str, default: Path | None = None)
     p.add_argument("-v", "--verbose", action="store_true", help="list passed requirements as well")
 
 
-def add_board(p: argparse.ArgumentParser, what: str) -> None:
+def add_board(p: Any, what: str) -> None:
     """--board and --node of the unit `what`."""
     names = ", ".join(NAMES)
     text = f"board {what}: {names} (%(default)s)"

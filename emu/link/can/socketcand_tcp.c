@@ -26,11 +26,6 @@ struct client {
 /* The kernel's own buffer is kept small: else it grows to megabytes and hides how far behind a client is. */
 enum { OUT_MAX = 4 << 20, OUT_HIGH = 1 << 20, SNDBUF = 256 << 10 };
 
-static size_t pad_of(const struct client *c)
-{
-    return c->hub->lossless ? SOCKETCAND_PAD : 0;
-}
-
 static int64_t time_stamp(const struct client *c, int64_t t_ns)
 {
     return t_ns + c->hub->epoch_ns;
@@ -44,6 +39,11 @@ static void log_client(const struct client *c, const char *what)
 }
 
 /* Before rawmode a client compares answers for equality: no padding. */
+static size_t pad_of(const struct client *c)
+{
+    return c->phase == PHASE_HOLD || c->phase == PHASE_RAW ? SOCKETCAND_PAD : 0;
+}
+
 static void send_answer(struct client *c, const char *text)
 {
     text_link_put(&c->io, text, strlen(text));
@@ -52,8 +52,7 @@ static void send_answer(struct client *c, const char *text)
 static void send_error(struct client *c, uint32_t class, const char *text, int64_t t_ns)
 {
     char msg[2 * SOCKETCAND_MSG_MAX];
-    const size_t n =
-        socketcand_error(class, time_stamp(c, t_ns), text, c->phase == PHASE_RAW ? pad_of(c) : 0, msg, sizeof msg);
+    const size_t n = socketcand_error(class, time_stamp(c, t_ns), text, pad_of(c), msg, sizeof msg);
     if (n) text_link_put(&c->io, msg, n);
 }
 

@@ -15,7 +15,7 @@
 #define SOCKETCAND_CLIENTS_MAX 32u
 #define SOCKETCAND_HOLD_MS     20u  /* the stream waits at least this long after < ok > to rawmode, */
 #define SOCKETCAND_HOLD_MAX    100u /* and until the client has read it, at most this many times as long */
-#define SOCKETCAND_PAD         64u  /* of messages in step and free pace, where they come in bursts: see socketcand.h */
+#define SOCKETCAND_PAD         64u  /* of messages after rawmode, so that python-can cuts none: see socketcand.h */
 
 struct socketcand_server {
     struct listener listen;

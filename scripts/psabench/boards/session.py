@@ -34,7 +34,7 @@ class Session:
     stacks: tuple[Stack, ...]
     from_ns: int  # where PulseView's window begins: a multiple of 10 ns
     scale: str  # seconds a pixel of it
-    trace_height: int = 18
+    trace_height: int = 9
     comment: str  # of GTKWave, in two lines
     gtk_from_ns: int
     gtk_cursor_ns: int

@@ -18,20 +18,40 @@ from psabench.link.own import replace_file
 from psabench.places import CHECKOUT
 
 NO_MARKERS = " ".join(26 * ["-1"])  # A to Z of GTKWave
+SHOWN_LINES = 10  # with the decoded rows as high as the window that PulseView opens, 1000 x 720
+FIRST_ROW_PX = (
+    -10
+)  # in PulseView's view, with a margin above; without it the rows are centred before they have their height
 SESSIONS: Mapping[str, Session] = {b.name: b.session for b in BOARDS.values() if b.session is not None}
 
 
-def pulseview_text(board: str) -> str:
-    """The .pvs file."""
+def pulseview_text(board: str, from_ns: int | None = None) -> str:
+    """The .pvs file; from_ns: where the window begins, from the recording's first instant on (the board's)."""
     session = SESSIONS[board]
+    begin_ns = session.from_ns if from_ns is None else from_ns
     lines = ["[General]", f"decode_signals={len(session.stacks)}", "generated_signals=0", "views=1", ""]
     for n, stack in enumerate(session.stacks):
         lines += [f"[decode_signal{n}]", *_stack_lines(stack), ""]
-    lines += ["[view0]", f"scale={session.scale}"]
+    lines += ["[view0]", f"scale={session.scale}", f"v_offset={FIRST_ROW_PX}"]
     # Boost's serialization of a decimal number: digits and exponent of the instant.
-    lines.append(f"offset=22 serialization::archive 18 0 0 0 0 {session.from_ns // 10} 0 0 0 0 0 -8 0 0 6")
+    lines.append(f"offset=22 serialization::archive 18 0 0 0 0 {begin_ns // 10} 0 0 0 0 0 -8 0 0 6")
     lines += [f"{line}\\trace_height={session.trace_height}" for line in BOARDS[board].lines]
+    shown = shown_lines(board)
+    for line in (line for line in BOARDS[board].lines if line not in shown):
+        lines += ["", f"[{line}]", f"name={line}", "enabled=false"]
     return "\n".join([*lines, ""])
+
+
+def shown_lines(board: str) -> list[str]:
+    """What PulseView draws: the lines that decoders read, then others, as many as leave room for the decoded rows.
+
+    It puts those below the lines and no session can move them. A parallel bus is the decoder's row.
+    """
+    read = {line for stack in SESSIONS[board].stacks for line in stack.channels.values()}
+    of_bus = set(PARALLEL_BUS) & read
+    lines = [line for line in BOARDS[board].lines if line not in of_bus]
+    first = sorted(lines, key=lambda line: line not in read)[:SHOWN_LINES]
+    return [line for line in lines if line in first]
 
 
 def _stack_lines(stack: Stack) -> Iterator[str]:
@@ -57,17 +77,18 @@ def _option_lines(value: str | int) -> tuple[str, str]:
     return f'value="@ByteArray({raw})"', "type=x"
 
 
-def gtkwave_text(board: str) -> str:
-    """The .gtkw file."""
+def gtkwave_text(board: str, from_ns: int | None = None) -> str:
+    """The .gtkw file; from_ns: where the window begins, in the recording's time (the board's)."""
     session = SESSIONS[board]
+    begin_ns, cursor_ns = (session.gtk_from_ns, session.gtk_cursor_ns) if from_ns is None else (from_ns, from_ns)
     first, second = session.comment.split("\n")
     return "\n".join([
         f"[*] GTKWave: gtkwave run.vcd share/{board}.gtkw (or File, Read Save File). {first}",
         f"[*] {second} Times here are nanoseconds.",
-        f"[timestart] {session.gtk_from_ns}",
+        f"[timestart] {begin_ns}",
         f"[size] 1400 {session.gtk_height}",
         "[pos] -1 -1",
-        f"*-15.000000 {session.gtk_cursor_ns} {NO_MARKERS}",
+        f"*-15.000000 {cursor_ns} {NO_MARKERS}",
         *_group_lines(board, session.groups),
         "",
     ])  # fmt: skip

@@ -1,10 +1,11 @@
-"""`psabench view`: the bus live in Foxglove, Lichtblick and PlotJuggler."""
+"""`psabench view`: a recording of lines in PulseView or GTKWave; the bus live in Foxglove, Lichtblick, PlotJuggler."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from psabench.errors import expected
 from psabench.options import CAN_HELP, Parser, add_board, node_of, positive
@@ -12,31 +13,65 @@ from psabench.places import no_package
 
 PORT = 8765  # what Foxglove offers
 
+USAGE = """\
+psabench view FILE [--with pulseview|gtkwave] [--print]
+       psabench view [--can BUS] [--board BOARD] [--port PORT] [--for SECONDS] [--v-per-g V]"""
 EPILOG = """\
 examples:
+  psabench view run.vcd                                   PulseView, or GTKWave where it is not installed
+  psabench view run.vcd --with gtkwave
+  psabench view run.vcd --print                           the command line, for a machine without a display
   psabench view --can socketcand:127.0.0.1:29536          then open ws://127.0.0.1:8765 in Foxglove
   psabench view --can slcan:/dev/ttyACM0 --board psd1 --port 9000
 
-Serves until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
+With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there. Without: serves
+until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
 """
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """What follows `psabench view`. Raises BadInput."""
-    p = Parser(prog="psabench view", description="Serve a CAN bus live as a Foxglove WebSocket.", epilog=EPILOG)
-    p.set_defaults(handler=_view_bus)
-    p.add_argument("--can", help=CAN_HELP)
-    add_board(p, "whose frames are decoded")
-    p.add_argument("--port", type=_view_port, default=PORT, help="TCP port on 127.0.0.1; 0: a free one (%(default)s)")
-    p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
-    p.add_argument("--v-per-g", type=positive, default=1.0, help="nominal scale of /nodeN/imu, V/g (%(default)g)")
-    return p.parse_args(words)
+    p = Parser(
+        prog="psabench view",
+        usage=USAGE,
+        description="Open a recording of lines in a viewer, or serve a CAN bus live as a Foxglove WebSocket.",
+        epilog=EPILOG,
+    )
+    p.set_defaults(handler=_run_view)
+    file = p.add_argument_group("a recording of lines")
+    file.add_argument("file", type=Path, nargs="?", metavar="FILE", help="VCD file of psa-emu --vcd or probe.start")
+    file.add_argument("--with", dest="program", choices=["pulseview", "gtkwave"], help="(the first that is installed)")
+    file.add_argument("--print", dest="show", action="store_true", help="print the command line instead of starting it")
+    live = p.add_argument_group("the bus, live")
+    live.add_argument("--can", help=CAN_HELP)
+    add_board(live, "whose frames are decoded")
+    live.add_argument(
+        "--port", type=_view_port, default=PORT, help="TCP port on 127.0.0.1; 0: a free one (%(default)s)"
+    )
+    live.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
+    live.add_argument("--v-per-g", type=positive, default=1.0, help="nominal scale of /nodeN/imu, V/g (%(default)g)")
+    args = p.parse_args(words)
+    if args.file is None and (args.program or args.show):
+        raise BadInput(expected("a VCD file", "none", "--with" if args.program else "--print"))
+    of_bus = {"can": "--can", "node": "--node", "port": "--port", "for_s": "--for", "v_per_g": "--v-per-g"}
+    both = [option for name, option in of_bus.items() if args.file and getattr(args, name) != p.get_default(name)]
+    if both:
+        raise BadInput(expected(f"a file or {both[0]}", "both", "view"))
+    return args
 
 
 def _view_port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(expected("a TCP port, 0 to 65535", repr(text)))
     return int(text)
+
+
+def _run_view(args: argparse.Namespace) -> int:
+    if args.file is None:
+        return _view_bus(args)
+    from psabench.logs.vcd_view import view_file
+
+    return view_file(args.file, args.program, show=args.show)
 
 
 def _view_bus(args: argparse.Namespace) -> int:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected, output_error
 from psabench.link.own import replace_file
+from psabench.logs.sessions import SESSIONS, gtkwave_text, pulseview_text
+from psabench.logs.vcd_span import Span, read_head, span_of
 from psabench.options import Parser
 from psabench.places import BUNDLE, CHECKOUT, no_package
 from psabench.shell.units import number
@@ -27,7 +29,6 @@ examples:
 PulseView loads the .pvs file by itself; GTKWave: gtkwave run.vcd run.gtkw.
 """
 NS_PER_S = 10**9
-MOST_HEAD = 1 << 20  # bytes of a VCD in which its lines are declared
 SCOPE = re.compile(rb"\$scope\s+module\s+(\w+)\s+\$end")
 LINE = re.compile(rb"\$var\s+wire\s+1\s+\S+\s+(\w+)\s+\$end")
 
@@ -99,27 +100,29 @@ def shipped_folder(folder: str) -> Path:
     raise BadInput(expected(f"the folder {folder} of psabench", "none"))
 
 
-def write_sessions(vcd: Path) -> list[Path]:
-    """Session files beside a VCD, of the board that its scope names. Raises BadInput, OutputError."""
-    try:
-        with vcd.open("rb") as file:
-            head = file.read(MOST_HEAD).partition(b"$enddefinitions")[0]
-    except OSError as e:
-        raise BadInput(f"{vcd}: {e.strerror}") from e
+def write_sessions(vcd: Path, keep: Sequence[Path] = ()) -> list[Path]:
+    """Sessions beside a VCD, of the board that its scope names, less those to keep. Raises BadInput, OutputError."""
+    head = read_head(vcd).partition(b"$enddefinitions")[0]
     scope, lines = SCOPE.search(head), [name.decode() for name in LINE.findall(head)]
     if not scope or not lines:
         raise BadInput(expected("a VCD file with a scope and wires", "another file", vcd))
     board = scope[1].decode()
-    written = []
-    for ending in (".gtkw", ".pvs"):
-        ours = shipped_folder("share") / f"{board}{ending}"
-        text = (
-            ours.read_text(encoding="utf-8") if ours.is_file() else gtkw_text(board, lines) if ending == ".gtkw" else ""
-        )
-        if text:
-            replace_file(vcd.with_suffix(ending), text)
-            written.append(vcd.with_suffix(ending))
-    return written
+    texts = board_texts(board, span_of(vcd)) if board in SESSIONS else {".gtkw": gtkw_text(board, lines)}
+    written = [(vcd.with_suffix(ending), text) for ending, text in texts.items() if vcd.with_suffix(ending) not in keep]
+    for path, text in written:
+        replace_file(path, text)
+    return [path for path, _ in written]
+
+
+def board_texts(board: str, span: Span) -> dict[str, str]:
+    """By ending: they begin where the board's sessions do, or at the first edge of a recording without that instant.
+
+    PulseView counts from a recording's first instant on, GTKWave from power-on.
+    """
+    session = SESSIONS[board]
+    if not all(span.start_ns <= t_ns < span.end_ns for t_ns in (session.from_ns, session.gtk_from_ns)):
+        return {".gtkw": gtkwave_text(board, span.edge_ns), ".pvs": pulseview_text(board, span.edge_ns - span.start_ns)}
+    return {".gtkw": gtkwave_text(board), ".pvs": pulseview_text(board, session.from_ns - span.start_ns)}
 
 
 def write_pictures(args: argparse.Namespace) -> list[Path]:

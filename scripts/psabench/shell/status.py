@@ -6,14 +6,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from psabench.bench import Bench, Status
+from psabench.bench import Bench, GrowingFile, Status
 from psabench.errors import BenchError
 
 EVERY_S = 0.25  # real time between two looks
 
 
 def line(s: Status, t_ns: int | None) -> str:
-    """`12.345 s wall | table 10.0000 deg 1.0000 deg/s | 25.00 degC | frames 1000 | late 0 | lost 0 | vcd 1.2 MB`."""
+    """`1.2 s wall | table 10.0 deg 1.0 deg/s | 25.00 degC | frames 1000 | late 0 | lost 0 | vcd 1.2 of 1000 MB`."""
     parts = ["real bench" if t_ns is None else f"{t_ns / 1e9:.3f} s {s.pace}"]
     if s.angle_deg is not None:
         rate = "" if s.rate_dps is None else f" {s.rate_dps:.4f} deg/s"
@@ -24,8 +24,15 @@ def line(s: Status, t_ns: int | None) -> str:
     if s.late is not None:
         parts.append(f"late {s.late}")
     parts.append(f"lost {s.lost}")
-    parts.extend(f"{f.kind}: {f.error}" if f.error else f"{f.kind} {f.size_bytes / 1e6:.1f} MB" for f in s.files)
+    parts.extend(map(_file_text, s.files))
     return " | ".join(parts)
+
+
+def _file_text(file: GrowingFile) -> str:
+    if file.error:
+        return f"{file.kind}: {file.error}"
+    limit = f" of {file.max_bytes / 1e6:g}" if file.max_bytes else ""
+    return f"{file.kind} {file.size_bytes / 1e6:.1f}{limit} MB"
 
 
 @dataclass(slots=True)

@@ -260,9 +260,10 @@ def test_a_recording_asked_for_on_a_full_disk_is_an_error_of_stop_and_flush(tmp_
 
 def test_a_recording_ends_at_its_limit_and_its_size_is_told_meanwhile(tmp_path: Path) -> None:
     path = tmp_path / "x.vcd"
-    with Emulator("stream", cans=["none"], pace="step") as emulator:
+    with Emulator("stream", cans=["none"], pace="step", seed=1) as emulator:
         assert emulator.control_path is not None
         with Control(emulator.control_path) as control:
+            control.call("subscribe", what="files")
             control.call("vcd.start", path=str(path), limit_mb=0.5)
             control.call("run", for_s=0.1)
             file = control.call("counters").result["files"][0]
@@ -271,11 +272,27 @@ def test_a_recording_ends_at_its_limit_and_its_size_is_told_meanwhile(tmp_path: 
             assert "error" not in file
             control.call("run", for_s=5.0)
             assert control.call("counters").result["files"][0]["error"] == "its limit of 0.5 MB is reached"
+            [event] = control.events
+            assert (event["event"], event["path"], event["bytes"]) == ("file", str(path), path.stat().st_size)
+            assert event["ended"] == "its limit of 0.5 MB is reached"
+            assert 0.1e9 < event["t_ns"] < 5.1e9
             with pytest.raises(ControlError, match=r"its limit of 0.5 MB is reached; stored \d+ bytes, edges before"):
                 control.call("vcd.stop")
         assert emulator.stop() == 0, "the limit is no fault"
-    assert 300_000 < path.stat().st_size <= 500_000
-    assert read_vcd(path).end_ns > 0
+    with Emulator("stream", cans=["none"], pace="step", seed=1) as emulator:
+        assert emulator.control_path is not None
+        with Control(emulator.control_path) as control:
+            control.call("vcd.start", path=str(tmp_path / "all.vcd"))
+            control.call("run", for_s=5.1)
+            control.call("vcd.stop")
+    assert 498_000 < path.stat().st_size <= 500_000
+    part = read_vcd(path)
+    for name, wire in read_vcd(
+        tmp_path / "all.vcd"
+    ).wires.items():  # every edge before the closing time, at which it ends
+        before = wire.t_ns < part.end_ns
+        assert part.wires[name].t_ns.tolist() == wire.t_ns[before].tolist()
+        assert part.wires[name].level.tolist() == wire.level[before].tolist()
 
 
 def test_the_kernel_s_limit_of_a_file_is_not_called_the_recording_s(tmp_path: Path) -> None:

@@ -140,6 +140,21 @@ def test_the_viewer_shows_the_stream(transport: str, make_rig: MakeRig) -> None:
         screen.wait_for(r"(?s)\A(?=.*185 +8 )(?=.*285 +8 )")  # in the order of their first coming
         screen.type("\x1b")
         assert screen.wait_end() == 0
+        assert "incomplete" not in screen.text
+
+
+@pytest.mark.host
+def test_python_can_gets_whole_messages_however_late_it_reads(
+    make_rig: MakeRig, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It reads 1024 bytes at a time, and a message that is cut there would be a line on can_viewer's screen."""
+    rig = make_rig("socketcand", "stream", pace="wall")
+    port = int(rig.emulator.endpoints[0]["port"])
+    with can.Bus(interface="socketcand", channel="can0", host="127.0.0.1", port=port, tcp_tune=True) as late:
+        until(lambda: unread(port) > 80_000, "80 kB for our host and this one, which do not read")
+        with caplog.at_level("DEBUG", "can"):
+            assert all(late.recv(TIMEOUT_S) for _ in range(500))
+    assert [r.getMessage() for r in caplog.records if r.levelname != "DEBUG"] == []
 
 
 # ---- cantools

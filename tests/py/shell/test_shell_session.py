@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from psabench.bench import GrowingFile
 from psabench.errors import BadInput, BenchError, ControlError, DeviceError
 from psabench.shell import status
 from psabench.shell.connect import Opening, addresses
@@ -198,6 +200,22 @@ def test_the_status_bar() -> None:
     assert watch.text() == first  # looked at not long ago
     now_s = 1.0
     assert watch.text().startswith("2.469 s")
+
+
+@pytest.mark.parametrize(
+    ("size_bytes", "max_bytes", "error", "text"),
+    [
+        (1_234_567, 1_000_000_000, "", "vcd 1.2 of 1000 MB"),
+        (1_234_567, 0, "", "vcd 1.2 MB"),
+        (499_990, 500_000, "its limit of 0.5 MB is reached", "vcd: its limit of 0.5 MB is reached"),
+    ],
+)
+def test_the_status_bar_has_the_size_and_the_limit_of_a_recording(
+    size_bytes: int, max_bytes: int, error: str, text: str
+) -> None:
+    file = GrowingFile(kind="vcd", size_bytes=size_bytes, max_bytes=max_bytes, error=error)
+    bench, _ = fake()
+    assert status.line(replace(bench.status(), files=(file,)), 0).split(" | ")[-1] == text
 
 
 def test_the_refusal_of_an_argument_is_a_wrong_line(monkeypatch: pytest.MonkeyPatch) -> None:

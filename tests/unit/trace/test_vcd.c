@@ -372,10 +372,53 @@ static void a_full_disk_is_told_once_and_stops_nothing(void **state)
     fclose(f);
 }
 
+enum { TICKS = 20000 };
+
+/* All lines move at each instant, one of them with the code '#'. Bytes of the file. */
+static size_t record_until(uint64_t max_bytes, char *out, size_t cap)
+{
+    memset(&trace, 0, sizeof trace);
+    for (int i = 0; i < 5; i++) trace_add(&trace, "Line", false);
+    FILE *f = tmpfile();
+    assert_non_null(f);
+    const struct vcd_cfg cfg = {.out = f, .scope = "unit1", .unit_ns = 10, .mask = 31, .max_bytes = max_bytes};
+    assert_true(vcd_open(&vcd, &cfg, &trace));
+    for (int i = 1; i <= TICKS; i++) {
+        for (unsigned line = 0; line < 5; line++) trace_set(&trace, line, i & 1, INT64_C(70) * i);
+        trace_advance(&trace, INT64_C(70) * i);
+    }
+    vcd_close(&vcd, INT64_C(70) * TICKS);
+    rewind(f);
+    const size_t n = fread(out, 1, cap - 1, f);
+    out[n] = '\0';
+    fclose(f);
+    return n;
+}
+
+static void a_file_that_ends_at_its_limit_is_whole_up_to_its_closing_time(void **state)
+{
+    (void)state;
+    static char whole[1 << 20];
+    const size_t all = record_until(0, whole, sizeof whole);
+    assert_int_equal(vcd_error(&vcd), 0);
+    assert_true(all > 400000 && all < sizeof whole - 1);
+    for (uint64_t max_bytes = 66000; max_bytes < all; max_bytes += 4567) {
+        const size_t n = record_until(max_bytes, text, sizeof text);
+        assert_int_equal(vcd_error(&vcd), EFBIG);
+        assert_true(vcd.limited && vcd.bytes == n);
+        assert_true(n <= max_bytes && n + 1024 > max_bytes);
+        assert_memory_equal(text, whole, n);
+        assert_int_equal(text[n - 1], '\n');
+        const char *last = strrchr(text, '#');
+        assert_true(last[-1] == '\n' && strchr(last, '\n') == text + n - 1);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(the_file_is_what_ieee_1364_says_and_ends_after_the_last_edge, fresh),
+        cmocka_unit_test(a_file_that_ends_at_its_limit_is_whole_up_to_its_closing_time),
         cmocka_unit_test_setup(sixty_four_lines_have_codes_of_their_own, fresh),
         cmocka_unit_test(times_are_rounded_down_to_the_unit),
         cmocka_unit_test_setup(times_have_the_digits_that_printf_gives, fresh),

@@ -33,7 +33,7 @@ SESSION = Session(
     ),
     from_ns=9_500_000,
     scale="2e-05",
-    trace_height=14,
+    trace_height=6,
     comment="Opens on the first latch of the counters; the lines\ncarry the names of docs/boards/pik.md.",
     gtk_from_ns=9_500_000,
     gtk_cursor_ns=10_000_000,

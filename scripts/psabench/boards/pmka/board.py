@@ -32,7 +32,6 @@ SESSION = Session(
     stacks=(period_stack("Samples", GREEN, "SH"), bus_stack(PARALLEL_BUS)),
     from_ns=9_500_000,
     scale="2e-05",
-    trace_height=14,
     comment="Opens on the first periods; the lines carry\nthe names of docs/boards/pmka.md.",
     gtk_from_ns=9_500_000,
     gtk_cursor_ns=10_000_000,

@@ -54,7 +54,6 @@ SESSION = Session(
     stacks=(Stack("Cycle", GREEN, (Decoder("psd1cycle", hidden=(0,)),), {line: line for line in _CYCLE_LINES}),),
     from_ns=9_880_000,
     scale="5e-08",
-    trace_height=14,
     comment="Opens on the second cycle of reading; the lines carry\nthe names of the article.",
     gtk_from_ns=9_880_000,
     gtk_cursor_ns=9_882_400,
