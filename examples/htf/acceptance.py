@@ -14,7 +14,6 @@ from typing import Any
 import openhtf as htf
 from openhtf.output.callbacks import json_factory
 from openhtf.plugs import BasePlug
-
 from psabench import Bench
 
 
