@@ -303,7 +303,9 @@ def test_set_up_installs_it_when_its_lock_changes(stamp: str, installs: int, tmp
     script = f"set -euo pipefail\nuv_version=1\n{body}\n"
 
     def set_up() -> None:
-        subprocess.run(["bash", "-c", f"{script}folder_env mf4 asammdf"], cwd=tmp_path, check=True, timeout=60, capture_output=True)
+        subprocess.run(
+            ["bash", "-c", f"{script}folder_env mf4 asammdf"], cwd=tmp_path, check=True, timeout=60, capture_output=True
+        )
 
     set_up()
     left_over = tmp_path / ".venv/mf4/left_over"
