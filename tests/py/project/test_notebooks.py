@@ -26,7 +26,7 @@ RUN = [] if os.environ.get("PSABENCH_NOTEBOOKS") == "all" else ["first_frame", "
 
 @WITH_SITE
 def test_a_run_gives_what_is_stored() -> None:
-    """Two of them: all are 20 s of CPU, with PSABENCH_NOTEBOOKS=all. A cell that raises fails, too."""
+    """Two of them: all are 15 to 25 s of CPU, with PSABENCH_NOTEBOOKS=all. A cell that raises fails, too."""
     done = subprocess.run(
         [sys.executable, ROOT / "tools/notebooks.py", "--check", *RUN], capture_output=True, text=True
     )
