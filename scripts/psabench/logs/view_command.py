@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.errors import expected
+from psabench.errors import BadInput, expected
 from psabench.options import CAN_HELP, Parser, add_board, node_of, positive
 from psabench.places import no_package
 
