@@ -36,6 +36,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "explore": ("explore.command", "play random schedules of faults and host behaviours, and check the requirements"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
+    "panel": ("panel.command_line", "serve a web page on this machine for a bench: channels, registers, instruments, faults"),
 }
 
 ABOUT = """\
