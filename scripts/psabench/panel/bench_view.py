@@ -9,16 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from psabench.bench import Bench
+from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
+from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, Envelope, samples
 from psabench.panel.describe import NOT_HERE, description
+from psabench.report.waveform import frame_picture
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
 
 FILE_ARGS = ("path", "file")
 LONGEST_NAME = 100
+FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
 
 @dataclass(slots=True)
@@ -74,6 +78,22 @@ class BenchView:
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
         return self.out / name
 
+    def frame(self) -> str:
+        """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""
+        if not isinstance(self.session.dut, Psa2):
+            raise BenchError(expected("a PSA-2", f"a {self.session.dut.title}", "frame"))
+        self.out.mkdir(parents=True, exist_ok=True)
+        path = self.out / "frame.vcd"
+        self.bench.probe.start(path, self.session.dut_name, limit_mb=FRAME_MB)
+        try:
+            self.bench.wait(FRAME_S)
+        finally:
+            self.bench.probe.stop()
+        try:
+            return frame_picture(read_vcd(path))
+        except ValueError as e:
+            raise BenchError(f"frame: {e}") from e
+
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
         return {"kind": "hello", **description(self.session), "history": self._history()}
@@ -99,15 +119,15 @@ class BenchView:
         c = self.channels[name]
         return {"unit": name, "names": c.names, "units": c.units, **c.message(buckets)}
 
-    def state(self) -> dict[str, Any]:
+    def state(self, *, lines: bool) -> dict[str, Any]:
         """Instruments, faults, lines, counters of the bench, and the overview of units."""
-        asked = {name: self._maybe(*call) for name, call in self._questions().items()}
+        asked = {name: self._maybe(*call) for name, call in self._questions(lines).items()}
         counters = asked.pop("counters")
         return {
             "kind": "state",
             "instruments": {k: v for k, v in asked.items() if v and k not in ("faults", "lines")},
             "faults": asked["faults"].get("faults", []),
-            "lines": asked["lines"].get("lines", {}),
+            "lines": asked.get("lines", {}).get("lines", {}),
             "bus": counters.get("bus", {}),
             "late": counters.get("pace", {}).get("late"),
             "files": counters.get("files", []),
@@ -115,12 +135,12 @@ class BenchView:
             "overview": self._overview(),
         }
 
-    def _questions(self) -> dict[str, tuple[str, Mapping[str, object]]]:
+    def _questions(self, lines: bool) -> dict[str, tuple[str, Mapping[str, object]]]:
         unit: dict[str, object] = {"unit": self.session.dut_name} if self.session.dut_name else {}
         return {
+            **({"lines": ("lines", unit)} if lines else {}),
             "counters": ("counters", {}),
             "faults": ("fault.list", {}),
-            "lines": ("lines", unit),
             "head": ("head.read", {}),
             "table": ("table.read", {"axis": 1}),
             "chamber": ("chamber.read", {}),
@@ -139,7 +159,10 @@ class BenchView:
         for name, unit in self.bench.units.items():
             c, counters = self.channels[name], unit.frames.counters
             last = c.history[-1].bands if c.history else ()
-            shown = [[n, None if b is None else float(f"{b[2]:.7g}"), u] for n, b, u in zip(c.names, last, c.units, strict=False)]
+            shown = [
+                [n, None if b is None else float(f"{b[2]:.7g}"), u]
+                for n, b, u in zip(c.names, last, c.units, strict=False)
+            ]
             rows.append(
                 {"name": name, "board": unit.title, "samples": c.count, "lost": counters.lost,
                  "torn": getattr(counters, "torn", 0), "last": shown[:6]}

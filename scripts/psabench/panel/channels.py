@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,7 @@ def envelopes(s: Samples) -> list[Envelope]:
     span_s = float(s.t_s[-1] - s.t_s[0])
     parts = int(min(max(1.0, span_s / BUCKET_S), MOST_BUCKETS, n))
     edges = np.linspace(0, n, parts + 1).astype(int)
-    return [_bucket(float(s.t_s[b - 1]), s.values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [_bucket(float(s.t_s[b - 1]), s.values[a:b]) for a, b in pairwise(edges)]
 
 
 def _bucket(t_s: float, values: Floats) -> Envelope:
@@ -118,9 +119,7 @@ class Channels:
         """For the page: columns rather than rows, as uPlot takes them; nine digits are more than a pixel."""
         return {
             "t": [b.t_s for b in buckets],
-            "bands": [
-                [[_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in range(len(self.names))
-            ],
+            "bands": [[[_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in range(len(self.names))],
         }
 
 

@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
     with _listening(args.port) as listener:
         worker.start()
         try:
-            asyncio.run(_serve(listener, hub, worker))
+            with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
+                asyncio.run(_serve(listener, hub, worker))
         finally:
             worker.stop()
     return 0

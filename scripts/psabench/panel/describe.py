@@ -1,4 +1,4 @@
-"""What a bench has, for the page: commands with their arguments, registers with their fields, units. All from tables."""
+"""What a bench has, for the page, from the tables that there are: commands, registers with their fields, units."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 LOGGED = 100  # different refusals that are reported; more would let a hostile page fill the disk
 SAFE_METHODS = ("GET", "HEAD")
 HEADERS = (
-    (b"content-security-policy", b"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+    (b"content-security-policy", b"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
      b"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"),
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"cross-origin-resource-policy", b"same-origin"),
@@ -86,12 +86,14 @@ class Door:
         if len(hosts) != 1 or hosts[0] not in self.hosts:
             return Refusal(421, expected(f"Host {self.hosts[0]}", _shown(hosts), "host"))
         own = [f"http://{hosts[0]}"]
-        if origins and origins != own or scope["type"] == "websocket" and not origins:
+        if origins != own and (origins or scope["type"] == "websocket"):
             return Refusal(403, expected(f"Origin {own[0]}", _shown(origins), "origin"))
         if scope["type"] == "http" and scope["method"] not in SAFE_METHODS:
             return Refusal(405, expected(" or ".join(SAFE_METHODS), scope["method"], "method"))
         if not self._has_cookie(scope) and not self.brings_token(scope):
-            return Refusal(401, "expected the token of the address that psabench panel has printed, got none or another")
+            return Refusal(
+                401, "expected the token of the address that psabench panel has printed, got none or another"
+            )
         return None
 
     def brings_token(self, scope: Mapping[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""Who is looking: a bounded queue for each page. A page that sleeps loses old updates, never the newest, and holds up nobody."""
+"""Who is looking: a bounded queue for each page. One that sleeps loses old updates and holds up no other."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ class Client:
 
     number: int = field(default_factory=lambda: next(_numbers))
     truth: bool = False  # its switch
+    lines: bool = False  # it shows the levels of the lines, which the emulator computes for whoever looks
     live: bool = True  # False: its tab is hidden
     missed: bool = False  # updates were dropped: it needs the whole state
     answers: deque[str] = field(default_factory=lambda: deque(maxlen=ANSWERS))
@@ -63,6 +64,3 @@ class Hub:
         if client is not None:
             client.put_answer(text)
 
-    @property
-    def any_truth(self) -> bool:
-        return any(c.truth for c in self.clients.values())

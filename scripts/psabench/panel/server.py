@@ -1,4 +1,4 @@
-"""Pages and the WebSocket. HTTP only reads; what a page wants done comes through the WebSocket, one JSON object each."""
+"""Pages and the WebSocket. HTTP only reads; requests come through the WebSocket, one JSON object each."""
 
 from __future__ import annotations
 
@@ -43,6 +43,9 @@ class ThreadedHub:
 
     def wants_truth(self) -> bool:
         return any(c.truth for c in list(self.hub.clients.values()))
+
+    def wants_lines(self) -> bool:
+        return any(c.lines and c.live for c in list(self.hub.clients.values()))
 
     def is_watched(self) -> bool:
         return any(c.live for c in list(self.hub.clients.values()))
@@ -126,6 +129,7 @@ class Pages:
         if request["do"] == "watch":
             woken = request.get("live") is True and not client.live
             client.live, client.truth = request.get("live") is True, request.get("truth") is True
+            client.lines = request.get("lines") is True
             if woken:
                 self._ask_worker(client, {"do": "hello"})
             return

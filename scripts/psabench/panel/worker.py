@@ -1,4 +1,4 @@
-"""The thread that has the bench: it moves time, carries out what pages ask for, and says what is new 30 times a second."""
+"""The thread that has the bench: it moves time, carries out what pages ask for, and publishes 30 times a second."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ class Outlet(Protocol):
     def publish(self, text: str, *, truth: bool = False) -> None: ...
     def answer(self, number: int, text: str) -> None: ...
     def wants_truth(self) -> bool: ...
+    def wants_lines(self) -> bool: ...
     def is_watched(self) -> bool: ...
 
 
@@ -41,11 +42,18 @@ class Due:
     every_s: float
     _next_s: float = 0.0
 
+    @property
+    def left_s(self) -> float:
+        """Until it is due again, at most every_s."""
+        return min(max(self._next_s - time.monotonic(), 0.0), self.every_s)
+
     def __call__(self) -> bool:
         now_s = time.monotonic()
         if now_s < self._next_s:
             return False
-        self._next_s = max(self._next_s + self.every_s, now_s)
+        self._next_s += self.every_s
+        if self._next_s < now_s:  # late: no burst to catch up
+            self._next_s = now_s + self.every_s / 2
         return True
 
 
@@ -152,16 +160,16 @@ class Worker:
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
         if view.bench.pace != "step":
-            view.bench.wait(UPDATE_S)
+            view.bench.wait(self._updates.left_s)
             return
         now_s = time.monotonic()
         if not self.playing:
             self._moved_s = now_s
-            self._wait_request(UPDATE_S)
+            self._wait_request(self._updates.left_s)
             return
         passed_s, self._moved_s = min(now_s - self._moved_s, 2 * UPDATE_S), now_s
         view.bench.wait(passed_s * self.speed)
-        self._wait_request(UPDATE_S - (time.monotonic() - now_s))
+        self._wait_request(self._updates.left_s)
 
     def _wait_request(self, for_s: float) -> None:
         """Sleep, but not while a page waits for an answer."""
@@ -184,7 +192,7 @@ class Worker:
             return
         self.outlet.publish(_text({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
         if self._states():
-            self.outlet.publish(_text(view.state()))
+            self.outlet.publish(_text(view.state(lines=self.outlet.wants_lines())))
             if self.outlet.wants_truth():
                 self._say_truth(view)
         if self._cans():
@@ -246,7 +254,9 @@ class Worker:
             if self._view.session.dut_name != before:
                 self.outlet.publish(_text(self._hello()))
             return done
-        raise BenchError(expected("hello, play or line", repr(str(what)[:40]), "do"))
+        if what == "frame":
+            return {"kind": "answer", "svg": self._view.frame()}
+        raise BenchError(expected("hello, play, line or frame", repr(str(what)[:40]), "do"))
 
     def _play(self, request: dict[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)

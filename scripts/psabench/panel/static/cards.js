@@ -47,7 +47,9 @@ export function instruments(hello, say) {
   for (const thing of THINGS) {
     const commands = Object.entries(hello.commands).filter(([n]) => n.startsWith(`${thing}.`) && !n.endsWith(".read") && !n.endsWith(".log"));
     if (!commands.length) continue;
-    list.append(make("h3", {}, thing), make("p", { class: "quiet", id: `read-${thing}` }, "-"), ...commands.map(([n, c]) => commandForm(n, c, say)));
+    const forms = commands.map(([n, c]) => commandForm(n, c, say));
+    if (thing === "vehicle" || thing === "gyro") list.append(make("details", {}, make("summary", {}, thing), ...forms));
+    else list.append(make("h3", {}, thing), make("p", { class: "quiet", id: `read-${thing}` }, "-"), ...forms);
   }
   const absent = THINGS.filter((t) => hello.absent[t]);
   if (absent.length) list.append(make("p", { class: "quiet" }, `Not in this scenario: ${absent.join(", ")}.`));

@@ -88,6 +88,16 @@ $("#snapshot").onclick = () => say(`bench.snapshot panel-${now.toFixed(3)}s.psas
 $("#start-stream").onclick = () => say("dut.start");
 $("#stop-stream").onclick = () => say("dut.stop");
 $("#reset-unit").onclick = () => say("dut.reset");
+$("#frame").onclick = async () => {
+  try {
+    const answer = await link.ask({ do: "frame" });
+    const picture = $("#frame-picture");
+    URL.revokeObjectURL(picture.src);
+    picture.src = URL.createObjectURL(new Blob([answer.svg], { type: "image/svg+xml" }));
+    picture.alt = "frame on Int, Data and CLK";
+    picture.hidden = false;
+  } catch (error) { complain(error.message); }
+};
 $("#window").onchange = plots.touch;
 $("#line").onsubmit = (event) => {
   event.preventDefault();
@@ -103,6 +113,8 @@ $("#truth-switch").onchange = (event) => {
   $("#truth-state").hidden = !event.target.checked;
   link.sendWatch({ truth: event.target.checked });
 };
+
+$("#show-lines").ontoggle = (event) => link.sendWatch({ lines: event.target.open });
 
 const THEMES = ["", "light", "dark"];
 function theme(name) {

@@ -31,7 +31,7 @@ export function build() {
   const holder = $("#plots");
   holder.replaceChildren();
   plots = names.map((name, k) => {
-    const box = make("div", { "data-channel": name });
+    const box = make("div", { "data-channel": name, role: "img", "aria-label": `channel ${name}` }, make("div", { class: "quiet" }));
     holder.append(box);
     return new uPlot(settings(name, units[k]), data[k], box);
   });
@@ -44,7 +44,7 @@ function settings(name, physical) {
   return {
     width: width(), height: names.length > 4 ? 110 : 140, pxAlign: false,
     cursor: { sync: { key: "channels" } },
-    scales: { x: { time: false } },
+    legend: { show: false }, scales: { x: { time: false } },
     // 50 px, the default, cut the sign off
     axes: [{ ...axis, size: 28 }, { ...axis, size: 80, values: (_, v) => v.map((x) => +x.toPrecision(7)) }],
     series: [{ label: "s" }, { ...edge, label: "min" }, { ...edge, label: "max" },
@@ -63,6 +63,7 @@ export function draw() {
     const t = data[k][0];
     if (!t.length) return;
     const first = t.findIndex((x) => x >= t.at(-1) - span);
+    plot.root.previousSibling.textContent = `${names[k]}  ${+(data[k][3].at(-1) ?? NaN).toPrecision(7)} ${units[k]}`;
     plot.setData(data[k].map((column) => column.slice(first)));
   });
 }
