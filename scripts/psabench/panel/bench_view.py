@@ -15,6 +15,7 @@ from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, Envelope, samples
 from psabench.panel.describe import NOT_HERE, description
+from psabench.panel.statistics import statistics
 from psabench.report.waveform import frame_picture
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
@@ -93,6 +94,15 @@ class BenchView:
             return frame_picture(read_vcd(path))
         except ValueError as e:
             raise BenchError(f"frame: {e}") from e
+
+    def statistics(self, channel: str) -> dict[str, Any]:
+        """Of a channel of the chosen unit. Raises BenchError."""
+        c = self.channels.get(self.session.dut_name, Channels())
+        if channel not in c.names:
+            raise BenchError(
+                expected(", ".join(c.names) or "a channel: no sample has come", repr(channel[:40]), "channel")
+            )
+        return statistics(*c.latest(channel), c.units[c.names.index(channel)])
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""

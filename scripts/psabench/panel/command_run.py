@@ -18,8 +18,9 @@ from psabench.options import of_fields
 from psabench.panel.bench_view import BenchView
 from psabench.panel.guard import Door, Log
 from psabench.panel.hub import Hub
+from psabench.panel.procedures import Runs
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
-from psabench.panel.worker import Worker, bench_of
+from psabench.panel.worker import Worker, bench_of, text_of
 from psabench.shell.connect import Opening, addresses
 
 
@@ -31,12 +32,14 @@ def run(args: argparse.Namespace) -> int:
     def opened() -> BenchView:
         return bench_of(lambda: _bench(opening, args.truth), lambda b: BenchView(b, args.out.resolve(), opening.start))
 
-    worker = Worker(opened, hub, playing=not args.paused)
+    out = args.out.resolve()
+    runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
+    worker = Worker(opened, hub, runs, playing=not args.paused)
     with _listening(args.port) as listener:
         worker.start()
         try:
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
-                asyncio.run(_serve(listener, hub, worker))
+                asyncio.run(_serve(listener, hub, worker, runs.out))
         finally:
             worker.stop()
     return 0
@@ -62,12 +65,12 @@ def _listening(port: int) -> Iterator[socket.socket]:
         yield listener
 
 
-async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker) -> None:
+async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, reports: Path) -> None:
     hub.loop = asyncio.get_running_loop()
     door = Door(port=listener.getsockname()[1])
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # a hostile client must not fill the terminal
     config = uvicorn.Config(
-        Pages(hub.hub, worker.ask, Log()).app(door),
+        Pages(hub.hub, worker.ask, Log(), reports).app(door),
         log_config=None,
         access_log=False,
         proxy_headers=False,  # no one stands between us and the browser, so no one may say who it is

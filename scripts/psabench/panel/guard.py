@@ -157,7 +157,8 @@ async def _answer(send: Send, status: int, body: bytes, headers: list[tuple[byte
 def _with_headers(send: Send) -> Send:
     async def sender(message: MutableMapping[str, Any]) -> None:
         if message["type"] == "http.response.start":
-            message["headers"] = [*message.get("headers", ()), *HEADERS]
+            own = {key.lower() for key, _ in message.get("headers", ())}  # a report has a policy of its own
+            message["headers"] = [*message.get("headers", ()), *(h for h in HEADERS if h[0] not in own)]
         await send(message)
 
     return sender

@@ -63,4 +63,3 @@ class Hub:
         client = self.clients.get(number)
         if client is not None:
             client.put_answer(text)
-

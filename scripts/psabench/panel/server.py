@@ -8,6 +8,7 @@ import queue
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
@@ -19,10 +20,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from psabench.errors import expected
 from psabench.panel.guard import Allowance, Door, Guard, Log
 from psabench.panel.hub import Client, Hub
+from psabench.panel.procedures import OFFERED, REPORT
 
 MESSAGE_BYTES = 4096  # of a request; a line of the shell is shorter
 PAGES = 32  # at the same time
 POLICY, TOO_MANY = 1008, 1013  # RFC 6455, 7.4.1, and its registry
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css", "LICENSE": "text/plain"}
 
 Ask = Callable[[int, dict[str, Any]], None]
@@ -59,8 +62,8 @@ class ThreadedHub:
 class Pages:
     """The application. ask: hands a request to the worker, raises queue.Full."""
 
-    def __init__(self, hub: Hub, ask: Ask, log: Log) -> None:
-        self._hub, self._ask, self._log = hub, ask, log
+    def __init__(self, hub: Hub, ask: Ask, log: Log, reports: Path) -> None:
+        self._hub, self._ask, self._log, self._reports = hub, ask, log, reports
         folder = files("psabench.panel") / "static"
         self._files = {f.name: f.read_bytes() for f in folder.iterdir() if f.is_file()}
 
@@ -68,6 +71,7 @@ class Pages:
         routes = [
             Route("/", self._file, methods=["GET"]),
             Route("/static/{name}", self._file, methods=["GET"]),
+            Route("/reports/{name}/report.html", self._report, methods=["GET"]),
             WebSocketRoute("/ws", self._socket),
         ]
         return Guard(Starlette(routes=routes), door, self._log)
@@ -78,6 +82,13 @@ class Pages:
         if body is None:
             return Response("no such file\n", status_code=404, media_type="text/plain")
         return Response(body, media_type=KINDS.get(name.rpartition(".")[2], "application/octet-stream"))
+
+    async def _report(self, request: Request) -> Response:
+        """Of a procedure that was started here; in a sandbox, where no script runs."""
+        path = self._reports / request.path_params["name"] / REPORT
+        if request.path_params["name"] not in OFFERED or not path.is_file():
+            return Response("no such report\n", status_code=404, media_type="text/plain")
+        return Response(path.read_bytes(), media_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 
     async def _socket(self, socket: WebSocket) -> None:
         await socket.accept()

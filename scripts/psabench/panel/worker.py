@@ -15,6 +15,7 @@ from typing import Any, Protocol
 from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
 from psabench.panel.bench_view import BenchView, error_text
+from psabench.panel.procedures import OFFERED, Runs
 
 UPDATE_S = 1 / 30
 STATE_S = 0.25
@@ -63,6 +64,7 @@ class Worker:
 
     opened: Callable[[], BenchView]
     outlet: Outlet
+    runs: Runs
     playing: bool = True
     speed: float = 1.0
     requests: queue.Queue[tuple[int, dict[str, Any]]] = field(default_factory=lambda: queue.Queue(WAITING))
@@ -111,6 +113,7 @@ class Worker:
         while not self._stop.is_set():
             self._turn()
         self._close()
+        self.runs.close()
 
     def _open(self) -> BenchView:
         view = self.opened()
@@ -140,22 +143,26 @@ class Worker:
     def _lose(self, why: str) -> None:
         self.lost, self.busy = why, ""
         self._close()
-        self.outlet.publish(_text({"kind": "lost", "why": why}))
+        self.outlet.publish(text_of({"kind": "lost", "why": why}))
 
     def _come_back(self) -> None:
         self._stop.wait(RETRY_S)
         try:
             self._view = self._open()
         except (BenchError, OSError):
-            self.outlet.publish(_text({"kind": "lost", "why": self.lost}))
+            self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
             return
         self.lost = ""
-        self.outlet.publish(_text(self._hello()))
+        self.outlet.publish(text_of(self._hello()))
 
     def _hello(self) -> dict[str, Any]:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
-        return self._view.describe() | {"time": self._time()}
+        return self._view.describe() | {
+            "time": self._time(),
+            "offered": dict(OFFERED),
+            "procedure": self.runs.message(),
+        }
 
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
@@ -190,20 +197,20 @@ class Worker:
         buckets = view.take(self._overviews())
         if not self.outlet.is_watched():
             return
-        self.outlet.publish(_text({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
+        self.outlet.publish(text_of({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
         if self._states():
-            self.outlet.publish(_text(view.state(lines=self.outlet.wants_lines())))
+            self.outlet.publish(text_of(view.state(lines=self.outlet.wants_lines())))
             if self.outlet.wants_truth():
                 self._say_truth(view)
         if self._cans():
-            self.outlet.publish(_text(view.can(view.now_s())))
+            self.outlet.publish(text_of(view.can(view.now_s())))
 
     def _say_truth(self, view: BenchView) -> None:
         try:
             message = view.truth()
         except BenchError as e:
             message = {"kind": "truth", "error": str(e)}
-        self.outlet.publish(_text(message), truth=True)
+        self.outlet.publish(text_of(message), truth=True)
 
     def _time(self) -> dict[str, Any]:
         assert self._view is not None
@@ -228,20 +235,28 @@ class Worker:
         try:
             result = self._result(request)
         except (LinkError, OSError):
-            self.outlet.answer(number, _text({"kind": "answer", "id": request.get("id"), "error": "the bench is gone"}))
+            self.outlet.answer(
+                number, text_of({"kind": "answer", "id": request.get("id"), "error": "the bench is gone"})
+            )
             raise
         except (BenchError, ValueError) as e:
             text = error_text(e) if isinstance(e, BenchError) else str(e)
             result = {"kind": "answer", "error": text}
         finally:
             self.busy = ""
-        self.outlet.answer(number, _text({"id": request.get("id"), **result}))
+        self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
 
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
         what = request.get("do")
         if what == "hello":
             return self._hello()
+        if what == "run":
+            self.runs.start(str(request.get("name", "")))
+            return {"kind": "answer"}
+        if what == "stop":
+            self.runs.stop()
+            return {"kind": "answer"}
         if self._view is None:
             raise BenchError(f"panel: no bench: {self.lost}")
         if what == "play":
@@ -252,11 +267,13 @@ class Worker:
             done = {"kind": "answer", **self._view.line(str(request.get("line", "")))}
             self._moved_s = time.monotonic()
             if self._view.session.dut_name != before:
-                self.outlet.publish(_text(self._hello()))
+                self.outlet.publish(text_of(self._hello()))
             return done
+        if what == "statistics":
+            return {"kind": "answer", **self._view.statistics(str(request.get("channel", "")))}
         if what == "frame":
             return {"kind": "answer", "svg": self._view.frame()}
-        raise BenchError(expected("hello, play, line or frame", repr(str(what)[:40]), "do"))
+        raise BenchError(expected("hello, play, line, frame, statistics, run or stop", repr(str(what)[:40]), "do"))
 
     def _play(self, request: dict[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)
@@ -267,7 +284,7 @@ class Worker:
         return {"kind": "answer", "time": self._time()}
 
 
-def _text(message: dict[str, Any]) -> str:
+def text_of(message: dict[str, Any]) -> str:
     """JSON that a browser reads: it has no NaN."""
     try:
         return json.dumps(message, allow_nan=False, separators=(",", ":"))

@@ -120,7 +120,9 @@ def test_registers_are_read_written_and_protected(page: Page) -> None:
 def test_instruments_time_and_the_frame(page: Page, panel: run.Running) -> None:
     page.fill("[aria-label='head.turn angle_deg']", "30")
     page.click("form[data-command='head.turn'] button")
-    expect(page.locator("#read-head")).to_contain_text(re.compile(r"angle_deg (29\.99|30).*at_rest true"), timeout=WAIT_MS)
+    expect(page.locator("#read-head")).to_contain_text(
+        re.compile(r"angle_deg (29\.99|30).*at_rest true"), timeout=WAIT_MS
+    )
     page.click("#play")
     expect(page.locator("#play")).to_have_text("Run")
     t_s = page.inner_text("#time")
@@ -256,7 +258,10 @@ def test_other_origins_and_rebound_names_get_nothing(browser: Browser, tmp_path:
 def test_a_hidden_page_comes_back_to_the_present(browser: Browser, panel: run.Running) -> None:
     with opened(browser, panel) as page:
         page.evaluate("panel.link.sendWatch({ live: false })")
-        until(page, "new Promise((d) => { const n = panel.counts.update; setTimeout(() => d(panel.counts.update === n), 300); })")
+        until(
+            page,
+            "new Promise((d) => { const n = panel.counts.update; setTimeout(() => d(panel.counts.update === n), 300); })",
+        )
         hellos = page.evaluate("panel.counts.hello")
         page.evaluate("panel.link.sendWatch({ live: true })")
         until(page, f"panel.counts.hello > {hellos}")

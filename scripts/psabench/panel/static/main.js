@@ -4,6 +4,8 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as procedures from "./procedures.js";
+import * as statistics from "./statistics.js";
 
 let hello = null, now = 0, playing = false;
 const counts = { update: 0, state: 0, can: 0, hello: 0, drawn: 0 };
@@ -48,9 +50,10 @@ const HANDLERS = {
     cards.instruments(m, say);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
+    procedures.offer(m, link);
     plots.add(m.history, true);
   },
-  update: (m) => { time(m.time); if (m.new) plots.add(m.new, false); },
+  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
   state: (m) => {
     cards.readings(m);
     cards.faultList(m, now, say);
@@ -59,6 +62,7 @@ const HANDLERS = {
     cards.busLoad(m);
   },
   can: cards.can,
+  procedure: procedures.follow,
   truth: (m) => { if ($("#truth-switch").checked) $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1); },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
 };
@@ -98,6 +102,7 @@ $("#frame").onclick = async () => {
     picture.hidden = false;
   } catch (error) { complain(error.message); }
 };
+$("#compute").onclick = () => link.ask({ do: "statistics", channel: $("#channel").value }).then(statistics.show, (e) => complain(e.message));
 $("#window").onchange = plots.touch;
 $("#line").onsubmit = (event) => {
   event.preventDefault();

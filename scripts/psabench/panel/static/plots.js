@@ -5,7 +5,7 @@ import { $, make } from "./page.js";
 const KEPT = 1800;
 let unit = "", names = [], units = [], data = [], plots = [], dirty = false;
 
-const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function forget(message) {
   unit = message.unit; names = message.names; units = message.units;
