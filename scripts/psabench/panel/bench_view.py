@@ -99,9 +99,8 @@ class BenchView:
         """Of a channel of the chosen unit. Raises BenchError."""
         c = self.channels.get(self.session.dut_name, Channels())
         if channel not in c.names:
-            raise BenchError(
-                expected(", ".join(c.names) or "a channel: no sample has come", repr(channel[:40]), "channel")
-            )
+            known = ", ".join(c.names) or "a channel: no sample has come"
+            raise BenchError(expected(known, repr(channel[:40]), "channel"))
         return statistics(*c.latest(channel), c.units[c.names.index(channel)])
 
     def describe(self) -> dict[str, Any]:

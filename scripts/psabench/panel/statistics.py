@@ -53,7 +53,7 @@ def spectrum(values: Floats, step_s: float) -> tuple[Floats, Floats]:
     starts = range(0, len(values) - n + 1, max(1, n // 2))
     parts = [np.abs(np.fft.rfft(window * (values[k : k + n] - values[k : k + n].mean()))) ** 2 for k in starts]
     power = 2.0 * step_s * np.mean(parts, axis=0) / (window**2).sum()
-    hz = np.fft.rfftfreq(n, step_s)
+    hz: Floats = np.asarray(np.fft.rfftfreq(n, step_s), dtype=np.float64)
     power[-1] /= 2.0 if n % 2 == 0 else 1.0  # the highest has no mirror image
     return _in_ratios(hz[1:], power[1:])
 

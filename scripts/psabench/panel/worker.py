@@ -158,11 +158,8 @@ class Worker:
     def _hello(self) -> dict[str, Any]:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
-        return self._view.describe() | {
-            "time": self._time(),
-            "offered": dict(OFFERED),
-            "procedure": self.runs.message(),
-        }
+        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message()}
+        return self._view.describe() | {"time": self._time()} | procedures
 
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""

@@ -7,13 +7,14 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import panel_run as run
 import pytest
 from psabench.emulator import Emulator
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
 
 LINES = ("dut.ready", "head.turn 30", "wait 0.3", "faults.add sensor.bias a.sensor.x bias_v=0.1 for_s=0.1", "wait 0.2")
 
@@ -102,15 +103,19 @@ def test_the_last_frame_is_drawn_with_its_words(panel: run.Running) -> None:
     assert "X =" in svg
 
 
+def send_until_closed(socket: ClientConnection, messages: Sequence[str | bytes]) -> None:
+    for message in messages:
+        socket.send(message)
+    while True:
+        socket.recv(timeout=run.WAIT_S)
+
+
 def test_floods_and_malformed_messages_close_the_page_with_one_line_each() -> None:
     with run.running("quiet", "--paused") as panel:
         for messages in (["{"], [json.dumps({"do": "line", "line": "head.turn 5"})] * 2000, ["x" * 100_000], [b"\xff"]):
             for _ in range(3):
                 with panel.socket() as socket, pytest.raises(ConnectionClosed):
-                    for message in messages:
-                        socket.send(message)
-                    while True:
-                        socket.recv(timeout=run.WAIT_S)
+                    send_until_closed(socket, messages)
         for _ in range(5):
             panel.http("/", Host="evil.example", Cookie=panel.cookie)
         with panel.socket() as socket:

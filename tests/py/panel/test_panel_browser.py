@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 CHROMIUM = Path("/usr/bin/chromium")
 WAIT_MS = 30_000
 REBOUND = "rebound.example"  # resolves to 127.0.0.1 for this browser: an attacker's name with a short-lived record
+UPDATES = "panel.counts.update"
 
 pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason="no /usr/bin/chromium: apt-get install chromium")
 
@@ -258,12 +259,33 @@ def test_other_origins_and_rebound_names_get_nothing(browser: Browser, tmp_path:
 def test_a_hidden_page_comes_back_to_the_present(browser: Browser, panel: run.Running) -> None:
     with opened(browser, panel) as page:
         page.evaluate("panel.link.sendWatch({ live: false })")
-        until(
-            page,
-            "new Promise((d) => { const n = panel.counts.update; setTimeout(() => d(panel.counts.update === n), 300); })",
-        )
+        until(page, f"new Promise((d) => {{ const n = {UPDATES}; setTimeout(() => d({UPDATES} === n), 300); }})")
         hellos = page.evaluate("panel.counts.hello")
         page.evaluate("panel.link.sendWatch({ live: true })")
         until(page, f"panel.counts.hello > {hellos}")
         updates = page.evaluate("panel.counts.update")
         until(page, f"panel.counts.update > {updates + 10}")
+
+
+def test_statistics_of_a_channel_are_drawn(page: Page) -> None:
+    page.click("#start-stream")
+    until(page, "panel.shown().points > 30")
+    page.select_option("#channel", "x")
+    page.click("#compute")
+    expect(page.locator("#moments")).to_contain_text("standard deviation")
+    assert page.locator("#charts canvas").count() == 3
+
+
+def test_a_calibration_is_followed_to_its_report(page: Page) -> None:
+    page.select_option("#procedure", "turns")
+    page.click("#run")
+    expect(page.locator("#procedure-step")).to_contain_text(
+        re.compile(r"running, test turns.* \d+/20"), timeout=WAIT_MS
+    )
+    expect(page.locator("#procedure-step")).to_contain_text("done", timeout=120_000)
+    with page.context.expect_page() as opening:
+        page.click("#report")
+    report = opening.value
+    expect(report.locator("h1").first).to_be_visible()
+    assert report.evaluate("self.origin") == "null"  # a sandbox
+    report.close()

@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from psabench.errors import BenchError
+from psabench.link.signals import Floats
 from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, envelopes
 from psabench.panel.guard import Allowance, Door, Log
 from psabench.panel.hub import UPDATES, Client
+from psabench.panel.procedures import Progress
 from psabench.panel.server import MESSAGE_BYTES, parsed
+from psabench.panel.statistics import spectrum, statistics
 
 DOOR = Door(port=8000, token="secret-token")
 OWN = {"host": "127.0.0.1:8000", "cookie": "psabench_panel_8000=secret-token"}
@@ -91,7 +95,7 @@ def test_malformed_requests_are_none(text: str) -> None:
 
 def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:
     n = 1000
-    t_s = np.arange(n) * 1e-3
+    t_s: Floats = np.arange(n, dtype=np.float64) / 1000.0
     x = np.zeros(n)
     x[517] = 1.0
     s = Samples(t_s=t_s, values=np.column_stack([x, np.full(n, np.nan)]), names=("x", "y"), units=("V", "V"))
@@ -100,7 +104,7 @@ def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:
     assert [b.bands[0][1] for b in found if b.bands[0]].count(1.0) == 1
     assert all(b.bands[1] is None for b in found)
     assert found[-1].t_s == pytest.approx(0.999)
-    long = Samples(t_s=np.arange(n) * 1.0, values=s.values, names=s.names, units=s.units)
+    long = Samples(t_s=t_s * 1000.0, values=s.values, names=s.names, units=s.units)
     assert len(envelopes(long)) == MOST_BUCKETS
 
 
@@ -125,3 +129,41 @@ def test_a_page_that_sleeps_has_a_bounded_queue_and_the_newest_update() -> None:
     before = list(client.updates)
     client.put_update("hidden")
     assert list(client.updates) == before
+
+
+def test_spectrum_and_allan_deviation_of_white_noise_and_a_sine() -> None:
+    rng = np.random.default_rng(1)
+    step_s, density = 1e-3, 2e-6  # one-sided, V per root Hz
+    noise = rng.normal(0.0, density * np.sqrt(0.5 / step_s), 8192)
+    t_s: Floats = np.arange(8192, dtype=np.float64) / 1000.0
+    found = statistics(t_s, noise, "V")
+    assert np.sqrt(np.mean(np.square(found["spectrum"]["y"][40:]))) == pytest.approx(density, rel=0.05)
+    for tau_s, deviation in list(zip(found["allan"]["x"], found["allan"]["y"], strict=True))[:20]:
+        assert deviation == pytest.approx(density / np.sqrt(2 * tau_s), rel=0.25)
+    assert sum(found["histogram"]["y"]) == 8192
+    hz, amplitude = spectrum(np.sin(2 * np.pi * 50.0 * t_s), step_s)
+    assert hz[np.argmax(amplitude)] == pytest.approx(50.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("values", "words"), [(np.zeros(63), "64 samples"), (np.array([0.0, np.nan] * 50), "gaps")])
+def test_statistics_need_enough_samples_without_gaps(values: Any, words: str) -> None:
+    with pytest.raises(BenchError, match=words):
+        statistics(np.arange(len(values), dtype=np.float64) / 1000.0, values, "V")
+
+
+# what a procedure prints | step, done, total, note
+PRINTED = [
+    ("turns, face side ██████···· 4/10, 3 s left\x1b[K", ("turns, face side", 4, 10, "")),
+    ("heading ████ 7/9, 0 s left; azimuth 12.3 +- 0.4 deg\x1b[K", ("heading", 7, 9, "azimuth 12.3 +- 0.4 deg")),
+    ("\x1b[Kturns, face side: 10/10 in 0.3 s", ("turns, face side", 10, 10, "")),
+    ("gyro: 3/3 in 61.0 s; u0 1.2", ("gyro", 3, 3, "u0 1.2")),
+    ("report: build/run/report.html", ("", 0, 0, "")),
+]
+
+
+@pytest.mark.parametrize(("text", "shown"), PRINTED)
+def test_the_bar_of_a_procedure_is_understood(text: str, shown: tuple[str, int, int, str]) -> None:
+    p = Progress()
+    p.take(text)
+    assert (p.step, p.done, p.total, p.note) == shown
+    assert list(p.lines) == ([text] if not p.step else [])
