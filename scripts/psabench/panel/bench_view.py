@@ -23,6 +23,7 @@ from psabench.shell.session import Session
 
 FILE_ARGS = ("path", "file")
 LONGEST_NAME = 100
+SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
 
@@ -66,14 +67,15 @@ class BenchView:
         if call is None:
             return text
         if call.command.name in NOT_HERE:
-            raise Wrong(f"{call.command.name}: not from the panel; use psabench shell --connect")
+            raise Wrong(expected("a command of the panel; psabench shell --connect has all", call.command.name, "panel"))
         names = [a for a in FILE_ARGS if a in call.args]
         if not names:
             return text
         self.out.mkdir(parents=True, exist_ok=True)
-        return Call(call.command, call.args | {a: str(self._file(str(call.args[a]))) for a in names}).line
+        return Call(call.command, call.args | {a: str(self.file(str(call.args[a]))) for a in names}).line
 
-    def _file(self, name: str) -> Path:
+    def file(self, name: str) -> Path:
+        """A file of that name in our folder. Raises Wrong."""
         plain = name.replace("-", "a").replace("_", "a").replace(".", "a")
         if not (plain.isascii() and plain.isalnum()) or name.startswith(".") or len(name) > LONGEST_NAME:
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
@@ -105,11 +107,16 @@ class BenchView:
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        return {"kind": "hello", **description(self.session), "history": self._history()}
+        return {"kind": "hello", **description(self.session), "history": self._history(), "snapshots": self.snapshots()}
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name
         return self._of_unit(name, list(self.channels[name].history)) if name in self.channels else {}
+
+    def snapshots(self) -> list[str]:
+        """Snapshots in our folder, the latest first."""
+        found = [p for p in self.out.glob(f"*{SNAPSHOT}") if p.is_file()]
+        return [p.name for p in sorted(found, key=lambda p: p.stat().st_mtime_ns, reverse=True)[:SNAPSHOTS]]
 
     # ---- what goes by itself
 

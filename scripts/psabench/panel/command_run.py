@@ -29,12 +29,16 @@ def run(args: argparse.Namespace) -> int:
     opening = of_fields(Opening, args, scpi=addresses(args.scpi))
     hub = ThreadedHub(Hub())
 
-    def opened() -> BenchView:
-        return bench_of(lambda: _bench(opening, args.truth), lambda b: BenchView(b, args.out.resolve(), opening.start))
-
     out = args.out.resolve()
+
+    def opened() -> BenchView:
+        return bench_of(lambda: _bench(opening, args.truth), lambda b: BenchView(b, out, opening.start))
+
+    def restored(path: Path) -> BenchView:
+        return bench_of(lambda: Bench.restore(path, pace=opening.pace or "step"), lambda b: BenchView(b, out))
+
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
-    worker = Worker(opened, hub, runs, playing=not args.paused)
+    worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
     with _listening(args.port) as listener:
         worker.start()
         try:
@@ -73,7 +77,7 @@ async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, repo
         Pages(hub.hub, worker.ask, Log(), reports).app(door),
         log_config=None,
         access_log=False,
-        proxy_headers=False,  # no one stands between us and the browser, so no one may say who it is
+        proxy_headers=False,  # there is no proxy whose headers could be trusted
         server_header=False,
         lifespan="off",
         http="h11",

@@ -7,9 +7,10 @@ import math
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 from psabench.bench import Bench
@@ -65,6 +66,7 @@ class Worker:
     opened: Callable[[], BenchView]
     outlet: Outlet
     runs: Runs
+    restored: Callable[[Path], BenchView] | None = None  # a view of a bench from a snapshot; None: it is another's
     playing: bool = True
     speed: float = 1.0
     requests: queue.Queue[tuple[int, dict[str, Any]]] = field(default_factory=lambda: queue.Queue(WAITING))
@@ -153,12 +155,12 @@ class Worker:
             self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
             return
         self.lost = ""
-        self.outlet.publish(text_of(self._hello()))
+        self.outlet.publish(text_of(self.hello()))
 
-    def _hello(self) -> dict[str, Any]:
+    def hello(self) -> dict[str, Any]:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
-        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message()}
+        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.restored is not None}
         return self._view.describe() | {"time": self._time()} | procedures
 
     def _move(self, view: BenchView) -> None:
@@ -245,40 +247,73 @@ class Worker:
 
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
-        what = request.get("do")
-        if what == "hello":
-            return self._hello()
-        if what == "run":
-            self.runs.start(str(request.get("name", "")))
-            return {"kind": "answer"}
-        if what == "stop":
-            self.runs.stop()
-            return {"kind": "answer"}
+        what = str(request.get("do"))
+        handler = HANDLERS.get(what)
+        if handler is None:
+            raise BenchError(expected(", ".join(HANDLERS), repr(what[:40]), "do"))
+        return {"kind": "answer", **handler(self, request)}
+
+    @property
+    def view(self) -> BenchView:
+        """The bench. Raises BenchError while it is lost."""
         if self._view is None:
             raise BenchError(f"panel: no bench: {self.lost}")
-        if what == "play":
-            return self._play(request)
-        if what == "line":
-            self.busy = str(request.get("line", ""))[:200]
-            before = self._view.session.dut_name
-            done = {"kind": "answer", **self._view.line(str(request.get("line", "")))}
-            self._moved_s = time.monotonic()
-            if self._view.session.dut_name != before:
-                self.outlet.publish(text_of(self._hello()))
-            return done
-        if what == "statistics":
-            return {"kind": "answer", **self._view.statistics(str(request.get("channel", "")))}
-        if what == "frame":
-            return {"kind": "answer", "svg": self._view.frame()}
-        raise BenchError(expected("hello, play, line, frame, statistics, run or stop", repr(str(what)[:40]), "do"))
+        return self._view
 
-    def _play(self, request: dict[str, Any]) -> dict[str, Any]:
+    def line(self, text: str) -> dict[str, Any]:
+        """Carry out a line of the shell."""
+        self.busy = text[:200]
+        before = self.view.session.dut_name
+        done = self.view.line(text)
+        self._moved_s = time.monotonic()
+        if str(done.get("line", "")).startswith("bench.snapshot "):
+            self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
+        if self.view.session.dut_name != before:
+            self.outlet.publish(text_of(self.hello()))
+        return done
+
+    def restore(self, name: str) -> dict[str, Any]:
+        """Go back: an emulator from the snapshot takes the place of ours. Raises BenchError, and ours goes on."""
+        if self.restored is None:
+            raise BenchError("panel: go back: this emulator was not started by the panel")
+        new = self.restored(self.view.file(name))
+        self._close()
+        self._view = new
+        new.session.tick = self._tick
+        self.playing, self._moved_s = False, time.monotonic()
+        self.outlet.publish(text_of(self.hello()))
+        return {}
+
+    def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)
         if isinstance(speed, bool) or not isinstance(speed, int | float) or not SLOWEST <= speed <= FASTEST:
             raise BenchError(expected(f"{SLOWEST:g} to {FASTEST:g}", repr(speed)[:40], "speed"))
         self.playing, self.speed = request.get("on") is True, float(speed)
         self._moved_s = time.monotonic()
-        return {"kind": "answer", "time": self._time()}
+        return {"time": self._time()}
+
+
+def _run_procedure(w: Worker, request: Mapping[str, Any]) -> dict[str, Any]:
+    w.runs.start(str(request.get("name", "")))
+    return {}
+
+
+def _stop_procedure(w: Worker, _: Mapping[str, Any]) -> dict[str, Any]:
+    w.runs.stop()
+    return {}
+
+
+# What a page may ask for, by its "do"; `watch` is the server's own.
+HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = {
+    "hello": lambda w, _: w.hello(),
+    "play": lambda w, request: w.play(request),
+    "line": lambda w, request: w.line(str(request.get("line", ""))),
+    "frame": lambda w, _: {"svg": w.view.frame()},
+    "statistics": lambda w, request: w.view.statistics(str(request.get("channel", ""))),
+    "restore": lambda w, request: w.restore(str(request.get("file", ""))),
+    "run": _run_procedure,
+    "stop": _stop_procedure,
+}
 
 
 def text_of(message: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.server
+import os
 import re
 import threading
 import time
@@ -10,8 +11,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
 import panel_run as run
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -135,6 +140,12 @@ def test_instruments_time_and_the_frame(page: Page, panel: run.Running) -> None:
     expect(page.locator("#log")).to_contain_text("until INT_FALL")
     page.click("#snapshot")
     expect(page.locator("#log")).to_contain_text("bench.snapshot panel-")
+    t_s = page.inner_text("#time")
+    page.click(".step[data-for='10ms']")
+    expect(page.locator("#time")).not_to_have_text(t_s)
+    page.click("#restore")
+    expect(page.locator("#time")).to_have_text(t_s)
+    expect(page.locator("#read-head")).to_contain_text("angle_deg 29.99")
     page.click("#frame")
     expect(page.locator("#frame-picture")).to_be_visible()
     assert page.evaluate("document.querySelector('#frame-picture').naturalWidth") > 100
@@ -289,3 +300,46 @@ def test_a_calibration_is_followed_to_its_report(page: Page) -> None:
     expect(report.locator("h1").first).to_be_visible()
     assert report.evaluate("self.origin") == "null"  # a sandbox
     report.close()
+
+
+PICTURE = Path(__file__).parents[3] / "docs/img/panel.png"
+BLOCK = 20  # pixels: fonts differ between machines, so means of blocks are compared
+
+
+def test_the_page_looks_as_in_its_picture(browser: Browser, tmp_path: Path) -> None:
+    """PSABENCH_PICTURES=1 draws docs/img/panel.png; 10 s of simulated time, so the curves are always the same."""
+    options = "calibrate", "--seed", "3", "--paused", "--out", tmp_path
+    view = {"width": 1280, "height": 1240}
+    with run.running(*options) as panel, opened(browser, panel, viewport=view, color_scheme="light") as page:
+        for line in (
+            "dut.ready",
+            "dut.start",
+            "wait 8",
+            "faults.add sensor.bias a.sensor.x bias_v=-0.005 for_s=1",
+            "wait 2",
+        ):
+            said(page, line)
+        page.select_option("#channel", "x")
+        page.click("#compute")
+        page.click("#read-registers")
+        expect(page.locator("#faults tbody")).to_contain_text("over")
+        expect(page.locator("#registers tbody")).to_contain_text("CONFIG0")
+        expect(page.locator("#moments")).to_contain_text("mean")
+        until(page, "panel.shown().points > 200")
+        page.evaluate("scrollTo(0, 0); document.activeElement.blur()")
+        page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        page.screenshot(path=tmp_path / "panel.png")
+    if os.environ.get("PSABENCH_PICTURES"):
+        Image.open(tmp_path / "panel.png").convert("RGB").quantize(48).save(PICTURE, optimize=True)
+    assert PICTURE.stat().st_size < 150_000
+    difference = np.abs(blocks(tmp_path / "panel.png") - blocks(PICTURE))
+    assert difference.mean() < 0.02
+    assert (difference > 0.3).mean() < 0.01
+
+
+def blocks(path: Path) -> npt.NDArray[np.float64]:
+    """Mean brightness of each block, 0 to 1."""
+    grey = np.asarray(plt.imread(path), dtype=np.float64)[..., :3].mean(axis=2)
+    rows, columns = (n // BLOCK for n in grey.shape)
+    cut = grey[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
+    return np.asarray(cut.mean(axis=(1, 3)))

@@ -51,6 +51,7 @@ const HANDLERS = {
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
+    HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },
   update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
@@ -60,6 +61,10 @@ const HANDLERS = {
     cards.board(m);
     cards.overview(m, hello ? hello.unit : "", say);
     cards.busLoad(m);
+  },
+  snapshots: (m) => {
+    $("#back").hidden = !m.names.length || !(hello && hello.restores);
+    options($("#snapshots"), m.names);
   },
   can: cards.can,
   procedure: procedures.follow,
@@ -89,6 +94,7 @@ $("#speed").onchange = () => play(playing);
 for (const button of document.querySelectorAll(".step")) button.onclick = () => step(button.dataset.for);
 $("#until").onclick = async () => { if (hello.pace === "step" && playing) await play(false); say(`until ${$("#event").value}`); };
 $("#snapshot").onclick = () => say(`bench.snapshot panel-${now.toFixed(3)}s.psasnap`);
+$("#restore").onclick = () => link.ask({ do: "restore", file: $("#snapshots").value }).then(() => complain(""), (e) => complain(e.message));
 $("#start-stream").onclick = () => say("dut.start");
 $("#stop-stream").onclick = () => say("dut.stop");
 $("#reset-unit").onclick = () => say("dut.reset");

@@ -14,13 +14,14 @@ export function show(message) {
   for (const chart of charts) chart.destroy();
   $("#moments").textContent = `${message.count} samples at ${digits(1 / message.step_s)} Hz: mean ${digits(message.mean)} ${message.unit}, standard deviation ${digits(message.std)} ${message.unit}`;
   $("#charts").replaceChildren();
-  charts = Object.entries(KINDS).map(([name, kind]) => chart(name, kind, message));
+  const boxes = Object.entries(KINDS).map(([name, kind]) => make("div",
+    { role: "img", "aria-label": kind.title(message), "data-chart": name }, make("div", { class: "quiet" }, kind.title(message))));
+  $("#charts").append(...boxes); // all of them, so that each has its width
+  charts = Object.entries(KINDS).map(([name, kind], i) => chart(name, kind, message, boxes[i]));
 }
 
-function chart(name, kind, message) {
+function chart(name, kind, message, box) {
   const { x, y } = message[name];
-  const box = make("div", { role: "img", "aria-label": kind.title(message), "data-chart": name }, make("div", { class: "quiet" }, kind.title(message)));
-  $("#charts").append(box);
   const axis = { stroke: css("--quiet"), grid: { stroke: css("--grid") }, ticks: { stroke: css("--grid") } };
   const scale = kind.log ? { distr: 3 } : {};
   const power = (_, v) => v.map((n) => (n === null || n === undefined ? "" : kind.log && Math.abs(Math.log10(n) % 1) > 1e-6 ? "" : String(+n.toPrecision(3))));
