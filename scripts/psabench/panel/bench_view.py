@@ -13,9 +13,9 @@ from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
-from psabench.panel.channels import Channels, Envelope, samples
-from psabench.panel.describe import NOT_HERE, description
-from psabench.panel.statistics import statistics
+from psabench.panel.channels import Channels, Envelope, samples_of
+from psabench.panel.describe import NOT_HERE, describe_bench
+from psabench.panel.statistics import channel_statistics
 from psabench.report.waveform import frame_picture
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
@@ -67,7 +67,9 @@ class BenchView:
         if call is None:
             return text
         if call.command.name in NOT_HERE:
-            raise Wrong(expected("a command of the panel; psabench shell --connect has all", call.command.name, "panel"))
+            raise Wrong(
+                expected("a command of the panel; psabench shell --connect has all", call.command.name, "panel")
+            )
         names = [a for a in FILE_ARGS if a in call.args]
         if not names:
             return text
@@ -97,17 +99,22 @@ class BenchView:
         except ValueError as e:
             raise BenchError(f"frame: {e}") from e
 
-    def statistics(self, channel: str) -> dict[str, Any]:
+    def channel_statistics(self, channel: str) -> dict[str, Any]:
         """Of a channel of the chosen unit. Raises BenchError."""
         c = self.channels.get(self.session.dut_name, Channels())
         if channel not in c.names:
             known = ", ".join(c.names) or "a channel: no sample has come"
             raise BenchError(expected(known, repr(channel[:40]), "channel"))
-        return statistics(*c.latest(channel), c.units[c.names.index(channel)])
+        return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        return {"kind": "hello", **description(self.session), "history": self._history(), "snapshots": self.snapshots()}
+        return {
+            "kind": "hello",
+            **describe_bench(self.session),
+            "history": self._history(),
+            "snapshots": self.snapshots(),
+        }
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name
@@ -126,7 +133,7 @@ class BenchView:
         for name, unit in self.bench.units.items():
             if name != self.session.dut_name and not every_unit:
                 continue
-            buckets = self.channels[name].add(samples(unit.frames.take()))
+            buckets = self.channels[name].add(samples_of(unit.frames.take()))
             if name == self.session.dut_name and buckets:
                 found = self._of_unit(name, buckets)
         return found

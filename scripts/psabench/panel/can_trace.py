@@ -68,11 +68,11 @@ class CanTrace:
             "id": f"{m.arbitration_id:03X}",
             "data": bytes(m.data).hex(" ").upper(),
             "name": name,
-            "text": "" if m.is_error_frame or not name else decoded(name, bytes(m.data)),
+            "text": "" if m.is_error_frame or not name else decoded_text(name, bytes(m.data)),
         }
 
 
-def decoded(name: str, data: bytes) -> str:
+def decoded_text(name: str, data: bytes) -> str:
     """`X 2.49036 V, Y -3.6e-06 V`; "" where the frame is not as long as the DBC has it."""
     form = message(name)
     try:
@@ -80,8 +80,8 @@ def decoded(name: str, data: bytes) -> str:
     except Exception:  # cantools and bitstruct raise kinds of their own for a frame that does not fit
         return ""
     units = {s.name: s.unit or "" for s in form.signals}
-    return ", ".join(f"{k} {_value(v)} {units.get(k, '')}".rstrip() for k, v in values.items())
+    return ", ".join(f"{k} {_value_text(v)} {units.get(k, '')}".rstrip() for k, v in values.items())
 
 
-def _value(v: object) -> str:
+def _value_text(v: object) -> str:
     return f"{v:.6g}" if isinstance(v, float) else str(v)

@@ -34,7 +34,7 @@ class Samples:
     units: tuple[str, ...]
 
 
-def samples(taken: Frames | Readings) -> Samples:
+def samples_of(taken: Frames | Readings) -> Samples:
     """What a reader has taken, whatever the board."""
     if isinstance(taken, Frames):
         values = np.column_stack([taken.u_v, taken.temp_degc])
@@ -52,7 +52,7 @@ class Envelope:
     bands: tuple[tuple[float, float, float] | None, ...]
 
 
-def envelopes(s: Samples) -> list[Envelope]:
+def split_envelopes(s: Samples) -> list[Envelope]:
     """Samples in order of time, split into buckets of about BUCKET_S, MOST_BUCKETS at most."""
     n = len(s.t_s)
     if n == 0:
@@ -60,10 +60,10 @@ def envelopes(s: Samples) -> list[Envelope]:
     span_s = float(s.t_s[-1] - s.t_s[0])
     parts = int(min(max(1.0, span_s / BUCKET_S), MOST_BUCKETS, n))
     edges = np.linspace(0, n, parts + 1).astype(int)
-    return [_bucket(float(s.t_s[b - 1]), s.values[a:b]) for a, b in pairwise(edges)]
+    return [_make_bucket(float(s.t_s[b - 1]), s.values[a:b]) for a, b in pairwise(edges)]
 
 
-def _bucket(t_s: float, values: Floats) -> Envelope:
+def _make_bucket(t_s: float, values: Floats) -> Envelope:
     bands = []
     for column in values.T:
         here = column[np.isfinite(column)]
@@ -88,7 +88,7 @@ class Channels:
             return []
         if s.names != self.names or (self.history and s.t_s[0] < self.history[-1].t_s):
             self._forget(s)
-        new = envelopes(s)
+        new = split_envelopes(s)
         self.history.extend(new)
         self.count += len(s.t_s)
         self._keep_raw(s)
@@ -119,9 +119,11 @@ class Channels:
         """For the page: columns rather than rows, as uPlot takes them; nine digits are more than a pixel."""
         return {
             "t": [b.t_s for b in buckets],
-            "bands": [[[_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in range(len(self.names))],
+            "bands": [
+                [[_nine_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in range(len(self.names))
+            ],
         }
 
 
-def _digits(band: tuple[float, float, float] | None, i: int) -> float | None:
+def _nine_digits(band: tuple[float, float, float] | None, i: int) -> float | None:
     return None if band is None else float(f"{band[i]:.9g}")

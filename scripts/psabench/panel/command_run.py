@@ -32,14 +32,14 @@ def run(args: argparse.Namespace) -> int:
     out = args.out.resolve()
 
     def opened() -> BenchView:
-        return bench_of(lambda: _bench(opening, args.truth), lambda b: BenchView(b, out, opening.start))
+        return bench_of(lambda: _open_bench(opening, args.truth), lambda b: BenchView(b, out, opening.start))
 
     def restored(path: Path) -> BenchView:
         return bench_of(lambda: Bench.restore(path, pace=opening.pace or "step"), lambda b: BenchView(b, out))
 
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
     worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
-    with _listening(args.port) as listener:
+    with _listen_loopback(args.port) as listener:
         worker.start()
         try:
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _bench(opening: Opening, truth: Path | None) -> Bench:
+def _open_bench(opening: Opening, truth: Path | None) -> Bench:
     bench = opening.open()
     if truth is not None:
         bench.truth_path = truth
@@ -57,7 +57,7 @@ def _bench(opening: Opening, truth: Path | None) -> Bench:
 
 
 @contextlib.contextmanager
-def _listening(port: int) -> Iterator[socket.socket]:
+def _listen_loopback(port: int) -> Iterator[socket.socket]:
     """Loopback only: there is no option for another address."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -15,7 +15,7 @@ from psabench.shell.session import Session
 NOT_HERE = ("bench.quit", "bench.fork", "help")
 
 
-def argument(a: Arg) -> dict[str, Any]:
+def describe_argument(a: Arg) -> dict[str, Any]:
     """One input of a form."""
     limits = {k: v for k, v in (("low", a.low), ("high", a.high)) if not math.isinf(v)}
     return {
@@ -30,12 +30,14 @@ def argument(a: Arg) -> dict[str, Any]:
     }
 
 
-def command(c: Command) -> dict[str, Any]:
+def describe_command(c: Command) -> dict[str, Any]:
     """One form; of a fault one for each kind."""
-    found: dict[str, Any] = {"what": c.what, "args": [argument(a) for a in c.args]}
+    found: dict[str, Any] = {"what": c.what, "args": [describe_argument(a) for a in c.args]}
     if c.variants:
-        found["variants"] = {k: {"what": v.what, "args": [argument(a) for a in v.args]} for k, v in c.variants.items()}
-        found["args"] = [argument(c.args[0])]
+        found["variants"] = {
+            k: {"what": v.what, "args": [describe_argument(a) for a in v.args]} for k, v in c.variants.items()
+        }
+        found["args"] = [describe_argument(c.args[0])]
     return found
 
 
@@ -55,7 +57,7 @@ def register_fields(unit: Unit) -> dict[str, Any]:
     return found
 
 
-def description(session: Session) -> Mapping[str, Any]:
+def describe_bench(session: Session) -> Mapping[str, Any]:
     """All of it."""
     bench = session.bench
     return {
@@ -63,7 +65,7 @@ def description(session: Session) -> Mapping[str, Any]:
         "units": [{"name": n, "board": u.title, "node": u.node.node_id} for n, u in bench.units.items()],
         "unit": session.dut_name,
         "registers": register_fields(session.dut) if bench.units else {},
-        "commands": {n: command(c) for n, c in session.vocabulary.commands.items() if n not in NOT_HERE},
+        "commands": {n: describe_command(c) for n, c in session.vocabulary.commands.items() if n not in NOT_HERE},
         "absent": dict(session.vocabulary.absent),
         "truth": bench.truth_path is not None,
     }

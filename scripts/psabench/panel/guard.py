@@ -82,12 +82,12 @@ class Door:
 
     def refusal(self, scope: Mapping[str, Any]) -> Refusal | None:
         """Why a request is not served; None: it is."""
-        hosts, origins = header(scope, b"host"), header(scope, b"origin")
+        hosts, origins = header_values(scope, b"host"), header_values(scope, b"origin")
         if len(hosts) != 1 or hosts[0] not in self.hosts:
-            return Refusal(421, expected(f"Host {self.hosts[0]}", _shown(hosts), "host"))
+            return Refusal(421, expected(f"Host {self.hosts[0]}", _shown_values(hosts), "host"))
         own = [f"http://{hosts[0]}"]
         if origins != own and (origins or scope["type"] == "websocket"):
-            return Refusal(403, expected(f"Origin {own[0]}", _shown(origins), "origin"))
+            return Refusal(403, expected(f"Origin {own[0]}", _shown_values(origins), "origin"))
         if scope["type"] == "http" and scope["method"] not in SAFE_METHODS:
             return Refusal(405, expected(" or ".join(SAFE_METHODS), scope["method"], "method"))
         if not self._has_cookie(scope) and not self.brings_token(scope):
@@ -103,19 +103,19 @@ class Door:
 
     def _has_cookie(self, scope: Mapping[str, Any]) -> bool:
         try:
-            found = SimpleCookie("; ".join(header(scope, b"cookie"))).get(self.cookie)
+            found = SimpleCookie("; ".join(header_values(scope, b"cookie"))).get(self.cookie)
         except CookieError:
             return False
         return found is not None and self.is_token(found.value)
 
 
-def header(scope: Mapping[str, Any], name: bytes) -> list[str]:
+def header_values(scope: Mapping[str, Any], name: bytes) -> list[str]:
     """All values of a header, as often as it was sent."""
     pairs: Iterable[tuple[bytes, bytes]] = scope["headers"]
     return [value.decode("latin-1") for key, value in pairs if key.lower() == name]
 
 
-def _shown(values: list[str]) -> str:
+def _shown_values(values: list[str]) -> str:
     return ", ".join(repr(v[:80]) for v in values) or "none"
 
 

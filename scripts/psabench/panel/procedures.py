@@ -111,7 +111,7 @@ class Runs:
 
     def _follow(self, ours: int, process: subprocess.Popen[bytes], progress: Progress) -> None:
         rest = b""
-        while more := _read(ours):
+        while more := _read_terminal(ours):
             *whole, rest = re.split(rb"[\r\n]+", rest + more)
             for part in whole:
                 progress.take(part.decode(errors="replace"))
@@ -139,7 +139,7 @@ class Runs:
         }
 
 
-def _read(descriptor: int) -> bytes:
+def _read_terminal(descriptor: int) -> bytes:
     """b"": the other end is closed; Linux calls it EIO."""
     try:
         return os.read(descriptor, 65536)

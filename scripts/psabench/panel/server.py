@@ -125,7 +125,7 @@ class Pages:
                 text = await socket.receive_text()
             except (WebSocketDisconnect, KeyError):  # KeyError: Starlette's, for a binary message
                 return
-            request = parsed(text)
+            request = parse_request(text)
             why = "a request each was malformed" if request is None else ""
             if not allowance.take():
                 why = f"more than {allowance.per_s:g} messages a second"
@@ -154,7 +154,7 @@ class Pages:
             client.put_answer(json.dumps({"kind": "answer", "id": request.get("id"), "error": error}))
 
 
-def parsed(text: str) -> dict[str, Any] | None:
+def parse_request(text: str) -> dict[str, Any] | None:
     """A request: an object with a text "do"; None: malformed."""
     if len(text) > MESSAGE_BYTES:
         return None

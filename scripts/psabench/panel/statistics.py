@@ -16,7 +16,7 @@ POINTS = 160  # of the spectrum, at even ratios of frequency
 SEGMENT = 2048  # samples in a segment of the spectrum
 
 
-def statistics(t_s: Floats, values: Floats, unit: str) -> dict[str, Any]:
+def channel_statistics(t_s: Floats, values: Floats, unit: str) -> dict[str, Any]:
     """Of samples at an even rate. Raises BenchError for too few, or for a channel that not every sample has."""
     if len(values) < LEAST:
         raise BenchError(expected(f"at least {LEAST} samples", len(values), "statistics"))
@@ -27,7 +27,7 @@ def statistics(t_s: Floats, values: Floats, unit: str) -> dict[str, Any]:
         raise BenchError(expected("rising times of arrival", f"a step of {step_s:g} s", "statistics"))
     counts, edges = np.histogram(values, BINS)
     taus_s = _taus_s(len(values), step_s)
-    hz, density = spectrum(values, step_s)
+    hz, density = amplitude_density(values, step_s)
     return {
         "unit": unit,
         "count": len(values),
@@ -46,7 +46,7 @@ def _taus_s(count: int, step_s: float) -> list[float]:
     return [float(m) * step_s for m in steps]
 
 
-def spectrum(values: Floats, step_s: float) -> tuple[Floats, Floats]:
+def amplitude_density(values: Floats, step_s: float) -> tuple[Floats, Floats]:
     """Frequencies, Hz, and one-sided amplitude density per root Hz, by Welch's method: Hann, half overlap."""
     n = min(SEGMENT, len(values))
     window = np.hanning(n + 1)[:-1]

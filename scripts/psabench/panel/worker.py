@@ -321,14 +321,14 @@ def text_of(message: dict[str, Any]) -> str:
     try:
         return json.dumps(message, allow_nan=False, separators=(",", ":"))
     except ValueError:
-        return json.dumps(_finite(message), allow_nan=False, separators=(",", ":"))
+        return json.dumps(_without_nan(message), allow_nan=False, separators=(",", ":"))
 
 
-def _finite(x: Any) -> Any:
+def _without_nan(x: Any) -> Any:
     if isinstance(x, dict):
-        return {k: _finite(v) for k, v in x.items()}
+        return {k: _without_nan(v) for k, v in x.items()}
     if isinstance(x, list | tuple):
-        return [_finite(v) for v in x]
+        return [_without_nan(v) for v in x]
     return None if isinstance(x, float) and not math.isfinite(x) else x
 
 

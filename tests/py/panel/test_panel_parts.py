@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from psabench.errors import BenchError
 from psabench.link.signals import Floats
-from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, envelopes
+from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, split_envelopes
 from psabench.panel.guard import Allowance, Door, Log
 from psabench.panel.hub import UPDATES, Client
 from psabench.panel.procedures import Progress
-from psabench.panel.server import MESSAGE_BYTES, parsed
-from psabench.panel.statistics import spectrum, statistics
+from psabench.panel.server import MESSAGE_BYTES, parse_request
+from psabench.panel.statistics import amplitude_density, channel_statistics
 
 DOOR = Door(port=8000, token="secret-token")
 OWN = {"host": "127.0.0.1:8000", "cookie": "psabench_panel_8000=secret-token"}
@@ -89,8 +89,8 @@ def test_a_page_may_send_a_burst_and_then_a_rate() -> None:
     ["", "null", "[]", "{}", '{"do":1}', '{"do":"hello","id":"x"}', "[" * 4000, '{"do":"' + "x" * MESSAGE_BYTES + '"}'],
 )
 def test_malformed_requests_are_none(text: str) -> None:
-    assert parsed(text) is None
-    assert parsed('{"do":"hello","id":1}') == {"do": "hello", "id": 1}
+    assert parse_request(text) is None
+    assert parse_request('{"do":"hello","id":1}') == {"do": "hello", "id": 1}
 
 
 def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:
@@ -99,13 +99,13 @@ def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:
     x = np.zeros(n)
     x[517] = 1.0
     s = Samples(t_s=t_s, values=np.column_stack([x, np.full(n, np.nan)]), names=("x", "y"), units=("V", "V"))
-    found = envelopes(s)
+    found = split_envelopes(s)
     assert len(found) == 29  # 0.999 s in thirtieths
     assert [b.bands[0][1] for b in found if b.bands[0]].count(1.0) == 1
     assert all(b.bands[1] is None for b in found)
     assert found[-1].t_s == pytest.approx(0.999)
     long = Samples(t_s=t_s * 1000.0, values=s.values, names=s.names, units=s.units)
-    assert len(envelopes(long)) == MOST_BUCKETS
+    assert len(split_envelopes(long)) == MOST_BUCKETS
 
 
 def test_channels_start_again_when_time_goes_back() -> None:
@@ -136,19 +136,19 @@ def test_spectrum_and_allan_deviation_of_white_noise_and_a_sine() -> None:
     step_s, density = 1e-3, 2e-6  # one-sided, V per root Hz
     noise = rng.normal(0.0, density * np.sqrt(0.5 / step_s), 8192)
     t_s: Floats = np.arange(8192, dtype=np.float64) / 1000.0
-    found = statistics(t_s, noise, "V")
+    found = channel_statistics(t_s, noise, "V")
     assert np.sqrt(np.mean(np.square(found["spectrum"]["y"][40:]))) == pytest.approx(density, rel=0.05)
     for tau_s, deviation in list(zip(found["allan"]["x"], found["allan"]["y"], strict=True))[:20]:
         assert deviation == pytest.approx(density / np.sqrt(2 * tau_s), rel=0.25)
     assert sum(found["histogram"]["y"]) == 8192
-    hz, amplitude = spectrum(np.sin(2 * np.pi * 50.0 * t_s), step_s)
+    hz, amplitude = amplitude_density(np.sin(2 * np.pi * 50.0 * t_s), step_s)
     assert hz[np.argmax(amplitude)] == pytest.approx(50.0, rel=0.05)
 
 
 @pytest.mark.parametrize(("values", "words"), [(np.zeros(63), "64 samples"), (np.array([0.0, np.nan] * 50), "gaps")])
 def test_statistics_need_enough_samples_without_gaps(values: Any, words: str) -> None:
     with pytest.raises(BenchError, match=words):
-        statistics(np.arange(len(values), dtype=np.float64) / 1000.0, values, "V")
+        channel_statistics(np.arange(len(values), dtype=np.float64) / 1000.0, values, "V")
 
 
 # what a procedure prints | step, done, total, note
