@@ -67,9 +67,8 @@ class BenchView:
         if call is None:
             return text
         if call.command.name in NOT_HERE:
-            raise Wrong(
-                expected("a command of the panel; psabench shell --connect has all", call.command.name, "panel")
-            )
+            known = "a command of the panel; psabench shell --connect has all"
+            raise Wrong(expected(known, call.command.name, "panel"))
         names = [a for a in FILE_ARGS if a in call.args]
         if not names:
             return text
@@ -109,12 +108,8 @@ class BenchView:
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        return {
-            "kind": "hello",
-            **describe_bench(self.session),
-            "history": self._history(),
-            "snapshots": self.snapshots(),
-        }
+        kept = {"history": self._history(), "snapshots": self.snapshots()}
+        return {"kind": "hello", **describe_bench(self.session), **kept}
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name

@@ -117,12 +117,9 @@ class Channels:
 
     def message(self, buckets: list[Envelope]) -> Mapping[str, Any]:
         """For the page: columns rather than rows, as uPlot takes them; nine digits are more than a pixel."""
-        return {
-            "t": [b.t_s for b in buckets],
-            "bands": [
-                [[_nine_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in range(len(self.names))
-            ],
-        }
+        channels = range(len(self.names))
+        bands = [[[_nine_digits(b.bands[k], i) for b in buckets] for i in range(3)] for k in channels]
+        return {"t": [b.t_s for b in buckets], "bands": bands}
 
 
 def _nine_digits(band: tuple[float, float, float] | None, i: int) -> float | None:

@@ -34,9 +34,7 @@ def describe_command(c: Command) -> dict[str, Any]:
     """One form; of a fault one for each kind."""
     found: dict[str, Any] = {"what": c.what, "args": [describe_argument(a) for a in c.args]}
     if c.variants:
-        found["variants"] = {
-            k: {"what": v.what, "args": [describe_argument(a) for a in v.args]} for k, v in c.variants.items()
-        }
+        found["variants"] = {name: describe_command(variant) for name, variant in c.variants.items()}
         found["args"] = [describe_argument(c.args[0])]
     return found
 

@@ -112,10 +112,17 @@ class Worker:
             return
         finally:
             self.ready.set()
-        while not self._stop.is_set():
-            self._turn()
-        self._close()
-        self.runs.close()
+        try:
+            while not self._stop.is_set():
+                self._turn()
+        except Exception:
+            self.outlet.publish(
+                text_of({"kind": "lost", "why": "an error in the panel, see its terminal; start it again"})
+            )
+            raise
+        finally:
+            self._close()
+            self.runs.close()
 
     def _open(self) -> BenchView:
         view = self.opened()
@@ -309,7 +316,7 @@ HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = 
     "play": lambda w, request: w.play(request),
     "line": lambda w, request: w.line(str(request.get("line", ""))),
     "frame": lambda w, _: {"svg": w.view.frame()},
-    "statistics": lambda w, request: w.view.statistics(str(request.get("channel", ""))),
+    "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
     "restore": lambda w, request: w.restore(str(request.get("file", ""))),
     "run": _run_procedure,
     "stop": _stop_procedure,
