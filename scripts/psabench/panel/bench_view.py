@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from typing import Any
 from psabench.bench import Bench
 from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
+from psabench.link.can_host import CanHost
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, Envelope, samples_of
@@ -23,6 +25,7 @@ from psabench.shell.session import Session
 
 FILE_ARGS = ("path", "file")
 LONGEST_NAME = 100
+TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
@@ -122,6 +125,15 @@ class BenchView:
 
     # ---- what goes by itself
 
+    def receive(self, for_s: float) -> None:
+        """Spend real time receiving, from all buses alike: a full one must not keep the others waiting."""
+        hosts = list(self.bench.hosts.values())
+        deadline_s = time.monotonic() + for_s
+        while (left_s := deadline_s - time.monotonic()) > 0.0:
+            came = [any_received(host) for host in hosts]
+            if not any(came):
+                time.sleep(min(left_s, IDLE_S))
+
     def take(self, every_unit: bool) -> dict[str, Any]:
         """New buckets of the chosen unit; of the others, which are kept for the overview, when every_unit."""
         found: dict[str, Any] = {}
@@ -201,6 +213,14 @@ class BenchView:
         """Time of the bench, s."""
         t_ns = self.session.now_ns()
         return self.bench.time_s if t_ns is None else t_ns / 1e9
+
+
+def any_received(host: CanHost) -> bool:
+    """Take the frames that have come, TURN at most; whether there were any."""
+    if not host.receive(0.0):
+        return False
+    host.receive_taken(TURN)
+    return True
 
 
 def error_text(e: BenchError) -> str:

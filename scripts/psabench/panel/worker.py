@@ -173,7 +173,7 @@ class Worker:
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
         if view.bench.pace != "step":
-            view.bench.wait(self._updates.left_s)
+            view.receive(self._updates.left_s)
             return
         now_s = time.monotonic()
         if not self.playing:

@@ -162,3 +162,29 @@ def test_a_page_that_does_not_read_holds_up_no_other(panel: run.Running) -> None
         for _ in range(60):
             run.received(awake, "update")
         assert time.monotonic() - begun_s < 20.0
+
+
+@pytest.mark.parametrize(
+    ("scenario", "boards"),
+    [
+        ("converters", {"PIK", "PMKA", "PSD-1", "PSA-2"}),
+        ("gyrocompass", {"PSA-2", "GYRO"}),
+        ("receiver", {"RECEIVER"}),
+        ("sins_table", {"BINS"}),
+    ],
+)
+def test_units_of_every_board_show_channels_and_registers(scenario: str, boards: set[str], tmp_path: Path) -> None:
+    with run.running(scenario, "--out", tmp_path) as panel, panel.socket() as socket:
+        hello = run.received(socket, "hello")
+        assert {u["board"] for u in hello["units"]} == boards
+        first = {u["board"]: u["name"] for u in reversed(hello["units"])}
+        for k, (board, name) in enumerate(first.items()):
+            assert "error" not in run.said(socket, 10 * k + 1, f"dut.use {name}")
+            assert "error" not in run.said(socket, 10 * k + 2, "dut.start")
+            new: dict[str, object] = {}
+            while new.get("unit") != name:
+                new = run.received(socket, "update").get("new", {})
+            assert new["t"], board
+            banks = run.asked(socket, 10 * k + 3, do="hello")["registers"]
+            rows = [run.said(socket, 10 * k + 4, f"dut.registers {bank}")["result"]["registers"] for bank in banks]
+            assert all(rows), board

@@ -108,6 +108,7 @@ $("#frame").onclick = async () => {
     picture.hidden = false;
   } catch (error) { complain(error.message); }
 };
+$("#all-channels").onchange = plots.build;
 $("#compute").onclick = () => link.ask({ do: "statistics", channel: $("#channel").value }).then(statistics.show, (e) => complain(e.message));
 $("#window").onchange = plots.touch;
 $("#line").onsubmit = (event) => {

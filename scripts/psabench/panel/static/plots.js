@@ -2,7 +2,7 @@
 
 import { $, make } from "./page.js";
 
-const KEPT = 1800;
+const KEPT = 1800, FEW = 6;
 let unit = "", names = [], units = [], data = [], plots = [], dirty = false;
 
 export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -30,7 +30,8 @@ export function build() {
   for (const plot of plots) plot.destroy();
   const holder = $("#plots");
   holder.replaceChildren();
-  plots = names.map((name, k) => {
+  $("#all-channels").parentElement.hidden = names.length <= FEW;
+  plots = ($("#all-channels").checked ? names : names.slice(0, FEW)).map((name, k) => {
     const box = make("div", { "data-channel": name, role: "img", "aria-label": `channel ${name}` }, make("div", { class: "quiet" }));
     holder.append(box);
     return new uPlot(settings(name, units[k]), data[k], box);
