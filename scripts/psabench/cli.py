@@ -35,8 +35,8 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "nav": ("sins.command", "apply the calibration of an inertial unit to a recording, or export it"),
     "explore": ("explore.command", "play random schedules of faults and host behaviours, and check the requirements"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
+    "panel": ("panel.command_line", "show a bench as a web page: channels, registers, instruments, faults"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
-    "panel": ("panel.command_line", "serve a web page on this machine for a bench: channels, registers, instruments, faults"),
 }
 
 ABOUT = """\

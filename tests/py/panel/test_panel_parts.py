@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import sys
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from psabench import cli
 from psabench.errors import BenchError
 from psabench.link.signals import Floats
 from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, split_envelopes
@@ -167,3 +172,18 @@ def test_the_bar_of_a_procedure_is_understood(text: str, shown: tuple[str, int, 
     p.take(text)
     assert (p.step, p.done, p.total, p.note) == shown
     assert list(p.lines) == ([text] if not p.step else [])
+
+
+@pytest.mark.parametrize("name", ["uPlot.iife.min.js", "uPlot.min.css"])
+def test_the_file_of_another_project_is_the_one_that_the_page_names(name: str) -> None:
+    digest = hashlib.sha256((files("psabench.panel") / "static" / name).read_bytes()).hexdigest()
+    assert digest in (Path(__file__).parents[3] / "docs/sources.md").read_text()
+
+
+def test_without_the_extra_one_line_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "psabench.panel.command_run", raising=False)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    assert cli.main(["panel"]) == 2
+    assert capsys.readouterr().err == "psabench: panel: expected pip install psabench[panel], got no module uvicorn\n"
