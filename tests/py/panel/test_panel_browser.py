@@ -333,8 +333,9 @@ def test_the_page_looks_as_in_its_picture(browser: Browser, tmp_path: Path) -> N
         Image.open(tmp_path / "panel.png").convert("RGB").quantize(48).save(PICTURE, optimize=True)
     assert PICTURE.stat().st_size < 150_000
     difference = np.abs(blocks(tmp_path / "panel.png") - blocks(PICTURE))
-    assert difference.mean() < 0.02
-    assert (difference > 0.3).mean() < 0.01
+    # the same machine differs by 0.0008 and 0 blocks, one chart in another's place by 0.009 and 6 % of them
+    assert difference.mean() < 0.004
+    assert (difference > 0.05).mean() < 0.02
 
 
 def blocks(path: Path) -> npt.NDArray[np.float64]:
