@@ -40,6 +40,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "nav": ("sins.command", "apply the calibration of an inertial unit to a recording, or export it"),
     "explore": ("explore.command", "play random schedules of faults and host behaviours, and check the requirements"),
     "mavlink": ("mavlink.command", "be a MAVLink system for ground stations: readings, parameters, calibration"),
+    "panel": ("panel.command_line", "show a bench as a web page: channels, registers, instruments, faults"),
     "shell": ("shell.command_line", "open an interactive shell: instruments, device, faults"),
 }
 

@@ -70,8 +70,10 @@ def test_the_same_sources_make_the_same_wheel(wheel: Path) -> None:
 def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as z:
         files = {n.removeprefix("psabench/bundle/"): z.read(n) for n in z.namelist() if "/bundle/" in n}
+        panel = {n.removeprefix("psabench/panel/static/") for n in z.namelist()}
         ours = [n for n, data in files.items() if str(ROOT).encode() in data]
     assert ours == []
+    assert {"index.html", "main.js", "panel.css", "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"} <= panel
     libraries = {"lib/libpsabench.so.0", "lib/libpsabench-nav.so.1"}
     assert libraries | {"bin/psa-emu", "include/psabench.h", "share/psabench/proto/psabench.dbc"} <= set(files)
     for folder in ("proto", "decoders", "share"):

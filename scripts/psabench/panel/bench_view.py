@@ -1,0 +1,228 @@
+"""An open bench as the panel needs it: lines carried out, time moved, channels and frames kept, state read."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from psabench.bench import Bench
+from psabench.boards.psa2.device import Psa2
+from psabench.errors import BenchError, ControlError, expected
+from psabench.link.can_host import CanHost
+from psabench.link.vcd import read_vcd
+from psabench.panel.can_trace import CanTrace
+from psabench.panel.channels import Channels, Envelope, samples_of
+from psabench.panel.describe import NOT_HERE, describe_bench
+from psabench.panel.statistics import channel_statistics
+from psabench.report.waveform import frame_picture
+from psabench.shell.grammar import Call, parse
+from psabench.shell.lexer import Wrong
+from psabench.shell.session import Session
+
+FILE_ARGS = ("path", "file")
+LONGEST_NAME = 100
+TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
+SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
+FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
+
+
+@dataclass(slots=True)
+class BenchView:
+    """Used in the worker's thread alone. out: the only folder that a line may write into."""
+
+    bench: Bench
+    out: Path
+    start: str = ""
+    tick: Callable[[], None] = lambda: None
+    session: Session = field(init=False)
+    channels: dict[str, Channels] = field(init=False)
+    traces: list[CanTrace] = field(init=False)
+    _viewed_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.session = Session(self.bench, self.start, tick=self.tick)
+        self.channels = {name: Channels() for name in self.bench.units}
+        self.traces = [self._trace(bus) for bus in self.bench.hosts]
+
+    def _trace(self, bus: str) -> CanTrace:
+        host = self.bench.hosts[bus]
+        boards = {u.node.node_id: u.board for u in self.bench.units.values() if u.host is host}
+        trace = CanTrace(bus, boards)
+        host.listeners.append(trace.on_message)
+        return trace
+
+    # ---- what a page asks for
+
+    def line(self, text: str) -> dict[str, Any]:
+        """Carry out one line of the shell. Raises Wrong or another BenchError."""
+        outcome = self.session.do(self._allowed(text))
+        if outcome is None:
+            return {"text": "", "result": {}}
+        return {"line": outcome.call.line, "text": outcome.text, "result": outcome.result, "failed": outcome.failed}
+
+    def _allowed(self, text: str) -> str:
+        """The line, with files in our folder. Raises Wrong."""
+        call = parse(text, self.session.vocabulary)
+        if call is None:
+            return text
+        if call.command.name in NOT_HERE:
+            known = "a command of the panel; psabench shell --connect has all"
+            raise Wrong(expected(known, call.command.name, "panel"))
+        names = [a for a in FILE_ARGS if a in call.args]
+        if not names:
+            return text
+        self.out.mkdir(parents=True, exist_ok=True)
+        return Call(call.command, call.args | {a: str(self.file(str(call.args[a]))) for a in names}).line
+
+    def file(self, name: str) -> Path:
+        """A file of that name in our folder. Raises Wrong."""
+        plain = name.replace("-", "a").replace("_", "a").replace(".", "a")
+        if not (plain.isascii() and plain.isalnum()) or name.startswith(".") or len(name) > LONGEST_NAME:
+            raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
+        return self.out / name
+
+    def frame(self) -> str:
+        """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""
+        if not isinstance(self.session.dut, Psa2):
+            raise BenchError(expected("a PSA-2", f"a {self.session.dut.title}", "frame"))
+        self.out.mkdir(parents=True, exist_ok=True)
+        path = self.out / "frame.vcd"
+        self.bench.probe.start(path, self.session.dut_name, limit_mb=FRAME_MB)
+        try:
+            self.bench.wait(FRAME_S)
+        finally:
+            self.bench.probe.stop()
+        try:
+            return frame_picture(read_vcd(path))
+        except ValueError as e:
+            raise BenchError(f"frame: {e}") from e
+
+    def channel_statistics(self, channel: str) -> dict[str, Any]:
+        """Of a channel of the chosen unit. Raises BenchError."""
+        c = self.channels.get(self.session.dut_name, Channels())
+        if channel not in c.names:
+            known = ", ".join(c.names) or "a channel: no sample has come"
+            raise BenchError(expected(known, repr(channel[:40]), "channel"))
+        return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
+
+    def describe(self) -> dict[str, Any]:
+        """The whole state of the page, for one that opens or has missed something."""
+        kept = {"history": self._history(), "snapshots": self.snapshots()}
+        return {"kind": "hello", **describe_bench(self.session), **kept}
+
+    def _history(self) -> dict[str, Any]:
+        name = self.session.dut_name
+        return self._of_unit(name, list(self.channels[name].history)) if name in self.channels else {}
+
+    def snapshots(self) -> list[str]:
+        """Snapshots in our folder, the latest first."""
+        found = [p for p in self.out.glob(f"*{SNAPSHOT}") if p.is_file()]
+        return [p.name for p in sorted(found, key=lambda p: p.stat().st_mtime_ns, reverse=True)[:SNAPSHOTS]]
+
+    # ---- what goes by itself
+
+    def receive(self, for_s: float) -> None:
+        """Spend real time receiving, from all buses alike: a full one must not keep the others waiting."""
+        hosts = list(self.bench.hosts.values())
+        deadline_s = time.monotonic() + for_s
+        while (left_s := deadline_s - time.monotonic()) > 0.0:
+            came = [any_received(host) for host in hosts]
+            if not any(came):
+                time.sleep(min(left_s, IDLE_S))
+
+    def take(self, every_unit: bool) -> dict[str, Any]:
+        """New buckets of the chosen unit; of the others, which are kept for the overview, when every_unit."""
+        found: dict[str, Any] = {}
+        for name, unit in self.bench.units.items():
+            if name != self.session.dut_name and not every_unit:
+                continue
+            buckets = self.channels[name].add(samples_of(unit.frames.take()))
+            if name == self.session.dut_name and buckets:
+                found = self._of_unit(name, buckets)
+        return found
+
+    def _of_unit(self, name: str, buckets: list[Envelope]) -> dict[str, Any]:
+        c = self.channels[name]
+        return {"unit": name, "names": c.names, "units": c.units, **c.message(buckets)}
+
+    def state(self, *, lines: bool) -> dict[str, Any]:
+        """Instruments, faults, lines, counters of the bench, and the overview of units."""
+        asked = {name: self._maybe(*call) for name, call in self._questions(lines).items()}
+        counters = asked.pop("counters")
+        return {
+            "kind": "state",
+            "instruments": {k: v for k, v in asked.items() if v and k not in ("faults", "lines")},
+            "faults": asked["faults"].get("faults", []),
+            "lines": asked.get("lines", {}).get("lines", {}),
+            "bus": counters.get("bus", {}),
+            "late": counters.get("pace", {}).get("late"),
+            "files": counters.get("files", []),
+            "counters": counters.get("units", {}).get(self.session.dut_name, {}),
+            "overview": self._overview(),
+        }
+
+    def _questions(self, lines: bool) -> dict[str, tuple[str, Mapping[str, object]]]:
+        unit: dict[str, object] = {"unit": self.session.dut_name} if self.session.dut_name else {}
+        return {
+            **({"lines": ("lines", unit)} if lines else {}),
+            "counters": ("counters", {}),
+            "faults": ("fault.list", {}),
+            "head": ("head.read", {}),
+            "table": ("table.read", {"axis": 1}),
+            "chamber": ("chamber.read", {}),
+            "supply": ("supply.read", {}),
+        }
+
+    def _maybe(self, command: str, args: Mapping[str, object]) -> dict[str, Any]:
+        if self.bench.pace == "real" or command.split(".")[0] in self.session.vocabulary.absent:
+            return {}
+        with suppress(ControlError):
+            return self.bench.control.call(command, **args).result
+        return {}
+
+    def _overview(self) -> list[dict[str, Any]]:
+        rows = []
+        for name, unit in self.bench.units.items():
+            c, counters = self.channels[name], unit.frames.counters
+            last = c.history[-1].bands if c.history else ()
+            shown = [
+                [n, None if b is None else float(f"{b[2]:.7g}"), u]
+                for n, b, u in zip(c.names, last, c.units, strict=False)
+            ]
+            rows.append(
+                {"name": name, "board": unit.title, "samples": c.count, "lost": counters.lost,
+                 "torn": getattr(counters, "torn", 0), "last": shown[:6]}
+            )  # fmt: skip
+        return rows
+
+    def can(self, now_s: float) -> dict[str, Any]:
+        """The CAN card."""
+        span_s, self._viewed_s = now_s - self._viewed_s, now_s
+        return {"kind": "can", "buses": [t.view(span_s) for t in self.traces]}
+
+    def truth(self) -> dict[str, Any]:
+        """Only for pages whose switch is on. Raises BenchError."""
+        unit = self.session.dut_name or None
+        return {"kind": "truth", "state": self.bench.truth_state(unit)}
+
+    def now_s(self) -> float:
+        """Time of the bench, s."""
+        t_ns = self.session.now_ns()
+        return self.bench.time_s if t_ns is None else t_ns / 1e9
+
+
+def any_received(host: CanHost) -> bool:
+    """Take the frames that have come, TURN at most; whether there were any."""
+    if not host.receive(0.0):
+        return False
+    host.receive_taken(TURN)
+    return True
+
+
+def error_text(e: BenchError) -> str:
+    """For a page: the column that the shell's errors have is of no use there."""
+    return str(e)

@@ -1,0 +1,349 @@
+"""The thread that has the bench: it moves time, carries out what pages ask for, and publishes 30 times a second."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from psabench.bench import Bench
+from psabench.errors import BenchError, LinkError, expected
+from psabench.panel.bench_view import BenchView, error_text
+from psabench.panel.procedures import OFFERED, Runs
+
+UPDATE_S = 1 / 30
+STATE_S = 0.25
+CAN_S = 0.2
+OVERVIEW_S = 0.5
+RETRY_S = 1.0  # real time between looks whether an emulator is there again
+WAITING = 64  # requests; a page that asks for more is refused
+SLOWEST, FASTEST = 0.001, 1000.0  # of simulated time to real time
+
+
+class Outlet(Protocol):
+    """Where texts go; called in the worker's thread."""
+
+    def publish(self, text: str, *, truth: bool = False) -> None: ...
+    def answer(self, number: int, text: str) -> None: ...
+    def wants_truth(self) -> bool: ...
+    def wants_lines(self) -> bool: ...
+    def is_watched(self) -> bool: ...
+
+
+@dataclass(slots=True)
+class Due:
+    """Whether something is due, by real time."""
+
+    every_s: float
+    _next_s: float = 0.0
+
+    @property
+    def left_s(self) -> float:
+        """Until it is due again, at most every_s."""
+        return min(max(self._next_s - time.monotonic(), 0.0), self.every_s)
+
+    def __call__(self) -> bool:
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            return False
+        self._next_s += self.every_s
+        if self._next_s < now_s:  # late: no burst to catch up
+            self._next_s = now_s + self.every_s / 2
+        return True
+
+
+@dataclass(slots=True)
+class Worker:
+    """opened: brings up the bench; called again after it was lost. again: whether it comes back by itself."""
+
+    opened: Callable[[], BenchView]
+    outlet: Outlet
+    runs: Runs
+    restored: Callable[[Path], BenchView] | None = None  # a view of a bench from a snapshot; None: it is another's
+    playing: bool = True
+    speed: float = 1.0
+    requests: queue.Queue[tuple[int, dict[str, Any]]] = field(default_factory=lambda: queue.Queue(WAITING))
+    ready: threading.Event = field(default_factory=threading.Event)
+    failed: BenchError | None = None  # of the first opening
+    lost: str = ""
+    busy: str = ""
+    _view: BenchView | None = None
+    _stop: threading.Event = field(default_factory=threading.Event)
+    _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
+    _states: Due = field(default_factory=lambda: Due(STATE_S))
+    _cans: Due = field(default_factory=lambda: Due(CAN_S))
+    _overviews: Due = field(default_factory=lambda: Due(OVERVIEW_S))
+    _thread: threading.Thread | None = None
+    _moved_s: float = 0.0
+
+    # ---- from the server's thread
+
+    def start(self) -> None:
+        """Returns when the bench is up. Raises its BenchError."""
+        self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
+        self._thread.start()
+        self.ready.wait()
+        if self.failed is not None:
+            raise self.failed
+
+    def stop(self) -> None:
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(10.0)
+
+    def ask(self, number: int, request: dict[str, Any]) -> None:
+        """Raises queue.Full."""
+        self.requests.put_nowait((number, request))
+
+    # ---- in its own
+
+    def _run(self) -> None:
+        try:
+            self._view = self._open()
+        except BenchError as e:
+            self.failed = e
+            return
+        finally:
+            self.ready.set()
+        try:
+            while not self._stop.is_set():
+                self._turn()
+        except Exception:
+            self.outlet.publish(
+                text_of({"kind": "lost", "why": "an error in the panel, see its terminal; start it again"})
+            )
+            raise
+        finally:
+            self._close()
+            self.runs.close()
+
+    def _open(self) -> BenchView:
+        view = self.opened()
+        view.session.tick = self._tick
+        self._moved_s = time.monotonic()
+        return view
+
+    def _close(self) -> None:
+        if self._view is not None:
+            with suppress(Exception):  # a connection that is lost closes as it likes
+                self._view.bench.close()
+        self._view = None
+
+    def _turn(self) -> None:
+        try:
+            if self._view is None:
+                self._come_back()
+            self._answer_all()
+            if self._view is not None:
+                self._move(self._view)
+                self._say_news()
+        except (LinkError, OSError) as e:
+            self._lose(str(e))
+        except BenchError as e:
+            self._lose(f"the bench does not go on: {e}")
+
+    def _lose(self, why: str) -> None:
+        self.lost, self.busy = why, ""
+        self._close()
+        self.outlet.publish(text_of({"kind": "lost", "why": why}))
+
+    def _come_back(self) -> None:
+        self._stop.wait(RETRY_S)
+        try:
+            self._view = self._open()
+        except (BenchError, OSError):
+            self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
+            return
+        self.lost = ""
+        self.outlet.publish(text_of(self.hello()))
+
+    def hello(self) -> dict[str, Any]:
+        if self._view is None:
+            return {"kind": "lost", "why": self.lost}
+        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.restored is not None}
+        return self._view.describe() | {"time": self._time()} | procedures
+
+    def _move(self, view: BenchView) -> None:
+        """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
+        if view.bench.pace != "step":
+            view.receive(self._updates.left_s)
+            return
+        now_s = time.monotonic()
+        if not self.playing:
+            self._moved_s = now_s
+            self._wait_request(self._updates.left_s)
+            return
+        passed_s, self._moved_s = min(now_s - self._moved_s, 2 * UPDATE_S), now_s
+        view.bench.wait(passed_s * self.speed)
+        self._wait_request(self._updates.left_s)
+
+    def _wait_request(self, for_s: float) -> None:
+        """Sleep, but not while a page waits for an answer."""
+        deadline_s = time.monotonic() + for_s
+        while self.requests.empty() and (left_s := deadline_s - time.monotonic()) > 0 and not self._stop.is_set():
+            time.sleep(min(left_s, 0.005))
+
+    def _tick(self) -> None:
+        """While a long line goes on: pages see it go."""
+        self._say_news()
+        if self._stop.is_set():
+            raise BenchError("panel: ended")
+
+    def _say_news(self) -> None:
+        view = self._view
+        if view is None or not self._updates():
+            return
+        buckets = view.take(self._overviews())
+        if not self.outlet.is_watched():
+            return
+        self.outlet.publish(text_of({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
+        if self._states():
+            self.outlet.publish(text_of(view.state(lines=self.outlet.wants_lines())))
+            if self.outlet.wants_truth():
+                self._say_truth(view)
+        if self._cans():
+            self.outlet.publish(text_of(view.can(view.now_s())))
+
+    def _say_truth(self, view: BenchView) -> None:
+        try:
+            message = view.truth()
+        except BenchError as e:
+            message = {"kind": "truth", "error": str(e)}
+        self.outlet.publish(text_of(message), truth=True)
+
+    def _time(self) -> dict[str, Any]:
+        assert self._view is not None
+        return {
+            "t_s": round(self._view.now_s(), 9),
+            "playing": self.playing or self._view.bench.pace != "step",
+            "speed": self.speed,
+            "busy": self.busy,
+        }
+
+    # ---- requests
+
+    def _answer_all(self) -> None:
+        for _ in range(WAITING):
+            try:
+                number, request = self.requests.get_nowait()
+            except queue.Empty:
+                return
+            self._answer(number, request)
+
+    def _answer(self, number: int, request: dict[str, Any]) -> None:
+        try:
+            result = self._result(request)
+        except (LinkError, OSError):
+            self.outlet.answer(
+                number, text_of({"kind": "answer", "id": request.get("id"), "error": "the bench is gone"})
+            )
+            raise
+        except (BenchError, ValueError) as e:
+            text = error_text(e) if isinstance(e, BenchError) else str(e)
+            result = {"kind": "answer", "error": text}
+        finally:
+            self.busy = ""
+        self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
+
+    def _result(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Raises BenchError for what cannot be done."""
+        what = str(request.get("do"))
+        handler = HANDLERS.get(what)
+        if handler is None:
+            raise BenchError(expected(", ".join(HANDLERS), repr(what[:40]), "do"))
+        return {"kind": "answer", **handler(self, request)}
+
+    @property
+    def view(self) -> BenchView:
+        """The bench. Raises BenchError while it is lost."""
+        if self._view is None:
+            raise BenchError(f"panel: no bench: {self.lost}")
+        return self._view
+
+    def line(self, text: str) -> dict[str, Any]:
+        """Carry out a line of the shell."""
+        self.busy = text[:200]
+        before = self.view.session.dut_name
+        done = self.view.line(text)
+        self._moved_s = time.monotonic()
+        if str(done.get("line", "")).startswith("bench.snapshot "):
+            self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
+        if self.view.session.dut_name != before:
+            self.outlet.publish(text_of(self.hello()))
+        return done
+
+    def restore(self, name: str) -> dict[str, Any]:
+        """Go back: an emulator from the snapshot takes the place of ours. Raises BenchError, and ours goes on."""
+        if self.restored is None:
+            raise BenchError("panel: go back: this emulator was not started by the panel")
+        new = self.restored(self.view.file(name))
+        self._close()
+        self._view = new
+        new.session.tick = self._tick
+        self.playing, self._moved_s = False, time.monotonic()
+        self.outlet.publish(text_of(self.hello()))
+        return {}
+
+    def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        speed = request.get("speed", self.speed)
+        if isinstance(speed, bool) or not isinstance(speed, int | float) or not SLOWEST <= speed <= FASTEST:
+            raise BenchError(expected(f"{SLOWEST:g} to {FASTEST:g}", repr(speed)[:40], "speed"))
+        self.playing, self.speed = request.get("on") is True, float(speed)
+        self._moved_s = time.monotonic()
+        return {"time": self._time()}
+
+
+def _run_procedure(w: Worker, request: Mapping[str, Any]) -> dict[str, Any]:
+    w.runs.start(str(request.get("name", "")))
+    return {}
+
+
+def _stop_procedure(w: Worker, _: Mapping[str, Any]) -> dict[str, Any]:
+    w.runs.stop()
+    return {}
+
+
+# What a page may ask for, by its "do"; `watch` is the server's own.
+HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = {
+    "hello": lambda w, _: w.hello(),
+    "play": lambda w, request: w.play(request),
+    "line": lambda w, request: w.line(str(request.get("line", ""))),
+    "frame": lambda w, _: {"svg": w.view.frame()},
+    "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
+    "restore": lambda w, request: w.restore(str(request.get("file", ""))),
+    "run": _run_procedure,
+    "stop": _stop_procedure,
+}
+
+
+def text_of(message: dict[str, Any]) -> str:
+    """JSON that a browser reads: it has no NaN."""
+    try:
+        return json.dumps(message, allow_nan=False, separators=(",", ":"))
+    except ValueError:
+        return json.dumps(_without_nan(message), allow_nan=False, separators=(",", ":"))
+
+
+def _without_nan(x: Any) -> Any:
+    if isinstance(x, dict):
+        return {k: _without_nan(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [_without_nan(v) for v in x]
+    return None if isinstance(x, float) and not math.isfinite(x) else x
+
+
+def bench_of(opened: Callable[[], Bench], make: Callable[[Bench], BenchView]) -> BenchView:
+    """A view of a bench that is closed again where there is none to be had."""
+    bench = opened()
+    try:
+        return make(bench)
+    except BaseException:
+        bench.close()
+        raise

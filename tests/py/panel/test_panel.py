@@ -1,0 +1,190 @@
+"""The panel as a process, over HTTP and its WebSocket: what it serves, refuses, carries out, and how it comes back."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import panel_run as run
+import pytest
+from psabench.emulator import Emulator
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
+
+LINES = ("dut.ready", "head.turn 30", "wait 0.3", "faults.add sensor.bias a.sensor.x bias_v=0.1 for_s=0.1", "wait 0.2")
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[run.Running]:
+    with run.running("quiet", "--seed", "3", "--out", tmp_path_factory.mktemp("out")) as p:
+        yield p
+
+
+def test_the_token_becomes_a_cookie_and_every_file_is_ours(panel: run.Running) -> None:
+    first = panel.http(f"/?token={panel.token}")
+    assert first.status == 303
+    cookie = first.headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    page = panel.http("/", Cookie=panel.cookie)
+    assert page.status == 200
+    assert "default-src 'none'" in page.headers["Content-Security-Policy"]
+    html = page.read().decode()
+    links = re.findall(r'(?:src|href)="([^"]+)"', html)
+    assert links
+    for link in links:
+        assert link.startswith("/static/")
+        assert panel.http(link, Cookie=panel.cookie).status == 200
+        assert panel.http(link).status == 401
+    assert panel.http("/static/..%2Fguard.py", Cookie=panel.cookie).status == 404
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [({"Host": "evil.example"}, 421), ({"Origin": "http://evil.example"}, 403), ({"Cookie": ""}, 401)],
+)
+def test_hostile_requests_get_nothing(panel: run.Running, headers: dict[str, str], status: int) -> None:
+    assert panel.http("/", **({"Cookie": panel.cookie} | headers)).status == status
+    if "Host" not in headers:  # the client library sends its own
+        with pytest.raises(InvalidStatus) as refused:
+            panel.socket(**headers)
+        assert refused.value.response.status_code == 403
+
+
+def test_the_page_gets_commands_registers_and_channels(panel: run.Running) -> None:
+    with panel.socket() as socket:
+        hello = run.received(socket, "hello")
+        assert hello["pace"] == "step"
+        assert hello["commands"]["head.turn"]["args"][0]["unit"] == "deg"
+        assert "bench.quit" not in hello["commands"]
+        dr = next(f for f in hello["registers"]["x"]["CONFIG0"] if f["name"] == "DR")
+        assert "1000 /s" in dr["meaning"].values()
+        assert run.said(socket, 1, "dut.ready").get("error") is None
+        assert run.said(socket, 2, "dut.start").get("error") is None
+        new = run.received(socket, "update")
+        while "new" not in new:
+            new = run.received(socket, "update")
+        assert new["new"]["names"] == ["x", "y", "z", "t"]
+        low, high, mean = (column[0] for column in new["new"]["bands"][0])
+        assert low <= mean <= high
+        can = run.received(socket, "can")
+        assert {"PSA2_XY", "PSA2_ZT"} <= {row["name"] for row in can["buses"][0]["ids"]}
+
+
+def test_the_emulator_checks_what_is_written_and_files_stay_in_one_folder(panel: run.Running) -> None:
+    with panel.socket() as socket:
+        row = run.said(socket, 1, "dut.write x CONFIG0 DR=2")["result"]
+        assert "DR 2" in row["fields"]
+        assert "error" in run.said(socket, 2, "dut.write x ID 05h")  # read-only
+        assert "CONFIG0.DR: expected 0 to 7" in run.said(socket, 3, "dut.write x CONFIG0 DR=9")["error"]
+        for name in ("../x", "/tmp/x", ".x", "a/b", ""):
+            assert "error" in run.said(socket, 4, f'bench.snapshot "{name}"')
+        assert "expected a command of the panel" in run.said(socket, 5, "bench.quit")["error"]
+
+
+def test_truth_comes_only_to_a_page_that_has_switched_it_on(panel: run.Running) -> None:
+    with panel.socket() as shut, panel.socket() as opened:
+        opened.send(json.dumps({"do": "watch", "live": True, "truth": True}))
+        assert "state" in run.received(opened, "truth")
+        kinds = {json.loads(shut.recv(timeout=run.WAIT_S))["kind"] for _ in range(60)}
+        assert "truth" not in kinds
+
+
+def test_the_last_frame_is_drawn_with_its_words(panel: run.Running) -> None:
+    with panel.socket() as socket:
+        run.said(socket, 1, "dut.ready")
+        svg = run.asked(socket, 2, do="frame")["svg"]
+    assert svg.startswith("<svg")
+    assert "X =" in svg
+
+
+def send_until_closed(socket: ClientConnection, messages: Sequence[str | bytes]) -> None:
+    for message in messages:
+        socket.send(message)
+    while True:
+        socket.recv(timeout=run.WAIT_S)
+
+
+def test_floods_and_malformed_messages_close_the_page_with_one_line_each() -> None:
+    with run.running("quiet", "--paused") as panel:
+        for messages in (["{"], [json.dumps({"do": "line", "line": "head.turn 5"})] * 2000, ["x" * 100_000], [b"\xff"]):
+            for _ in range(3):
+                with panel.socket() as socket, pytest.raises(ConnectionClosed):
+                    send_until_closed(socket, messages)
+        for _ in range(5):
+            panel.http("/", Host="evil.example", Cookie=panel.cookie)
+        with panel.socket() as socket:
+            assert run.said(socket, 1, "time")["result"]["t_s"] == 0.0  # and nothing has moved
+        lines = panel.end().splitlines()
+    assert len(lines) == len(set(lines)) == 3, lines
+
+
+def test_the_same_lines_by_panel_and_shell_end_in_the_same_state(tmp_path: Path) -> None:
+    with run.running("quiet", "--seed", "3", "--paused", "--out", tmp_path) as panel, panel.socket() as socket:
+        for k, line in enumerate((*LINES, "bench.snapshot by-panel")):
+            assert "error" not in run.said(socket, k + 1, line)
+    words = [w for line in (*LINES, f"bench.snapshot {tmp_path / 'by-shell'}") for w in ("--command", line)]
+    subprocess.run([sys.executable, "-m", "psabench.cli", "shell", "quiet", "--seed", "3", *words], check=True)
+    digests = [re.findall(r'"state":"([0-9a-f]{64})"', (tmp_path / n).read_text()) for n in ("by-panel", "by-shell")]
+    assert digests[0]
+    assert digests[0] == digests[1]
+
+
+def test_an_emulator_that_dies_and_returns_is_found_again(tmp_path: Path) -> None:
+    control = tmp_path / "psa.ctl"
+
+    def emulator() -> Emulator:
+        return Emulator("quiet", cans=["socketcand:0"], pace="wall", control=False, extra=["--control", control])
+
+    first = emulator().__enter__()
+    try:
+        with run.running("--connect", control, "--out", tmp_path) as panel, panel.socket() as socket:
+            assert run.received(socket, "hello")["pace"] == "wall"
+            first.stop()
+            assert "closed by the emulator" in run.received(socket, "lost")["why"]
+            assert "no bench" in run.said(socket, 1, "time")["error"]
+            with emulator():
+                assert run.received(socket, "hello")["units"]
+                assert "error" not in run.said(socket, 2, "head.turn 10")
+    finally:
+        first.stop()
+
+
+def test_a_page_that_does_not_read_holds_up_no_other(panel: run.Running) -> None:
+    with panel.socket() as asleep, panel.socket() as awake:
+        run.received(asleep, "hello")
+        begun_s = time.monotonic()
+        for _ in range(60):
+            run.received(awake, "update")
+        assert time.monotonic() - begun_s < 20.0
+
+
+@pytest.mark.parametrize(
+    ("scenario", "boards"),
+    [
+        ("converters", {"PIK", "PMKA", "PSD-1", "PSA-2"}),
+        ("gyrocompass", {"PSA-2", "GYRO"}),
+        ("receiver", {"RECEIVER"}),
+        ("sins_table", {"BINS"}),
+    ],
+)
+def test_units_of_every_board_show_channels_and_registers(scenario: str, boards: set[str], tmp_path: Path) -> None:
+    with run.running(scenario, "--out", tmp_path) as panel, panel.socket() as socket:
+        hello = run.received(socket, "hello")
+        assert {u["board"] for u in hello["units"]} == boards
+        first = {u["board"]: u["name"] for u in reversed(hello["units"])}
+        for k, (board, name) in enumerate(first.items()):
+            assert "error" not in run.said(socket, 10 * k + 1, f"dut.use {name}")
+            assert "error" not in run.said(socket, 10 * k + 2, "dut.start")
+            new: dict[str, object] = {}
+            while new.get("unit") != name:
+                new = run.received(socket, "update").get("new", {})
+            assert new["t"], board
+            banks = run.asked(socket, 10 * k + 3, do="hello")["registers"]
+            rows = [run.said(socket, 10 * k + 4, f"dut.registers {bank}")["result"]["registers"] for bank in banks]
+            assert all(rows), board
