@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -17,6 +19,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 LINES = ("dut.ready", "head.turn 30", "wait 0.3", "faults.add sensor.bias a.sensor.x bias_v=0.1 for_s=0.1", "wait 0.2")
+
+LOST = re.compile("connection (closed|lost)|gone away")  # CAN or the control socket, whichever is used first
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +150,7 @@ def test_an_emulator_that_dies_and_returns_is_found_again(tmp_path: Path) -> Non
         with run.running("--connect", control, "--out", tmp_path) as panel, panel.socket() as socket:
             assert run.received(socket, "hello")["pace"] == "wall"
             first.stop()
-            assert "closed by the emulator" in run.received(socket, "lost")["why"]
+            assert LOST.search(run.received(socket, "lost")["why"])
             assert "no bench" in run.said(socket, 1, "time")["error"]
             with emulator():
                 assert run.received(socket, "hello")["units"]
@@ -188,3 +192,20 @@ def test_units_of_every_board_show_channels_and_registers(scenario: str, boards:
             banks = run.asked(socket, 10 * k + 3, do="hello")["registers"]
             rows = [run.said(socket, 10 * k + 4, f"dut.registers {bank}")["result"]["registers"] for bank in banks]
             assert all(rows), board
+
+
+def test_an_emulator_of_the_panel_that_dies_is_started_again(tmp_path: Path) -> None:
+    with run.running("quiet", "--out", tmp_path) as panel, panel.socket() as socket:
+        run.received(socket, "hello")
+        (child,) = children(panel.process.pid)
+        os.kill(child, signal.SIGKILL)
+        assert LOST.search(run.received(socket, "lost")["why"])
+        assert run.received(socket, "hello")["units"]
+        assert children(panel.process.pid) != [child]
+        assert "error" not in run.said(socket, 1, "head.turn 10")
+
+
+def children(pid: int) -> list[int]:
+    """Processes that any thread of this one has started."""
+    lists = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(word) for path in lists for word in path.read_text().split()]
