@@ -102,7 +102,7 @@ def test_a_page_without_a_place_is_named(names: list[str], more: list[dict[str, 
 
 
 def test_a_folder_that_a_page_links_to_becomes_a_list(pages: build.Pages) -> None:
-    assert "](docs/chips/index.md)" in pages.texts["README.md"]
+    assert "](docs/chips/index.md)" in pages.texts["CONTRIBUTING.md"]
     assert "[ads1282.md](ads1282.md)" in pages.texts["docs/chips/index.md"]
     assert "emu/chip/ads1282/regs.c" not in pages.texts
 
