@@ -147,8 +147,9 @@ static int clear_path(const struct sockaddr_un *a, long *owner)
 static int listen_as(const char *path, int fd)
 {
     struct sockaddr_un a = {.sun_family = AF_UNIX};
-    snprintf(a.sun_path, sizeof a.sun_path, "%s~", path);
-    unlink(a.sun_path); /* of a process that was killed here */
+    struct stat left;
+    snprintf(a.sun_path, sizeof a.sun_path, "%s.%ld", path, (long)getpid());
+    if (lstat(a.sun_path, &left) == 0 && S_ISSOCK(left.st_mode)) unlink(a.sun_path); /* its process was killed here */
     if (bind(fd, (struct sockaddr *)&a, sizeof a) < 0) return -errno;
     const bool named = listen(fd, LISTENER_BACKLOG) == 0 && link(a.sun_path, path) == 0;
     const int err = named ? 0 : -errno;

@@ -10,7 +10,7 @@
 
 #define CTL_LINE_MAX    4096u
 #define CTL_CLIENTS_MAX 16u
-#define CTL_PATH_MAX    106u /* bytes; the socket has one more until it listens */
+#define CTL_PATH_MAX    99u /* bytes; until it listens the name of the socket has a process number more */
 
 struct ctl_client;
 

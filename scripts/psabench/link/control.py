@@ -99,7 +99,7 @@ class Control(AbstractContextManager["Control"]):
                     raise
                 raise LinkError(f"control socket: {command}: no reply within {REPLY_S:g} s") from None
             except OSError as e:
-                raise LinkError(f"control socket: {command}: {e}") from e
+                raise LinkError(f"control socket: {command}: connection lost ({e.strerror})") from e
             if not more:
                 raise LinkError(f"control socket: {command}: connection closed by the emulator")
             self._bytes += more

@@ -87,6 +87,8 @@ class BenchView:
 
     def frame(self) -> str:
         """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""
+        if not self.bench.units:
+            raise BenchError(expected("a PSA-2", "no unit", "frame"))
         if not isinstance(self.session.dut, Psa2):
             raise BenchError(expected("a PSA-2", f"a {self.session.dut.title}", "frame"))
         self.out.mkdir(parents=True, exist_ok=True)

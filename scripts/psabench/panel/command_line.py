@@ -49,5 +49,6 @@ def _run_panel(args: argparse.Namespace) -> int:
     try:
         from psabench.panel import command_run
     except ModuleNotFoundError as e:
-        raise BadInput(expected("pip install psabench[panel]", f"no module {e.name}", "panel")) from e
+        lacks = expected("the extra 'panel'", f"no module {e.name}", "panel")
+        raise BadInput(f"{lacks}; pip install 'psabench[panel]'") from e
     return command_run.run(args)

@@ -22,29 +22,33 @@ class Client:
     lines: bool = False  # it shows the levels of the lines, which the emulator computes for whoever looks
     live: bool = True  # False: its tab is hidden
     missed: bool = False  # updates were dropped: it needs the whole state
-    answers: deque[str] = field(default_factory=lambda: deque(maxlen=ANSWERS))
-    updates: deque[str] = field(default_factory=lambda: deque(maxlen=UPDATES))
+    answers: int = 0  # of the texts that wait
+    texts: deque[tuple[bool, str]] = field(default_factory=deque)  # whether it is an answer; oldest first
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
     def put_update(self, text: str) -> None:
         if not self.live:
             return
-        if len(self.updates) == UPDATES:
-            self.updates.clear()
+        if len(self.texts) - self.answers == UPDATES:
+            self.texts = deque(t for t in self.texts if t[0])
             self.missed = True
-        self.updates.append(text)
+        self.texts.append((False, text))
         self.wake.set()
 
     def put_answer(self, text: str) -> None:
-        self.answers.append(text)
+        if self.answers < ANSWERS:
+            self.answers += 1
+            self.texts.append((True, text))
         self.wake.set()
 
     async def next_text(self) -> str:
-        """Waits for something to send; answers go first."""
-        while not self.answers and not self.updates:
+        """Waits for something to send."""
+        while not self.texts:
             self.wake.clear()
             await self.wake.wait()
-        return (self.answers or self.updates).popleft()
+        is_answer, text = self.texts.popleft()
+        self.answers -= is_answer
+        return text
 
 
 @dataclass(slots=True)

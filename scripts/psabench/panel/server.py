@@ -24,7 +24,7 @@ from psabench.panel.procedures import OFFERED, REPORT
 
 MESSAGE_BYTES = 4096  # of a request; a line of the shell is shorter
 PAGES = 32  # at the same time
-POLICY, TOO_MANY = 1008, 1013  # RFC 6455, 7.4.1, and its registry
+POLICY, TOO_LONG, TOO_MANY = 1008, 1009, 1013  # RFC 6455, 7.4.1, and its registry
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css", "LICENSE": "text/plain"}
 
@@ -121,14 +121,18 @@ class Pages:
         """Until the page goes, or does what ours never does: then it is closed and one line is logged."""
         allowance = Allowance()
         while True:
-            try:
-                text = await socket.receive_text()
-            except (WebSocketDisconnect, KeyError):  # KeyError: Starlette's, for a binary message
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                if message.get("code") == TOO_LONG:
+                    why = expected(f"messages of up to {MESSAGE_BYTES} bytes", "more", "page")
+                    self._log.once(f"closed a page: {why}")
                 return
-            request = parse_request(text)
-            why = "a request each was malformed" if request is None else ""
+            request = parse_request(message.get("text") or "")
+            why = (
+                expected("requests, JSON objects with a text do", "another message", "page") if request is None else ""
+            )
             if not allowance.take():
-                why = f"more than {allowance.per_s:g} messages a second"
+                why = expected(f"up to {allowance.per_s:g} messages a second", "more", "page")
             if why or request is None:
                 self._log.once(f"closed a page: {why}")
                 with suppress(RuntimeError):
@@ -156,7 +160,7 @@ class Pages:
 
 def parse_request(text: str) -> dict[str, Any] | None:
     """A request: an object with a text "do"; None: malformed."""
-    if len(text) > MESSAGE_BYTES:
+    if len(text.encode()) > MESSAGE_BYTES:
         return None
     try:
         request = json.loads(text)

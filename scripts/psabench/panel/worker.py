@@ -7,6 +7,7 @@ import math
 import queue
 import threading
 import time
+import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -240,17 +241,20 @@ class Worker:
     def _answer(self, number: int, request: dict[str, Any]) -> None:
         try:
             result = self._result(request)
-        except (LinkError, OSError):
-            self.outlet.answer(
-                number, text_of({"kind": "answer", "id": request.get("id"), "error": "the bench is gone"})
-            )
-            raise
-        except (BenchError, ValueError) as e:
-            text = error_text(e) if isinstance(e, BenchError) else str(e)
-            result = {"kind": "answer", "error": text}
+        except Exception as e:  # whatever a page asks for, the others go on
+            result = {"kind": "answer", "error": self._error_of(e)}
         finally:
             self.busy = ""
         self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
+        if "error" in result and self._view is not None:
+            self._view.now_s()  # raises LinkError where it was the bench that has gone, and not a unit that is silent
+
+    def _error_of(self, e: Exception) -> str:
+        if isinstance(e, BenchError):
+            return error_text(e)
+        if not isinstance(e, ValueError | OSError):
+            traceback.print_exception(e)
+        return str(e) if isinstance(e, ValueError | OSError) else f"panel: internal error, see its terminal: {e!r}"
 
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
@@ -277,7 +281,7 @@ class Worker:
             self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
         if self.view.session.dut_name != before:
             self.outlet.publish(text_of(self.hello()))
-        return done
+        return done | {"time": self._time()}
 
     def restore(self, name: str) -> dict[str, Any]:
         """Go back: an emulator from the snapshot takes the place of ours. Raises BenchError, and ours goes on."""
@@ -289,7 +293,7 @@ class Worker:
         new.session.tick = self._tick
         self.playing, self._moved_s = False, time.monotonic()
         self.outlet.publish(text_of(self.hello()))
-        return {}
+        return {"time": self._time()}
 
     def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)

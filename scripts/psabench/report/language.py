@@ -109,14 +109,16 @@ def localised_page(page: str) -> str:
 
 def take_option(words: Sequence[str]) -> tuple[list[str], str]:
     """--lang LANG or --lang=LANG, anywhere in a command line: the other words, and the language. Raises BadInput."""
-    left, name = list(words), ENGLISH
-    for i, word in enumerate(words):
+    left, name, rest = [], ENGLISH, iter(words)
+    for word in rest:
         if word == OPTION:
-            if i + 1 == len(words):
+            name = next(rest, "")
+            if not name:
                 raise BadInput(expected("a value", "none", OPTION))
-            left, name = [*words[:i], *words[i + 2 :]], words[i + 1]
         elif word.startswith(f"{OPTION}="):
-            left, name = [*words[:i], *words[i + 1 :]], word.partition("=")[2]
+            name = word.partition("=")[2]
+        else:
+            left.append(word)
     return left, name
 
 
@@ -134,4 +136,4 @@ def load_language(name: str) -> Language | None:
     import polib  # of who asks for a translation
 
     catalogue = polib.pofile(str(LOCALE / f"{name}.po"))
-    return Language(name=name, texts={e.msgid: e.msgstr for e in catalogue})
+    return Language(name=name, texts={e.msgid: e.msgstr for e in catalogue if not e.fuzzy and not e.obsolete})

@@ -145,7 +145,7 @@ def test_a_malformed_profile_is_refused_with_the_arithmetic(
         ("--line {file}", 3, "expected a new name or a symbolic link to a pty"),
         ("--unit q", 2, '--unit: expected a unit of the scenario, got "q"'),
         ("--control {file}", 3, "expected a new path or a socket, got another file"),
-        ("--control {long}", 3, "up to 106 bytes"),
+        ("--control {long}", 3, "up to 99 bytes"),
         ("--truth {dir}/no/such", 3, "No such file or directory"),
         ("--frobnicate", 2, "expected an option that --help lists, got --frobnicate"),
         ("--vcd", 2, "--vcd: expected an argument, got none"),

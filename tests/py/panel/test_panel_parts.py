@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import sys
 from importlib.resources import files
@@ -41,6 +42,7 @@ REQUESTS = [
     (scope("http", {"host": "127.0.0.1:8000"}), 401),
     (scope("http", {"host": "127.0.0.1:8000"}, query="token=secret-tokem"), 401),
     (scope("http", {"host": "127.0.0.1:8000"}, query="token=secret-token", path="/static/main.js"), 401),
+    (scope("http", {"host": "127.0.0.1:8000", "cookie": 'x={"a":1}; psabench_panel_8000=secret-token'}), 0),
     (scope("http", {"host": "127.0.0.1:8000", "cookie": "psabench_panel_8000="}), 401),
     (scope("http", {"host": "127.0.0.1:8000", "cookie": "psabench_panel_8001=secret-token"}), 401),
     (scope("http", {}, query="token=secret-token"), 421),
@@ -127,13 +129,28 @@ def test_a_page_that_sleeps_has_a_bounded_queue_and_the_newest_update() -> None:
     client = Client()
     for k in range(10 * UPDATES + 7):
         client.put_update(str(k))
-    assert len(client.updates) <= UPDATES
-    assert client.updates[-1] == str(10 * UPDATES + 6)
+    assert len(client.texts) <= UPDATES
+    assert client.texts[-1] == (False, str(10 * UPDATES + 6))
     assert client.missed
     client.live = False
-    before = list(client.updates)
+    before = list(client.texts)
     client.put_update("hidden")
-    assert list(client.updates) == before
+    assert list(client.texts) == before
+
+
+def test_answers_stay_in_order_and_are_never_dropped_for_updates() -> None:
+    client = Client()
+    client.put_update("before")
+    client.put_answer("answer")
+    for k in range(UPDATES):
+        client.put_update(str(k))
+    sent = [asyncio.run(client.next_text()) for _ in range(len(client.texts))]
+    assert sent == ["answer", str(UPDATES - 1)]  # the others came to a page that was full
+    client.put_update("before")
+    client.put_answer("answer")
+    client.put_update("after")
+    assert [asyncio.run(client.next_text()) for _ in range(3)] == ["before", "answer", "after"]
+    assert client.answers == 0
 
 
 def test_spectrum_and_allan_deviation_of_white_noise_and_a_sine() -> None:
@@ -186,4 +203,6 @@ def test_without_the_extra_one_line_says_what_to_install(
     monkeypatch.delitem(sys.modules, "psabench.panel.command_run", raising=False)
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     assert cli.main(["panel"]) == 2
-    assert capsys.readouterr().err == "psabench: panel: expected pip install psabench[panel], got no module uvicorn\n"
+    assert capsys.readouterr().err == (
+        "psabench: panel: expected the extra 'panel', got no module uvicorn; pip install 'psabench[panel]'\n"
+    )

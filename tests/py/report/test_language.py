@@ -85,6 +85,7 @@ def test_no_entry_is_there_twice() -> None:
         (["run", "turns", "--lang", "ru", "-v"], ["run", "turns", "-v"], "ru"),
         (["--lang=ru", "run", "turns"], ["run", "turns"], "ru"),
         (["run", "turns"], ["run", "turns"], "en"),
+        (["--lang", "en", "run", "--lang=ru"], ["run"], "ru"),
     ],
 )
 def test_the_option_stands_anywhere(words: list[str], left: list[str], name: str) -> None:

@@ -18,6 +18,7 @@ const link = new Link(take, (text) => {
 async function say(line, quiet = false) {
   try {
     const answer = await link.say(line);
+    time(answer.time);
     complain("");
     if (!quiet || answer.failed) log(line, answer.text);
     return answer;

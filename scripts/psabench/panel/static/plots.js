@@ -71,4 +71,4 @@ export function draw() {
 
 export function touch() { dirty = true; }
 export function resize() { for (const plot of plots) plot.setSize({ width: width(), height: plot.height }); }
-export const shown = () => ({ unit, names, points: data.length ? data[0][0].length : 0, last: data.map((c) => c[3].at(-1)) });
+export const shown = () => ({ unit, names, points: data.length ? data[0][0].length : 0, t_s: data.length ? data[0][0].at(-1) ?? 0 : 0, last: data.map((c) => c[3].at(-1)) });
