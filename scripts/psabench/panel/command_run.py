@@ -40,11 +40,12 @@ def run(args: argparse.Namespace) -> int:
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
     worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
     with _listen_loopback(args.port) as listener:
-        worker.start()
         try:
+            worker.start()
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
                 asyncio.run(_serve(listener, hub, worker, runs.out))
         finally:
+            runs.close()
             worker.stop()
     return 0
 

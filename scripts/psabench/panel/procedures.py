@@ -14,6 +14,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,7 @@ class Runs:
         """Ctrl-C, if one is running."""
         if self._process is not None and self._process.poll() is None:
             self._stopped = True
-            os.killpg(self._process.pid, signal.SIGINT)
+            _signal_group(self._process.pid, signal.SIGINT)
 
     def close(self) -> None:
         """With the panel."""
@@ -107,7 +108,8 @@ class Runs:
             try:
                 self._process.wait(END_S)
             except subprocess.TimeoutExpired:
-                os.killpg(self._process.pid, signal.SIGKILL)
+                _signal_group(self._process.pid, signal.SIGKILL)
+                self._process.wait()
 
     def _follow(self, ours: int, process: subprocess.Popen[bytes], progress: Progress) -> None:
         rest = b""
@@ -137,6 +139,11 @@ class Runs:
             "lines": list(p.lines),
             "report": report if p.state != "running" else "",
         }
+
+
+def _signal_group(pid: int, number: signal.Signals) -> None:
+    with suppress(ProcessLookupError):  # it has just ended
+        os.killpg(pid, number)
 
 
 def _read_terminal(descriptor: int) -> bytes:

@@ -123,7 +123,6 @@ class Worker:
             raise
         finally:
             self._close()
-            self.runs.close()
 
     def _open(self) -> BenchView:
         view = self.opened()
