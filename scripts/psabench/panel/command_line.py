@@ -6,8 +6,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.errors import BadInput, expected
+from psabench.errors import expected
 from psabench.options import BUS_HELP, Parser, add_scpi, node_id
+from psabench.places import no_package
 
 EPILOG = """\
 examples:
@@ -49,6 +50,5 @@ def _run_panel(args: argparse.Namespace) -> int:
     try:
         from psabench.panel import command_run
     except ModuleNotFoundError as e:
-        lacks = expected("the extra 'panel'", f"no module {e.name}", "panel")
-        raise BadInput(f"{lacks}; pip install 'psabench[panel]'") from e
+        raise no_package(e, "panel") from e
     return command_run.run(args)

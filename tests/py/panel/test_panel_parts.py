@@ -204,5 +204,5 @@ def test_without_the_extra_one_line_says_what_to_install(
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     assert cli.main(["panel"]) == 2
     assert capsys.readouterr().err == (
-        "psabench: panel: expected the extra 'panel', got no module uvicorn; pip install 'psabench[panel]'\n"
+        "psabench: panel: expected the extra 'panel', got none; pip install 'psabench[panel]'\n"
     )
