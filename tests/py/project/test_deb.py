@@ -50,7 +50,7 @@ echo "== library"
 printf '%s\n' '#include <psabench.h>' '#include <stdio.h>' \
     'int main(void) { psabench *b = psabench_new(1); puts(b ? "bench" : "none"); psabench_free(b); }' > a.c
 cc a.c $(pkg-config --cflags --libs psabench) -o a && ./a
-SIGROKDECODE_DIR= sigrok-cli -L | grep -c psd1cycle
+PYTHONDONTWRITEBYTECODE=1 SIGROKDECODE_DIR= sigrok-cli -L | grep -c psd1cycle
 man -w psabench psa-emu
 echo "== extras"
 python3 -c 'import matplotlib' 2> /dev/null || psabench run turns 2>&1 || true
@@ -62,7 +62,11 @@ diff before after && echo "== nothing left"
 
 
 def run(command: Sequence[str | Path], stdin: Path | None = None) -> str:
-    env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "PYTHONPATH")}
+    env = {
+        k: v
+        for k, v in os.environ.items()
+        if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE")
+    }
     with stdin.open("rb") if stdin else open(os.devnull, "rb") as given:
         done = subprocess.run(command, cwd=ROOT, env=env, stdin=given, capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
