@@ -167,7 +167,7 @@ RULES = {
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
     # 64,140, 68,580 and 2,211 before the articles' last devices: modes of heading, MEMS gyros, pairs, climates.
     # 65,350, 72,772 and 2,302 before the panel, viewers, packages, notebooks, site and reports in Russian.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_415, 65_415),
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_414, 65_414),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 74_890, 74_890),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_392, 2_392),
 }

@@ -364,8 +364,7 @@ static bool open_socket(struct ctl_server *s, const char *option, const char *pa
                         path, owner);
     if (err == -EEXIST)
         return why_fail(why, cap, "--%s %s: expected a new path or a socket, got another file", option, path);
-    if (err == -ENAMETOOLONG)
-        return why_fail(why, cap, "--%s %s: expected a path of up to %u bytes", option, path, CTL_PATH_MAX);
+    if (err == -ENAMETOOLONG) return why_fail(why, cap, "--%s %s: expected up to %u bytes", option, path, CTL_PATH_MAX);
     return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
 }
 

@@ -19,7 +19,7 @@ class Client:
 
     number: int = field(default_factory=lambda: next(_numbers))
     truth: bool = False  # its switch
-    lines: bool = False  # it shows the levels of the lines, which the emulator computes for whoever looks
+    lines: bool = False  # it shows the levels of the lines; the emulator computes them only when they are read
     live: bool = True  # False: its tab is hidden
     missed: bool = False  # updates were dropped: it needs the whole state
     answers: int = 0  # of the texts that wait

@@ -286,10 +286,8 @@ def test_a_recording_ends_at_its_limit_and_its_size_is_told_meanwhile(tmp_path: 
             control.call("run", for_s=5.1)
             control.call("vcd.stop")
     assert 498_000 < path.stat().st_size <= 500_000
-    part = read_vcd(path)
-    for name, wire in read_vcd(
-        tmp_path / "all.vcd"
-    ).wires.items():  # every edge before the closing time, at which it ends
+    part, whole = read_vcd(path), read_vcd(tmp_path / "all.vcd")
+    for name, wire in whole.wires.items():  # every edge before the closing time, at which it ends
         before = wire.t_ns < part.end_ns
         assert part.wires[name].t_ns.tolist() == wire.t_ns[before].tolist()
         assert part.wires[name].level.tolist() == wire.level[before].tolist()
