@@ -168,7 +168,7 @@ RULES = {
     # 64,140, 68,580 and 2,211 before the articles' last devices: modes of heading, MEMS gyros, pairs, climates.
     # 65,350, 72,772 and 2,302 before the panel, viewers, packages, notebooks, site and reports in Russian.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_414, 65_414),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 74_890, 74_890),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 74_878, 74_878),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_392, 2_392),
 }
 

@@ -143,6 +143,13 @@ def natural(text: str) -> int:
     return int(text)
 
 
+def port_number(text: str) -> int:
+    """A TCP port; 0: any free one."""
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(expected("a TCP port, 0 to 65535", repr(text)))
+    return int(text)
+
+
 def positive(text: str) -> float:
     try:
         value = float(text)

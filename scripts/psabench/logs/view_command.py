@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psabench.errors import BadInput, expected
-from psabench.options import CAN_HELP, Parser, add_board, node_of, positive
+from psabench.options import CAN_HELP, Parser, add_board, node_of, port_number, positive
 from psabench.places import no_package
 
 PORT = 8765  # what Foxglove offers
@@ -46,7 +46,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     live.add_argument("--can", help=CAN_HELP)
     add_board(live, "whose frames are decoded")
     live.add_argument(
-        "--port", type=_view_port, default=PORT, help="TCP port on 127.0.0.1; 0: a free one (%(default)s)"
+        "--port", type=port_number, default=PORT, help="TCP port on 127.0.0.1; 0: a free one (%(default)s)"
     )
     live.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     live.add_argument("--v-per-g", type=positive, default=1.0, help="nominal scale of /nodeN/imu, V/g (%(default)g)")
@@ -58,12 +58,6 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     if both:
         raise BadInput(expected(f"a file or {both[0]}", "both", "view"))
     return args
-
-
-def _view_port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(expected("a TCP port, 0 to 65535", repr(text)))
-    return int(text)
 
 
 def _run_view(args: argparse.Namespace) -> int:

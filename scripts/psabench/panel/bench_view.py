@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -24,7 +25,7 @@ from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
 
 FILE_ARGS = ("path", "file")
-LONGEST_NAME = 100
+PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
 TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
@@ -80,8 +81,7 @@ class BenchView:
 
     def file(self, name: str) -> Path:
         """A file of that name in our folder. Raises Wrong."""
-        plain = name.replace("-", "a").replace("_", "a").replace(".", "a")
-        if not (plain.isascii() and plain.isalnum()) or name.startswith(".") or len(name) > LONGEST_NAME:
+        if not PLAIN_NAME.fullmatch(name):
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
         return self.out / name
 
@@ -223,8 +223,3 @@ def any_received(host: CanHost) -> bool:
         return False
     host.receive_taken(TURN)
     return True
-
-
-def error_text(e: BenchError) -> str:
-    """For a page: the column that the shell's errors have is of no use there."""
-    return str(e)

@@ -6,8 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.errors import expected
-from psabench.options import BUS_HELP, Parser, add_scpi, node_id
+from psabench.options import BUS_HELP, Parser, add_scpi, node_id, port_number
 from psabench.places import no_package
 
 EPILOG = """\
@@ -31,19 +30,13 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     panel.add_argument("--paused", action="store_true", help="in step pace: time stands still until the page says so")
     panel.add_argument("--connect", "--control", type=Path, metavar="CONTROL", help="control socket of an emulator")
     panel.add_argument("--truth", type=Path, metavar="SOCKET", help="truth port of that emulator")
-    panel.add_argument("--port", type=_port_number, default=0, help="port on 127.0.0.1 (any free one)")
+    panel.add_argument("--port", type=port_number, default=0, help="port on 127.0.0.1 (any free one)")
     panel.add_argument("--out", type=Path, default=Path("build/panel"), help="folder for files (%(default)s)")
     panel.add_argument("--seed", type=int, help="random seed; overrides the scenario")
     panel.add_argument("--can", help=f"{BUS_HELP}; default: the bus of the emulator")
     add_scpi(panel, "VISA address of an instrument; may be repeated")
     panel.add_argument("--node", type=node_id, help="CANopen node of the unit (the emulator's, else 5)")
     return panel.parse_args(words)
-
-
-def _port_number(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(expected("a port, 0 to 65535", repr(text)))
-    return int(text)
 
 
 def _run_panel(args: argparse.Namespace) -> int:

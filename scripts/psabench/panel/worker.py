@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
-from psabench.panel.bench_view import BenchView, error_text
+from psabench.panel.bench_view import BenchView
 from psabench.panel.procedures import OFFERED, Runs
 
 UPDATE_S = 1 / 30
@@ -249,11 +249,10 @@ class Worker:
             self._view.now_s()  # raises LinkError where it was the bench that has gone, and not a unit that is silent
 
     def _error_of(self, e: Exception) -> str:
-        if isinstance(e, BenchError):
-            return error_text(e)
-        if not isinstance(e, ValueError | OSError):
-            traceback.print_exception(e)
-        return str(e) if isinstance(e, ValueError | OSError) else f"panel: internal error, see its terminal: {e!r}"
+        if isinstance(e, BenchError | ValueError | OSError):
+            return str(e)
+        traceback.print_exception(e)
+        return f"panel: internal error, see its terminal: {e!r}"
 
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""

@@ -20,6 +20,7 @@ from websockets.sync.client import ClientConnection
 
 LINES = ("dut.ready", "head.turn 30", "wait 0.3", "faults.add sensor.bias a.sensor.x bias_v=0.1 for_s=0.1", "wait 0.2")
 
+HELLOS = 40  # of 100 kB each
 LOST = re.compile("connection (closed|lost)|gone away")  # CAN or the control socket, whichever is used first
 
 
@@ -182,10 +183,14 @@ def test_an_emulator_that_dies_and_returns_is_found_again(tmp_path: Path) -> Non
 def test_a_page_that_does_not_read_holds_up_no_other(panel: run.Running) -> None:
     with panel.socket() as asleep, panel.socket() as awake:
         run.received(asleep, "hello")
+        for k in range(HELLOS):  # which it does not read: more than the buffers on the way take
+            asleep.send(json.dumps({"id": k + 1, "do": "hello"}))
         begun_s = run.received(awake, "update")["time"]["t_s"]
         for _ in range(2 * UPDATES):
             now_s = run.received(awake, "update")["time"]["t_s"]
         assert now_s > begun_s
+        while run.received(asleep, "hello").get("id") is not None:  # awake again, it gets the whole state instead
+            pass
 
 
 @pytest.mark.parametrize(
