@@ -3,7 +3,6 @@
 
 Usage:
     build.py [--out DIR]    default build/site; exit 1 with Sphinx's warnings if there is one
-    build.py --check PAGE ... [--out DIR]   resolve every link of all pages, write these alone
 
 Pages stay where they are. They are copied to build/site-src beside what is made for the site alone: the start page and the
 navigation (navigation.yaml), lists of folders that a page links to, the reference of libraries and of the Python package.
@@ -174,7 +173,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Command line; see the module's text. Returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
     parser.add_argument("--out", type=Path, default=OUT, help="folder of the site (build/site)")
-    parser.add_argument("--check", nargs="+", metavar="PAGE", help="pages to write: index, docs/links, ...")
     args = parser.parse_args(argv)
     if not PACKAGES.is_dir():
         print(f"{PACKAGES.relative_to(ROOT)}: expected packages, got none: tools/setup site", file=sys.stderr)
@@ -186,13 +184,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     trees = Path(f"{SOURCE}-doctrees")
     for folder in (args.out, trees):
         shutil.rmtree(folder, ignore_errors=True)
-    common = ["-q", "-c", str(HERE), "-d", str(trees), str(SOURCE)]
-    if args.check:
-        unread = int(build_main(["-W", "-b", "dummy", *common, f"{trees}/none"]))
-        paths = [str(next(SOURCE / (p + e) for e in PAGE if (SOURCE / (p + e)).is_file())) for p in args.check]
-        # Not strict: a search index of some pages is a warning.
-        return unread or int(build_main(["-b", "html", *common, str(args.out), *paths]))
-    status = int(build_main(["-W", "-b", "html", *common, str(args.out)]))
+    status = int(build_main(["-q", "-W", "-b", "html", "-c", str(HERE), "-d", str(trees), str(SOURCE), str(args.out)]))
     if status == 0:
         print(f"site: {args.out}/index.html")
     return status
