@@ -101,7 +101,7 @@ def test_the_misfit_of_a_curve_is_pooled_over_the_methods_that_measured_it() -> 
         "test",
         "three points",
     )
-    bench = FakeThermalBench(noise_v=0.0)
+    bench = FakeThermalBench(noise_v=2e-7)
     recordings = measure_schedule(bench, schedule, RunStart(origin_s=0.0, chamber_degc=25.0), ThermalWatch())
     found = estimate_run(recordings, schedule, 9.81, BenchAccuracy(**EXACT)).budget
     f = found.fitted["soak", "zero_x_ug"]
