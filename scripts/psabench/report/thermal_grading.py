@@ -119,11 +119,10 @@ def _graded_rows(result: ThermalResult, truth: ThermalTruth) -> list[GradedAt]:
     """At the coldest, the normal and the hottest temperature of the soak that a method's fits have reached."""
     rows = []
     for m in result.methods:
-        budget = m.budget(result.accuracy)
         for k in _graded_at(m, truth.element_c, result.normal_c):
             temp_c = float(truth.element_c[k])
             for q in quantity_names():
-                e = budget.estimate_at(q, temp_c)
+                e = result.budget.estimate_at(m.name, q, temp_c)
                 true = float(truth.points.quantity(q)[k])
                 rows.append(GradedAt(method=m.name, temp_c=temp_c, estimate=e, truth=true, error=e.value - true))
     return rows

@@ -93,8 +93,7 @@ def _method_section(report: ThermalReport, m: Method, ident: str) -> str:
 def _budget_table(report: ThermalReport, m: Method) -> list[tuple[str, ...]]:
     """Standard uncertainties at the normal temperature, of the quantities of x."""
     rows: list[tuple[str, ...]] = [("", "component", "u", "unit")]
-    budget = m.budget(report.result.accuracy)
-    for e in (budget.estimate_at(q, report.result.normal_c) for q in m.fits if "_x" in q):
+    for e in (e for e in report.result.estimates[m.name] if "_x" in e.name):
         rows += [(e.name, c.name, f"{c.u:.2g}", e.unit) for c in e.budget]
     return rows
 

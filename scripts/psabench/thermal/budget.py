@@ -26,6 +26,7 @@ from psabench.thermal.reduce import ARCSEC, AXES, Points, face_of, turning_axes
 
 TEMP_U_K = 0.05  # standard uncertainty of the case's sensor (E0)
 PLAY_K = 0.3  # limit of how far the way to a temperature moves what the element feels (E0)
+Key = tuple[str, str]  # method and quantity
 NOTHING = Excess(square=0.0, variance=0.0)
 SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn again at each turn
 
@@ -34,11 +35,16 @@ SCALE_U_ARCSEC = 1.0 / 12.0**0.5  # of the head's scale, read to 1 arcsec; drawn
 class Fitted:
     """A quantity by one method, with what is known of how it was measured."""
 
+    method: str  # soak; sweep-1
     points: Points
     best: Compensation
     leftover: Leftover
     settling_k: float  # that the element may miss the case by, at the end of a dwell
     play: bool  # whether the way to a temperature was not that of the soak
+
+    @property
+    def key(self) -> Key:
+        return self.method, self.best.quantity
 
     @property
     def kind(self) -> str:
@@ -77,14 +83,14 @@ def symbol_of(quantity: str) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Budget:
-    """Of all quantities by one method, by name: what is more than noise is found over those that share its cause."""
+    """Of all quantities by all methods: what is more than noise is found over those that share its cause."""
 
-    fitted: Mapping[str, Fitted]
+    fitted: Mapping[Key, Fitted]
     accuracy: BenchAccuracy
 
-    def estimate_at(self, quantity: str, temp_c: float) -> Estimate:
+    def estimate_at(self, method: str, quantity: str, temp_c: float) -> Estimate:
         """The quantity at a temperature of the element, with its budget."""
-        f = self.fitted[quantity]
+        f = self.fitted[method, quantity]
         gain, dof = f.leftover.noise_gain(f.best, temp_c), (BLOCKS - 1) * len(f.points.history[0])
         value, scatter = float(f.best.value_at(temp_c)), _readings_noise(f) * gain
         made = estimate(quantity, symbol_of(quantity), unit_of(quantity), value, scatter, dof)
@@ -96,27 +102,27 @@ class Budget:
 
     def _point_parts(self, f: Fitted, gain: float) -> Iterator[Component]:
         yield Component(name="head", u=_head_noise(f, self.accuracy) * gain)
-        between, misfit = self._between[f.best.quantity], self._misfit[f.best.quantity]
+        between, misfit = self._between[f.key], self._misfit[f.key]
         yield from excess_lines({"between recordings": between.times(gain**2), "misfit": misfit})
 
     @cached_property
-    def _between(self) -> dict[str, Excess]:
+    def _between(self) -> dict[Key, Excess]:
         """Of one point: what is beyond the next orders. Tilts of the mounting are in what the head moves alone."""
-        return self._pooled(self._rough_square, by=lambda f: (f.kind, f.moves_with_head))
+        return self._pooled(self._rough_square, by=lambda f: (f.kind, f.moves_with_head, f.method))
 
     @cached_property
-    def _misfit(self) -> dict[str, Excess]:
-        """What the polynomial leaves, rms over the points."""
+    def _misfit(self) -> dict[Key, Excess]:
+        """What the polynomial leaves, rms over the points: the curve is the same for all methods."""
         return self._pooled(self._smooth_square, by=lambda f: f.kind)
 
     def _pooled(
         self, square: Callable[[Fitted], MeanSquare | None], by: Callable[[Fitted], Hashable]
-    ) -> dict[str, Excess]:
+    ) -> dict[Key, Excess]:
         """Over the groups of quantities that share the cause."""
-        groups: dict[Hashable, dict[str, MeanSquare]] = {}
-        for name, f in self.fitted.items():
+        groups: dict[Hashable, dict[Key, MeanSquare]] = {}
+        for key, f in self.fitted.items():
             if (made := square(f)) is not None:
-                groups.setdefault(by(f), {})[name] = made
+                groups.setdefault(by(f), {})[key] = made
         found = dict.fromkeys(self.fitted, NOTHING)
         for group in groups.values():
             found |= excess_of(group)
@@ -144,7 +150,7 @@ class Budget:
         return MeanSquare(
             value=smooth.total / smooth.noise_part,
             dof=smooth.dof,
-            noise=self._known(f) + self._between[f.best.quantity].square,
+            noise=self._known(f) + self._between[f.key].square,
             gain=f.leftover.n / smooth.noise_part,
             drawn=False,
             source=_source_of(f),
@@ -153,7 +159,7 @@ class Budget:
 
 def _source_of(f: Fitted) -> Hashable:
     """Of what is drawn: a tilt is the same for all axes that the head turns on one face, noise is each quantity's."""
-    return face_of(f.axis_pair[1]) if f.moves_with_head else f.best.quantity
+    return f.method, face_of(f.axis_pair[1]) if f.moves_with_head else f.best.quantity
 
 
 def _readings_noise(f: Fitted) -> float:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from psabench.thermal.compensation import Array
 
 ALIKE_P = 0.05  # chance that a group whose cause is the same is taken for one of different causes
 LARGE = 1e3  # noncentrality from which chi-square is as good as normal
+K = TypeVar("K", bound=Hashable)
 LEAST = 1e-12  # variance, of the largest one of a group: no weight is infinite
 
 
@@ -70,7 +72,7 @@ class Excess:
         return Excess(square=self.square * factor, variance=self.variance * factor**2)
 
 
-def excess_of(each: Mapping[str, MeanSquare]) -> dict[str, Excess]:
+def excess_of(each: Mapping[K, MeanSquare]) -> dict[K, Excess]:
     """Of a group of quantities: one for all of them, or each its own."""
     squares = list(each.values())
     weights = _weights_of(np.array([s.variance(0.0) for s in squares]))

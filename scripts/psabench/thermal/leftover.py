@@ -17,7 +17,7 @@ from numpy.polynomial.chebyshev import chebvander
 from psabench.thermal.compensation import Array, Compensation, SweepCase, scale_temperature
 from psabench.thermal.reduce import AXES, Curves, Points, Quantities
 
-NEXT_ORDERS = 3  # beyond the degree: what a polynomial leaves of a smooth curve is in them
+NEXT_ORDERS = 2  # beyond the degree, an odd and an even one: what a polynomial leaves of a smooth curve is in them
 TAU_STEP = 1e-4  # of the lag, for its derivative
 
 

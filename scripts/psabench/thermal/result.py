@@ -11,7 +11,7 @@ import numpy.typing as npt
 from psabench.budget.accuracy import BenchAccuracy
 from psabench.errors import BadInput
 from psabench.estimate.uncertainty import Estimate
-from psabench.thermal.budget import Budget, Fitted
+from psabench.thermal.budget import Budget, Fitted, Key
 from psabench.thermal.compensation import (
     Compensation,
     element_temperature,
@@ -62,13 +62,20 @@ class Method:
     settling_k: float = 0.0  # that the element may miss the case by, at the end of a dwell
     play: bool = True  # whether the way to a temperature was not that of the soak
 
-    def budget(self, accuracy: BenchAccuracy) -> Budget:
-        """Of its quantities, on a bench of this accuracy."""
-        fitted = {
-            q: Fitted(points=self.points, best=f.best, leftover=f.leftover, settling_k=self.settling_k, play=self.play)
+    @property
+    def fitted(self) -> dict[Key, Fitted]:
+        """What a budget needs."""
+        return {
+            (self.name, q): Fitted(
+                method=self.name,
+                points=self.points,
+                best=f.best,
+                leftover=f.leftover,
+                settling_k=self.settling_k,
+                play=self.play,
+            )
             for q, f in self.fits.items()
         }
-        return Budget(fitted=fitted, accuracy=accuracy)
 
     @property
     def title(self) -> str:
@@ -83,6 +90,7 @@ class ThermalResult:
     g_mps2: float
     recordings: tuple[Recording, ...]
     methods: tuple[Method, ...]
+    budget: Budget
     estimates: dict[str, tuple[Estimate, ...]]  # by method, at normal_c
     normal_c: float
     accuracy: BenchAccuracy
@@ -111,13 +119,14 @@ def estimate_run(
     low = max(float(m.points.case_c.min()) for m in methods)
     high = min(float(m.points.case_c.max()) for m in methods)
     normal_c = min(max(NORMAL_C, low), high)
-    budgets = {m.name: m.budget(accuracy) for m in methods}
-    estimates = {n: tuple(b.estimate_at(q, normal_c) for q in quantity_names()) for n, b in budgets.items()}
+    budget = Budget(fitted={k: f for m in methods for k, f in m.fitted.items()}, accuracy=accuracy)
+    estimates = {m.name: tuple(budget.estimate_at(m.name, q, normal_c) for q in m.fits) for m in methods}
     return ThermalResult(
         schedule=schedule,
         g_mps2=g_mps2,
         recordings=tuple(recordings),
         methods=methods,
+        budget=budget,
         estimates=estimates,
         normal_c=normal_c,
         accuracy=accuracy,

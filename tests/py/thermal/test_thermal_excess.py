@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from psabench.budget.accuracy import EXACT, BenchAccuracy
 from psabench.thermal.excess import Excess, MeanSquare, excess_lines, excess_of
+from psabench.thermal.measure import RunStart, ThermalWatch, measure_schedule
+from psabench.thermal.result import estimate_run
+from psabench.thermal.schedule import schedule_of_dict
+from thermal_bench import FakeThermalBench
 
 DOF, GAIN, TRIALS = 6, 2.0, 1000
 
@@ -86,3 +92,22 @@ def test_what_is_negative_is_taken_off_the_other_line(squares: tuple[float, floa
     variance = 0.5 if min(squares) > 0.0 else 1.0  # of a difference of both
     for c, x in zip(found, left, strict=True):
         assert x == 0.0 or c.dof == pytest.approx(2.0 * x**2 / variance)
+
+
+def test_the_misfit_of_a_curve_is_pooled_over_the_methods_that_measured_it() -> None:
+    """A second method that leaves the same doubles what is known of it; a quantity of its own kind alone does not."""
+    schedule = schedule_of_dict(
+        {"low_c": 20, "high_c": 50, "degree": 1, "soak": {"temperatures_c": [20, 35, 50], "ramp_k_per_min": 20}},
+        "test",
+        "three points",
+    )
+    bench = FakeThermalBench(noise_v=2e-7)
+    recordings = measure_schedule(bench, schedule, RunStart(origin_s=0.0, chamber_degc=25.0), ThermalWatch())
+    found = estimate_run(recordings, schedule, 9.81, BenchAccuracy(**EXACT)).budget
+    f = found.fitted["soak", "zero_x_ug"]
+    alone, twice = (
+        next(c for c in replace(found, fitted=each).estimate_at("soak", "zero_x_ug", 35.0).budget if c.name == "misfit")
+        for each in ({f.key: f}, {f.key: f, ("sweep-1", "zero_x_ug"): replace(f, method="sweep-1")})
+    )
+    assert twice.u == pytest.approx(alone.u)
+    assert twice.dof == pytest.approx(2.0 * alone.dof)

@@ -147,8 +147,7 @@ def squares_of(f: Fitted) -> tuple[Squares, Squares]:
 
 def fitted_of(recordings: Sequence[Recording], schedule: Schedule) -> Mapping[str, Fitted]:
     """Of its one method."""
-    (method,) = found_by(recordings, schedule).methods
-    return method.budget(BenchAccuracy(**EXACT)).fitted
+    return {quantity: f for (_, quantity), f in found_by(recordings, schedule).budget.fitted.items()}
 
 
 def test_what_a_cubic_misses_of_a_turn_is_in_the_curves(whole: ThermalResult) -> None:
