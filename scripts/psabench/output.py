@@ -45,14 +45,21 @@ def show_report(args: argparse.Namespace, lines: Iterable[str], write: Callable[
 
     write: writes both and returns the page, after the lines: they are seen where it cannot be stored.
     """
-    if not args.json:
+    if args.json:
+        _print_stored(write().parent / RESULT)
+        return
+    for line in lines:
+        print(line)
+    print(f"report: {write()}")
+
+
+def show_stored(args: argparse.Namespace, lines: Iterable[str], path: Path) -> None:
+    """The lines; with --json a document that has just been stored, byte for byte."""
+    if args.json:
+        _print_stored(path)
+    else:
         for line in lines:
             print(line)
-    page = write()
-    if args.json:
-        print_stored(page.parent / RESULT)
-    else:
-        print(f"report: {page}")
 
 
 def print_json(data: object) -> None:
@@ -65,8 +72,7 @@ def json_line(data: object) -> str:
     return json.dumps(without_nan(data), ensure_ascii=False, allow_nan=False)
 
 
-def print_stored(path: Path) -> None:
-    """A document of JSON that has just been stored, byte for byte."""
+def _print_stored(path: Path) -> None:
     print(path.read_text(encoding="utf-8"), end="")
 
 

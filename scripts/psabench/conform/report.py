@@ -18,7 +18,7 @@ from psabench.conform.coverage import USUAL, Coverage, Goal, Result
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.link.own import replace_file
-from psabench.output import print_stored
+from psabench.output import show_stored
 from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
 from psabench.report.provenance import KEY
 
@@ -150,10 +150,7 @@ def publish(folder: Path, run: Run, args: argparse.Namespace, first: Sequence[st
     args: --verbose, --json.
     """
     page = write(folder, run)
-    if args.json:
-        print_stored(folder / DOCUMENT)
-    else:
-        print("\n".join([*first, *lines(run, everything=args.verbose)]))
+    show_stored(args, [*first, *lines(run, everything=args.verbose)], folder / DOCUMENT)
     print(f"report: {page}", file=sys.stderr)
     return run.coverage().status
 

@@ -71,7 +71,7 @@ MISTAKES: list[tuple[str, str]] = [
         "run script nothing.psa --axis x",
         "script: expected --scenario, --pace, --control, --seed, --can, --scpi, --node, --json, got --axis",
     ),
-    ("record run.log --speed 3", "record: expected --can, --lcm, --board, --node, --for, --count, got --speed"),
+    ("record run.log --speed 3", "record: expected --can, --lcm, --board, --node, --for, --count, --json, got --speed"),
     ("run all --axis w", "turns: axis: expected x, y or z, got 'w'"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
     ("run turns --can socketcand:127.0.0.1:1", "--head: expected the VISA address of the dividing head"),
