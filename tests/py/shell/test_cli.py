@@ -64,7 +64,7 @@ MISTAKES: list[tuple[str, str]] = [
     (
         "run compare-converters --real-time",
         "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, "
-        "got --real-time",
+        "--json, got --real-time",
     ),
     ("run gyrocompass --window-s 0", "gyrocompass: window_s, repeat: expected at least 0.1 s and 1, got 0.0 s and 1"),
     (
