@@ -108,6 +108,7 @@ FROM_OUTPUTS: Mapping[str, Mapping[str, Any]] = {
 IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
     "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
+    "--fresh": {"action": "store_true", "help": "measure again in a folder that has recordings; they go"},
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 

@@ -103,7 +103,18 @@ _PLATFORM = (
 _HEAD = tuple(COMMON)
 _TABLE = ("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose")
 _CHAMBER = (
-    *("--schedule", "--resume", "--can", "--head", "--chamber", "--control", "--truth", "--scenario", "--node"),
+    *(
+        "--schedule",
+        "--resume",
+        "--fresh",
+        "--can",
+        "--head",
+        "--chamber",
+        "--control",
+        "--truth",
+        "--scenario",
+        "--node",
+    ),
     *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
 )
 
