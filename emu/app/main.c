@@ -1,5 +1,5 @@
 /* psa-emu: options, scenario, bench, service. */
-#include "app/list.h"
+#include "app/list/list.h"
 #include "app/options.h"
 #include "app/service.h"
 #include "base/text.h"
@@ -18,14 +18,16 @@
 #define PSABENCH_FLAGS "unknown"
 #endif
 
+#ifdef __clang__
+#define COMPILER __VERSION__
+#else
+#define COMPILER "GCC " __VERSION__
+#endif
+
 static void print_version(void)
 {
     puts("psa-emu " VERSION);
-#ifdef __clang__
-    puts("compiler: " __VERSION__);
-#else
-    puts("compiler: GCC " __VERSION__);
-#endif
+    puts("compiler: " COMPILER);
     puts("flags: " PSABENCH_FLAGS);
 }
 
@@ -54,16 +56,40 @@ static void override_scenario(struct scenario *s, const struct options *o)
     if (o->start) s->start = true;
 }
 
-/* The scenario with every key. */
-static bool print_scenario(const struct scenario *s, FILE *out)
+/* The tree is deleted. */
+static bool print_json(cJSON *j, FILE *out)
 {
-    cJSON *j = scenario_dump(s);
     char *text = cJSON_Print(j);
     errno = text ? 0 : ENOMEM;
     const bool ok = text && fprintf(out, "%s\n", text) >= 0 && fflush(out) == 0;
     cJSON_free(text);
     cJSON_Delete(j);
     return ok;
+}
+
+/* The scenario with every key. */
+static bool print_scenario(const struct scenario *s, FILE *out)
+{
+    return print_json(scenario_dump(s), out);
+}
+
+static cJSON *version_json(void)
+{
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddStringToObject(j, "version", VERSION);
+    cJSON_AddStringToObject(j, "compiler", COMPILER);
+    cJSON_AddStringToObject(j, "flags", PSABENCH_FLAGS);
+    return j;
+}
+
+/* --json with a list or --version. */
+static int print_list(enum options_action action)
+{
+    char why[1024];
+    cJSON *j = action == OPTIONS_VERSION ? version_json() : list_json(action, why, sizeof why);
+    if (!j) return print_error(SERVICE_MACHINE, why);
+    print_json(j, stdout);
+    return end_stdout();
 }
 
 /* --resolved: SERVICE_DONE, or the exit status with one line in why. */
@@ -150,6 +176,7 @@ int main(int argc, char *argv[])
     char why[1024];
     signal(SIGXFSZ, SIG_IGN); /* a limit of the file size is an error of write(), as a full disk is */
     if (!options_parse(argc, argv, &o, why, sizeof why)) return print_error(SERVICE_INPUT, why);
+    if (o.json && o.action != OPTIONS_DUMP) return print_list(o.action);
     if (o.action == OPTIONS_HELP) options_print_help(stdout);
     if (o.action == OPTIONS_VERSION) print_version();
     if (o.action == OPTIONS_LIST_COMMANDS) list_commands(stdout);

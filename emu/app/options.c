@@ -374,6 +374,7 @@ static const struct row rows[] = {
     {"--list-commands", NULL, set_action, OPTIONS_LIST_COMMANDS, "commands of the control socket and the truth port"},
     {"--list-scpi", NULL, set_action, OPTIONS_LIST_SCPI, "SCPI headers of the instruments"},
     {"--list-faults", NULL, set_action, OPTIONS_LIST_FAULTS, "kinds of faults and their points"},
+    {"--json", NULL, set_flag, IN(json), "print what a --list option or --version prints as JSON (docs/tools/json.md)"},
     {"--help", NULL, set_action, OPTIONS_HELP, NULL},
     {"--version", NULL, set_action, OPTIONS_VERSION, NULL},
 };
@@ -440,6 +441,9 @@ bool options_parse(int argc, char *const argv[], struct options *o, char *why, s
     if (!parse_all(&t, argc, argv)) return false;
     if (o->pace == PACE_STEP && !o->control) {
         return why_fail(why, cap, "--pace step: expected --control PATH, whose commands advance the time, got none");
+    }
+    if (o->json && (o->action == OPTIONS_RUN || o->action == OPTIONS_HELP)) {
+        return why_fail(why, cap, "--json: expected a --list option or --version with it, got none");
     }
     if (o->lcm_truth && !o->lcm) return why_fail(why, cap, "--lcm-truth: expected --lcm URL, got none");
     if (o->wait_client && o->pace == PACE_STEP) {

@@ -116,6 +116,7 @@ struct options {
     bool eager;       /* conversions that no one looks at are computed, too */
     bool start;       /* units start operational, without waiting for NMT */
     bool quiet;       /* no counters on stderr at the end */
+    bool json;        /* what the action prints is JSON */
 };
 
 /* argv[0] is skipped; the strings stay the caller's. False with one line in why: what, where, what would be right. */

@@ -51,21 +51,31 @@ static enum control_outcome do_clear(const struct control_call *call)
 
 /* ---- what there is */
 
+void describe_kind(const struct fault_kind *k, cJSON *to)
+{
+    cJSON_AddStringToObject(to, "kind", k->name);
+    cJSON_AddStringToObject(to, "what", k->what);
+    cJSON_AddStringToObject(to, "seen", k->seen);
+    cJSON_AddBoolToObject(to, "once", k->once);
+}
+
+void describe_kind_args(const struct fault_kind *k, cJSON *to)
+{
+    cJSON *args = cJSON_AddArrayToObject(to, "args");
+    for (unsigned i = 0; i < FAULT_ARGS; i++) {
+        if ((k->need | k->may) & FAULT_BIT(i)) describe_arg(&fault_args[i], !(k->need & FAULT_BIT(i)), args);
+    }
+}
+
 static void add_kind(const struct control_bench *b, const struct fault_kind *k, cJSON *to)
 {
     struct fault_names names;
     cJSON *j = add_object(to);
-    cJSON_AddStringToObject(j, "kind", k->name);
-    cJSON_AddStringToObject(j, "what", k->what);
-    cJSON_AddStringToObject(j, "seen", k->seen);
-    cJSON_AddBoolToObject(j, "once", k->once);
+    describe_kind(k, j);
     cJSON *places = cJSON_AddArrayToObject(j, "points");
     fault_place_names(b, NULL, k->places, &names);
     for (unsigned i = 0; i < names.count; i++) cJSON_AddItemToArray(places, cJSON_CreateString(names.name[i]));
-    cJSON *args = cJSON_AddArrayToObject(j, "args");
-    for (unsigned i = 0; i < FAULT_ARGS; i++) {
-        if ((k->need | k->may) & FAULT_BIT(i)) describe_arg(&fault_args[i], !(k->need & FAULT_BIT(i)), args);
-    }
+    describe_kind_args(k, j);
 }
 
 static enum control_outcome do_kinds(const struct control_call *call)

@@ -24,11 +24,10 @@ void describe_arg(const struct control_arg *a, bool optional, cJSON *list)
     cJSON_AddStringToObject(j, "what", a->what);
 }
 
-enum control_outcome describe_commands(const struct control_call *call)
+void describe_rows(const struct control_table *const *tables, cJSON *list)
 {
-    cJSON *list = cJSON_AddArrayToObject(call->result, "commands");
     const struct control_command *row;
-    for (unsigned i = 0; (row = control_row(call->control->tables, i)); i++) {
+    for (unsigned i = 0; (row = control_row(tables, i)); i++) {
         cJSON *j = add_object(list);
         cJSON_AddStringToObject(j, "name", row->name);
         cJSON_AddStringToObject(j, "what", row->what);
@@ -39,6 +38,11 @@ enum control_outcome describe_commands(const struct control_call *call)
             cJSON_AddItemToArray(scpi, cJSON_CreateString(row->scpi[k].header));
         }
     }
+}
+
+enum control_outcome describe_commands(const struct control_call *call)
+{
+    describe_rows(call->control->tables, cJSON_AddArrayToObject(call->result, "commands"));
     return CONTROL_DONE;
 }
 

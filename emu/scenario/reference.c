@@ -45,8 +45,7 @@ static const struct chapter chapters[] = {
 };
 // clang-format on
 
-/* "number, V/g" */
-static void print_kind(FILE *out, const struct field *d)
+static const char *kind_of(const struct field *d)
 {
     static const char *const kinds[] = {
         [FIELD_REAL] = "number",     [FIELD_U8] = "integer",      [FIELD_U32] = "integer",
@@ -54,8 +53,14 @@ static void print_kind(FILE *out, const struct field *d)
         [FIELD_CHOICE] = "one word", [FIELD_REALS] = "list",      [FIELD_EACH] = "number or list",
         [FIELD_LIST] = "list",       [FIELD_SECTION] = "mapping", [FIELD_CUSTOM] = "see there",
     };
+    return d->load ? "see there" : kinds[d->type];
+}
+
+/* "number, V/g" */
+static void print_kind(FILE *out, const struct field *d)
+{
     const char *unit = yaml_unit(d->key);
-    fprintf(out, "%s%s%s", d->load ? "see there" : kinds[d->type], *unit ? ", " : "", unit);
+    fprintf(out, "%s%s%s", kind_of(d), *unit ? ", " : "", unit);
     if (d->count) fprintf(out, " (%u)", d->count);
 }
 
@@ -129,15 +134,93 @@ static void print_boards(FILE *out)
     fprintf(out, "\n");
 }
 
-void scenario_keys(FILE *out)
+/* With an instrument and a unit to show the defaults of. NULL: no memory. */
+static struct scenario *new_example(void)
 {
     struct scenario *s = malloc(sizeof *s);
-    if (!s) return;
+    if (!s) return NULL;
     scenario_default(s, "");
     s->lab.table = table_default(1);
     s->units[0] = scenario_unit_default(0);
+    return s;
+}
+
+void scenario_keys(FILE *out)
+{
+    struct scenario *s = new_example();
+    if (!s) return;
     for (size_t i = 0; i < sizeof chapters / sizeof *chapters; i++) print_chapter(out, &chapters[i], s);
     print_boards(out);
     for (unsigned i = 0; board_types[i]; i++) print_profile(out, board_types[i]);
+    free(s);
+}
+
+/* ---- as JSON */
+
+static cJSON *add_object(cJSON *list)
+{
+    cJSON *j = cJSON_CreateObject();
+    cJSON_AddItemToArray(list, j);
+    return j;
+}
+
+/* value: the default, which the tree takes; NULL: none. */
+static void add_row(cJSON *list, const struct field *d, cJSON *value)
+{
+    cJSON *j = add_object(list);
+    const char *unit = yaml_unit(d->key);
+    cJSON_AddStringToObject(j, "key", d->key);
+    cJSON_AddStringToObject(j, "type", kind_of(d));
+    if (*unit) cJSON_AddStringToObject(j, "unit", unit);
+    if (field_is_number(d) && d->min < d->max) {
+        cJSON_AddNumberToObject(j, "min", d->min);
+        cJSON_AddNumberToObject(j, "max", d->max);
+    }
+    cJSON *choices = d->type == FIELD_CHOICE ? cJSON_AddArrayToObject(j, "choices") : NULL;
+    for (unsigned i = 0; choices && d->choices[i]; i++)
+        cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
+    if (value) cJSON_AddItemToObject(j, "default", value);
+    cJSON_AddStringToObject(j, "what", d->what);
+}
+
+static void add_chapter(cJSON *list, const struct chapter *c, const struct scenario *s)
+{
+    const char *section = c->offset == NO_DEFAULTS ? NULL : (const char *)s + c->offset;
+    cJSON *j = add_object(list);
+    cJSON_AddStringToObject(j, "path", c->path);
+    cJSON_AddStringToObject(j, "what", c->words);
+    cJSON *keys = cJSON_AddArrayToObject(j, "keys");
+    const struct field *d;
+    size_t offset;
+    for (size_t i = 0; (d = yaml_row(c->rows, i, &offset)); i++)
+        add_row(keys, d, section && d->type != FIELD_SECTION ? yaml_dump_value(d, section + offset) : NULL);
+}
+
+static void add_profile(cJSON *list, const struct board_type *t)
+{
+    union board_profile_store p;
+    cJSON *j = add_object(list);
+    fields_default(t->fields, &p);
+    cJSON_AddStringToObject(j, "profile", t->profile_name);
+    cJSON *keys = cJSON_AddArrayToObject(j, "keys");
+    for (size_t i = 0; i < t->fields->count; i++)
+        add_row(keys, &t->fields->row[i], yaml_dump_value(&t->fields->row[i], &p));
+}
+
+void scenario_add_keys(cJSON *to)
+{
+    struct scenario *s = new_example();
+    if (!s) return;
+    cJSON *sections = cJSON_AddArrayToObject(to, "sections"), *boards = cJSON_AddArrayToObject(to, "boards");
+    cJSON *profiles = cJSON_AddArrayToObject(to, "profiles");
+    for (size_t i = 0; i < sizeof chapters / sizeof *chapters; i++) add_chapter(sections, &chapters[i], s);
+    for (const struct board_name *n = board_names; n->name; n++) {
+        cJSON *j = add_object(boards);
+        cJSON_AddStringToObject(j, "board", n->name);
+        cJSON_AddStringToObject(j, "title", board_name_title(n));
+        cJSON_AddStringToObject(j, "profile", n->profile ? n->profile : n->type->profile_name);
+        cJSON_AddNumberToObject(j, "node", n->type->node);
+    }
+    for (unsigned i = 0; board_types[i]; i++) add_profile(profiles, board_types[i]);
     free(s);
 }

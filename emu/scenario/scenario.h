@@ -125,5 +125,6 @@ cJSON *scenario_dump(const struct scenario *s);
 
 /* The keys as Markdown tables, for docs/scenarios.md and --list-keys. */
 void scenario_keys(FILE *out);
+void scenario_add_keys(cJSON *to); /* the same as JSON */
 
 #endif

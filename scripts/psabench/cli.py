@@ -60,6 +60,7 @@ examples:
   psabench conform device --board psa2   check a board; report: build/conform/psa2-article/report.html
 
 psabench COMMAND --help lists the options. --lang ru with any command: its report in Russian.
+--json with a command that prints data: JSON on stdout (docs/tools/json.md).
 Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the bench or a link failed, 130 ended by
 Ctrl-C.
 """

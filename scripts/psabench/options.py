@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, NoReturn, TypeVar
 
 from psabench.boards.registry import NAMES, of_name
 from psabench.errors import BadInput, expected
+from psabench.output import add_json
 
 Options = TypeVar("Options")
 
@@ -179,16 +179,6 @@ def add_scpi(p: Any, what: str) -> None:
     p.add_argument("--scpi", action="append", default=[], metavar="NAME=ADDRESS", help=what)
 
 
-def add_json(p: Any) -> None:
-    """--json: the command prints its data with `print_json`."""
-    p.add_argument("--json", action="store_true", help="print JSON in place of tables")
-
-
-def print_json(data: object) -> None:
-    """As every command with --json does."""
-    print(json.dumps(data, indent=1, ensure_ascii=False))
-
-
 def add_inputs(p: Any) -> None:
     text = "voltage at an input during the test: x=2.5"
     p.add_argument("--input", action="append", default=[], metavar="AXIS=V", help=text)
@@ -213,6 +203,7 @@ def add_selection(p: Any, beginning: str, out: str, default: Path | None = None)
     p.add_argument("--require", nargs="+", default=[], metavar="ID", help=text)
     p.add_argument("--out", type=Path, default=default, metavar="FOLDER", help=f"folder of the report ({out})")
     p.add_argument("-v", "--verbose", action="store_true", help="list passed requirements as well")
+    add_json(p, "print the report's conform.json instead of text")
 
 
 def add_board(p: Any, what: str) -> None:

@@ -4,7 +4,7 @@
 
 #include "rig.h"
 
-#include "app/list.h"
+#include "app/list/list.h"
 #include "bench/bench.h"
 #include "control/control.h"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +18,7 @@ from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
 from psabench.logs.formats import check_readable, read_frames
+from psabench.output import json_line
 
 TEMP_DECIMALS = 3  # a code is 15 mK
 CHUNK = 4096  # samples decoded at once
@@ -28,12 +29,41 @@ COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole num
 Table = Mapping[str, np.ndarray[Any, np.dtype[Any]]]  # columns by what the CSV calls them
 
 
+Row = tuple[Any, ...]
+WriteTable = Callable[[Sequence[str], Sequence[Row], bool], None]  # names of columns, rows, whether they are the first
+Form = Callable[[IO[str]], WriteTable]
+
+
+def csv_table(out: IO[str]) -> WriteTable:
+    """Names of columns before the first row."""
+    csv_file = csv.writer(out, lineterminator="\n")
+
+    def write(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
+        csv_file.writerows([names, *rows] if first else rows)
+
+    return write
+
+
+def json_table(out: IO[str]) -> WriteTable:
+    """An object a row: its keys are the names of the columns."""
+
+    def write(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
+        out.writelines(f"{json_line(dict(zip(names, row, strict=True)))}\n" for row in rows)
+
+    return write
+
+
 def decode_can(
-    path: Path, node: int, out: IO[str], board: str = "psa2", more: Callable[[Frames], Table] | None = None
+    path: Path,
+    node: int,
+    out: IO[str],
+    board: str = "psa2",
+    more: Callable[[Frames], Table] | None = None,
+    table: Form = csv_table,
 ) -> FrameReader | ReadingReader:
     """Frames (of other boards: readings) of one node from a log. Nothing is written before the first.
 
-    more: further columns of frames.
+    more: further columns of frames. table: form of the rows in `out`.
 
     Raises BadInput for a file that cannot be read, with what was wrong and where, and for one without a frame of that
     node, with the nodes whose frames it has.
@@ -41,7 +71,7 @@ def decode_can(
     check_readable(path)
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
-    if not _write(out, (_of_frames(f, more) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
+    if not _write(table(out), (_of_frames(f, more) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
         raise BadInput(expected(f"frames of node {node}", _no_frame(node, _senders(ids, board)), path))
     return reader
 
@@ -106,19 +136,18 @@ def _of_readings(r: Readings) -> Table:
     return columns
 
 
-def _write(out: IO[str], tables: Iterable[Table]) -> bool:
-    """One CSV of tables with the same columns, their names before the first row; whether there was a row."""
-    csv_file, begun = csv.writer(out, lineterminator="\n"), False
+def _write(out: WriteTable, tables: Iterable[Table]) -> bool:
+    """Tables with the same columns; whether there was a row."""
+    begun = False
     for table in tables:
         rows = list(zip(*(c.tolist() for c in table.values()), strict=True))
-        if rows and not begun:
-            csv_file.writerow(table)
+        if rows:
+            out(list(table), rows, not begun)
             begun = True
-        csv_file.writerows(rows)
     return begun
 
 
-def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
+def decode_line(path: Path, fmt: LineFormat, out: IO[str], table: Form = csv_table) -> LineDecoder:
     """Frames of a capture of INT/DATA/CLK samples. Raises BadInput when the file cannot be opened or has no frame.
 
     Nothing is written before the first frame.
@@ -130,7 +159,7 @@ def decode_line(path: Path, fmt: LineFormat, out: IO[str]) -> LineDecoder:
     except OSError as e:
         raise BadInput(f"{path}: {e.strerror}") from e
     with stream:
-        begun = _write(out, (_of_line(f, fmt) for f in decode_stream(stream, decoder)))
+        begun = _write(table(out), (_of_line(f, fmt) for f in decode_stream(stream, decoder)))
     if not begun:
         raise BadInput(expected(f"frames of {fmt.word_bits}-bit words", f"none ({decoder.counts})", path))
     return decoder

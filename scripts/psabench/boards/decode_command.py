@@ -5,16 +5,21 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from psabench.errors import BadInput, expected
 from psabench.link.own import output_text
 from psabench.options import LINE_HZ, Parser, add_board, node_of, positive
+from psabench.output import add_json, print_json
 from psabench.passport.command import STORE
 
 if TYPE_CHECKING:
+    from psabench.boards.decode import Form
     from psabench.thermal.apply import Compensator
+
+Decoded = tuple[dict[str, int], int]  # counters, exit status
 
 ARTICLE_CONFIG0 = 0x56
 EPILOG = """\
@@ -55,6 +60,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         help="for --passport: CONFIG0 of the converters, whose filter has a known gain (0x56, the article's)",
     )
     p.add_argument("--store", type=Path, default=STORE, help="store of passports (%(default)s)")
+    add_json(p, "print one JSON object per row instead of CSV; with --out, its counters")
     return p.parse_args(words)
 
 
@@ -69,6 +75,8 @@ def _register_value(text: str) -> int:
 
 
 def _decode(args: argparse.Namespace) -> int:
+    from psabench.boards.decode import csv_table, json_table
+
     if args.line and args.board != "psa2":
         raise BadInput(expected("a CAN log for this board (leave --line out)", args.board, "--line"))
     if args.passport and (args.line or args.board != "psa2"):
@@ -76,10 +84,14 @@ def _decode(args: argparse.Namespace) -> int:
     if args.out and args.out.exists() and args.file.exists() and args.out.samefile(args.file):
         raise BadInput(expected("another file than the one that is read", args.out, "--out"))
     with output_text(args.out) if args.out else _Stdout() as out:
-        return _decode_line(args, out) if args.line else _decode_can(args, out)
+        form = csv_table if args.out or not args.json else json_table
+        counts, status = _decode_line(args, out, form) if args.line else _decode_can(args, out, form)
+    if args.out and args.json:
+        print_json({"file": str(args.out), **counts})
+    return status
 
 
-def _decode_line(args: argparse.Namespace, out: Any) -> int:
+def _decode_line(args: argparse.Namespace, out: Any, form: Form) -> Decoded:
     from psabench.boards.decode import decode_line
     from psabench.link.lineport import LineFormat
 
@@ -87,17 +99,20 @@ def _decode_line(args: argparse.Namespace, out: Any) -> int:
         line_format = LineFormat(word_bits=args.word_bits, sample_hz=args.sample_hz)
     except ValueError as e:
         raise BadInput(str(e)) from e
-    print(decode_line(args.file, line_format, out).counts, file=sys.stderr)
-    return 0
+    counts = decode_line(args.file, line_format, out, form).counts
+    print(counts, file=sys.stderr)
+    return asdict(counts), 0
 
 
-def _decode_can(args: argparse.Namespace, out: Any) -> int:
+def _decode_can(args: argparse.Namespace, out: Any, form: Form) -> Decoded:
     from psabench.boards.decode import decode_can
 
     compensator = _open_compensator(args) if args.passport else None
-    c = decode_can(args.file, node_of(args), out, args.board, compensator.columns if compensator else None).counters
+    columns = compensator.columns if compensator else None
+    c = decode_can(args.file, node_of(args), out, args.board, columns, form).counters
     print(f"frames {c.frames}, lost {c.lost}, torn {c.torn}", file=sys.stderr)
-    return _report_compensation(compensator, c.frames) if compensator else 0
+    counts = {"frames": c.frames, "lost": c.lost, "torn": c.torn}
+    return counts, _report_compensation(compensator, c.frames) if compensator else 0
 
 
 def _report_compensation(compensator: Compensator, frames: int) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from psabench.campaign import builds, chains, runner, settings
 from psabench.campaign.cases import DEFAULT_STUDIES, STUDIES, WIRE_STUDIES, Case
@@ -18,6 +18,7 @@ from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput, expected
 from psabench.options import KEPT, Parser, natural, of_fields
+from psabench.output import add_json, show_data, show_report
 from psabench.places import find_emulator
 from psabench.procedures.head_bench import Progress
 from psabench.progress import Bar
@@ -117,30 +118,37 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
     p.add_argument("--forget-others", action="store_true", help="delete results of other builds")
+    add_json(p)
     return p.parse_args(words)
 
 
 def _main(args: argparse.Namespace) -> int:
     if args.list:
-        _print_studies()
+        show_data(args, _studies_dict(), _study_lines())
         return 0
     from psabench.campaign import page  # matplotlib takes a second: other commands and --list do without
 
     options = of_fields(Options, args, studies=args.study, settings=args.set)
     found = campaign(options, Bar())
-    print("\n".join(page.console(found)))
-    print(page.verdict(found))
-    print(f"report: {page.write(options.out, found)}")
+    show_report(args, [*page.console(found), page.verdict(found)], lambda: page.write(options.out, found))
     return 0 if found.within else 1
 
 
-def _print_studies() -> None:
+def _study_lines() -> Iterator[str]:
     for study in STUDIES.values():
-        print(f"{study.name}: {study.title}")
-        for line in _case_names(list(study.cases(Setup()))):
-            print(f"  {line}")
-    print("settings of --set, with the article's values")
-    print("\n".join(settings.lines()))
+        yield f"{study.name}: {study.title}"
+        yield from (f"  {line}" for line in _case_names(list(study.cases(Setup()))))
+    yield "settings of --set, with the article's values"
+    yield from settings.lines()
+
+
+def _studies_dict() -> dict[str, Any]:
+    """The same for programs."""
+    studies = [
+        {"study": s.name, "title": s.title, "cases": [{"case": c.name, "title": c.title} for c in s.cases(Setup())]}
+        for s in STUDIES.values()
+    ]
+    return {"studies": studies, "settings": settings.rows()}
 
 
 def _case_names(cases: Sequence[Case]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, add_parameter, given_parameters, natural
+from psabench.output import add_json, show_report
 
 if TYPE_CHECKING:
     from psabench.procedures.heading_modes import ModeParams
@@ -46,6 +47,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--hours", type=float, default=HOURS, help="time of the flight, h (%(default)s)")
     p.add_argument("--chain", choices=CHAINS, default=CHAINS[0], help="how a run is computed (%(default)s)")
     p.add_argument("--out", type=Path, default=OUT, help="folder of the report (%(default)s)")
+    add_json(p)
     _add_parameters(p)
     return p.parse_args(words)
 
@@ -75,8 +77,7 @@ def _run_command(args: argparse.Namespace) -> int:
     timed = {name: (page.look_hours(p, e.shape[1]), e) for name, e in errors.items()}
     found = {name: page.summary_of(e, args.seed) for name, e in errors.items()}
     report = page.write_page(args.out, timed, found, facts)
-    print("\n".join(page.console_lines(found)))
-    print(f"report: {report}")
+    show_report(args, page.console_lines(found), lambda: report)
     return 0
 
 

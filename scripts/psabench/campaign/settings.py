@@ -70,6 +70,21 @@ def lines() -> Iterator[str]:
         yield f"  {shown[name]:{width}}  {unit}{s.about}{choices}"
 
 
+def rows() -> list[dict[str, object]]:
+    """Of --list --json: name, the article's value (null: any), unit, meaning, choices or range."""
+    plain = Setup()
+    return [
+        {
+            "name": name,
+            "value": getattr(plain, name),
+            "unit": s.unit,
+            "about": s.about,
+            **({"choices": list(CHOICES[name])} if name in CHOICES else {"min": s.low, "max": s.high}),
+        }
+        for name, s in SETTINGS.items()
+    ]
+
+
 def _shown(value: object) -> str:
     if value is None or isinstance(value, bool):
         return {None: ANY, True: "yes", False: "no"}[value]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, natural
+from psabench.output import add_json, show_data
 
 if TYPE_CHECKING:
     from psabench.campaign.sins_unit import Experiment
@@ -43,6 +44,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--repeatability", type=float, metavar="X", help=text)
     p.add_argument("--seed", type=natural, help="random seed (the experiment's)")
     p.add_argument("--out", type=Path, default=Path("build/sins"), help="folder of recordings and report (%(default)s)")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -53,10 +55,17 @@ def _run_command(args: argparse.Namespace) -> int:
 
     e = _chosen_experiment(args)
     pairs = sins_pairs.run_pairs(e, args.pairs, Bar())
-    for path in _write_recordings(args.out, e):
-        print(f"recording: {path}")
-    print("\n".join(aligned(sins_pairs.pair_table(pairs))))
-    print(sins_pairs.pair_words(pairs, e.repeatability))
+    paths = [str(path) for path in _write_recordings(args.out, e)]
+    rows = [{**asdict(pair), "factor": pair.factor} for pair in pairs]
+    show_data(
+        args,
+        {"recordings": paths, "repeatability": e.repeatability, "seed": e.seed, "pairs": rows},
+        [
+            *(f"recording: {path}" for path in paths),
+            *aligned(sins_pairs.pair_table(pairs)),
+            sins_pairs.pair_words(pairs, e.repeatability),
+        ],
+    )
     return 0
 
 

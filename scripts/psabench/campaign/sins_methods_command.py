@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, natural
+from psabench.output import add_json, show_report
 
 ABOUT = """\
 Draw strapdown units with the article's errors, put each on three rate tables (level and true; off level; off its
@@ -34,6 +35,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--units", type=natural, default=UNITS, help="units to draw (%(default)s)")
     p.add_argument("--seed", type=natural, default=SEED, help="random seed (%(default)s)")
     p.add_argument("--out", type=Path, default=OUT, help="folder of the report (%(default)s)")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -49,6 +51,5 @@ def _run_command(args: argparse.Namespace) -> int:
     provenance.note_digest(page.NAME, args.seed, {"units": args.units})
     rows = run_methods(args.units, args.seed, Bar())
     report = page.write_page(args.out, rows, args.units, args.seed)
-    print("\n".join(page.console_lines(rows)))
-    print(f"report: {report}")
+    show_report(args, page.console_lines(rows), lambda: report)
     return 0

@@ -17,11 +17,10 @@ from psabench.options import (
     add_clock_ppm,
     add_default_node,
     add_inputs,
-    add_json,
     add_scpi,
     add_selection,
-    print_json,
 )
+from psabench.output import add_json, show_data
 
 if TYPE_CHECKING:
     from psabench.conform.requirements import Requirement
@@ -199,11 +198,8 @@ def _list(args: argparse.Namespace) -> int:
     from psabench.conform.selection import requirements_of
 
     found = requirements_of(variant(args.board, args.profile))
-    if args.json:
-        print_json([_requirement_dict(r) for r in found])
-        return 0
-    for r in found:
-        print(f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}")
+    lines = (f"{r.id:16} {r.grade} {'/'.join(r.observe) or '-':16} {r.text}" for r in found)
+    show_data(args, [_requirement_dict(r) for r in found], lines)
     return 0
 
 

@@ -37,7 +37,7 @@ def handle(args: argparse.Namespace) -> int:
         clock_ppm=args.clock_ppm,
         goal=goal,
     )
-    return report.publish(folder, run, everything=args.verbose)
+    return report.publish(folder, run, args)
 
 
 def device_run(

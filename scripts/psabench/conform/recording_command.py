@@ -46,7 +46,7 @@ def handle(args: argparse.Namespace) -> int:
         goal=goal,
         selection=selection_of(("--only", args.only)),
     )
-    return report.publish(folder, run, everything=args.verbose, first=_about(bench))
+    return report.publish(folder, run, args, _about(bench))
 
 
 def _bench(args: argparse.Namespace) -> recording.Bench:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import shlex
 import sys
@@ -17,10 +18,12 @@ from psabench.conform.coverage import USUAL, Coverage, Goal, Result
 from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.link.own import replace_file
+from psabench.output import show_stored
 from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
 from psabench.report.provenance import KEY
 
-FORMAT = 1  # of conform.json
+DOCUMENT = "conform.json"
+FORMAT = 1  # of it
 ORDER = tuple(Verdict)
 MARKS = {
     Verdict.PASSED: "ok",
@@ -135,17 +138,19 @@ def unseen(run: Run) -> dict[str, int]:
 
 def write(folder: Path, run: Run) -> Path:
     """conform.json, junit.xml and report.html, each whole or not at all; returns the page. Raises as write_report."""
-    page = write_report(folder, as_dict(run), html_page(run, folder), "conform.json")
-    told = json.loads((folder / "conform.json").read_text(encoding="utf-8"))
+    page = write_report(folder, as_dict(run), html_page(run, folder), DOCUMENT)
+    told = json.loads((folder / DOCUMENT).read_text(encoding="utf-8"))
     replace_file(folder / "junit.xml", junit(run, told[KEY]))
     return page
 
 
-def publish(folder: Path, run: Run, *, everything: bool, first: Sequence[str] = ()) -> int:
-    """Write the report and print what it says, after `first`; the exit status of the command. Raises as write."""
+def publish(folder: Path, run: Run, args: argparse.Namespace, first: Sequence[str] = ()) -> int:
+    """Write the report and print what it says, after `first`; the exit status of the command. Raises as write.
+
+    args: --verbose, --json.
+    """
     page = write(folder, run)
-    for line in [*first, *lines(run, everything=everything)]:
-        print(line)
+    show_stored(args, [*first, *lines(run, everything=args.verbose)], folder / DOCUMENT)
     print(f"report: {page}", file=sys.stderr)
     return run.coverage().status
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from psabench.boards.registry import BOARDS, NAMES
 from psabench.options import Parser, natural, positive
+from psabench.output import STREAM, add_json, show_event
 
 if TYPE_CHECKING:
     from psabench.explore.finding import Finding
@@ -52,20 +54,23 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--out", type=Path, metavar="FOLDER", help=f"folder of the findings ({OUT}/BOARD-PROFILE)")
     p.add_argument("--fresh", action="store_true", help="play again what is done")
     p.add_argument("--replay", type=Path, metavar="FILE", help="play one schedule from its file")
+    add_json(p, STREAM)
     return p.parse_args(words)
 
 
 def _handle_command(args: argparse.Namespace) -> int:
-    return _replay_schedule(args.replay) if args.replay else _explore_board(args)
+    return _replay_schedule(args) if args.replay else _explore_board(args)
 
 
-def _replay_schedule(path: Path) -> int:
+def _replay_schedule(args: argparse.Namespace) -> int:
     from psabench.explore.finding import replay_file
 
-    played = replay_file(path)
+    played = replay_file(args.replay)
     for v in played.violations:
-        print(v.words())
-    print(f"{path}: {played.actions} actions, {played.time_s:.6f} s simulated, {len(played.violations)} violations")
+        show_event(args, {"event": "violation", **asdict(v)}, v.words())
+    counts = {"actions": played.actions, "simulated_s": played.time_s, "violations": len(played.violations)}
+    line = "{actions} actions, {simulated_s:.6f} s simulated, {violations} violations".format(**counts)
+    show_event(args, {"event": "end", "file": str(args.replay), **counts}, f"{args.replay}: {line}")
     return 1 if played.violations else 0
 
 
@@ -82,27 +87,34 @@ def _explore_board(args: argparse.Namespace) -> int:
     out = args.out or OUT / f"{v.board}-{v.profile}"
     if args.fresh:
         (out / DONE).unlink(missing_ok=True)
-    shown = Shown(v.name, count)
+    shown = Shown(args, v.name, count)
     for_s = None if args.hours is None else 3600.0 * args.hours
     with workers(jobs) as at_work:
         tally = run_search(search, out, at_work, count=count, for_s=for_s, most=args.findings, told=shown.tell)
     shown.close()
-    print(shown.summary(tally))
+    counts = {"schedules": tally.schedules, "simulated_s": tally.simulated_s, "violations": tally.times}
+    show_event(args, {"event": "end", "board": v.name, **counts}, shown.summary(tally))
     return 1 if tally.times else 0
+
+
+def _finding_dict(f: Finding) -> dict[str, Any]:
+    """A finding as a line of JSON."""
+    counts = {"actions": len(f.schedule.actions), "of_actions": f.of}
+    return {"event": "found", **asdict(f.violation), **counts, "schedule": str(f.folder / "schedule.json")}
 
 
 class Shown:
     """Progress on stderr, findings on stdout."""
 
-    def __init__(self, name: str, count: int | None) -> None:
-        self._name, self._count = name, count
+    def __init__(self, args: argparse.Namespace, name: str, count: int | None) -> None:
+        self._args, self._name, self._count = args, name, count
         self._live = sys.stderr.isatty()
 
     def tell(self, tally: Tally, finding: Finding | None) -> None:
         """As `search.run_search` tells."""
         if finding is not None:
             self.close()
-            print(f"found: {finding.words()}", flush=True)
+            show_event(self._args, _finding_dict(finding), f"found: {finding.words()}")
         elif self._live:
             of = "" if self._count is None else f" of {self._count}"
             print(f"\r{self._name}: {tally.schedules}{of}, {len(tally.times)} found \x1b[K", end="", file=sys.stderr)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from psabench.options import Parser, yes_no
+from psabench.output import add_json, show_data
 from psabench.progress import Bar
 
 EPILOG = """\
@@ -35,6 +37,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     made.add_argument(
         "--corrects", type=yes_no, default=False, metavar="YES|NO", help="correct at take-off as well (no)"
     )
+    add_json(made)
     return p.parse_args(words)
 
 
@@ -47,5 +50,5 @@ def _replay_recordings(args: argparse.Namespace) -> int:
     p = made_params(KoiParams, "koi replay", given)
     known = read_estimates(args.with_estimates, args.unit, p)
     rows = list(replay_flights(args.folders, known, p, Bar()))
-    print("\n".join(replay_lines(rows)))
+    show_data(args, [{**asdict(row), "folder": str(row.folder)} for row in rows], replay_lines(rows))
     return 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import glob
 import io
 import os
 import sqlite3
@@ -138,6 +139,7 @@ def replace_file(path: Path, text: str) -> None:
     """
     path = Path(os.path.realpath(path))  # a link stays one
     draft = path.with_name(f"{path.name}.{os.getpid()}.part")
+    _remove_dead_drafts(path)
     try:
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -151,6 +153,26 @@ def replace_file(path: Path, text: str) -> None:
     finally:
         with suppress(OSError):
             draft.unlink()
+
+
+def _remove_dead_drafts(path: Path) -> None:
+    """Of processes that were killed before their draft became the file."""
+    for draft in path.parent.glob(f"{glob.escape(path.name)}.*.part"):
+        pid = draft.name.removeprefix(f"{path.name}.").removesuffix(".part")
+        if pid.isdecimal() and not _is_alive(int(pid)):
+            with suppress(OSError):
+                draft.unlink()
+
+
+def _is_alive(pid: int) -> bool:
+    """Whether there is such a process; of one that is none of ours, too."""
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 SQLITE_ERRNO = {

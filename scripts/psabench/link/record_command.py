@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.options import CAN_HELP, Parser, add_board, natural, node_of, positive
+from psabench.output import add_json, show_data
 
 if TYPE_CHECKING:
     import can
@@ -45,6 +46,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     add_board(p, "whose frames are counted")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     p.add_argument("--count", type=natural, help="stop after this number of CAN messages")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -64,8 +66,16 @@ def _record(args: argparse.Namespace) -> int:
     node = node_of(args)
     r = record(_source(args), args.file, node, args.for_s, args.count, args.board)
     c = r.counters
-    print(f"{r.stored} messages, {r.last_s - r.first_s:.3f} s, in {args.file}")
-    print(f"frames of node {node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}")
+    counts = {"node": node, "frames": c.frames, "lost": c.lost, "torn": c.torn, "overruns": c.overruns}
+    span_s = r.last_s - r.first_s
+    show_data(
+        args,
+        {"file": str(args.file), "messages": r.stored, "received": r.received, "span_s": span_s, **counts},
+        [
+            f"{r.stored} messages, {span_s:.3f} s, in {args.file}",
+            f"frames of node {node}: {c.frames}, lost {c.lost}, torn {c.torn}, overruns {c.overruns}",
+        ],
+    )
     if r.unstored:
         print(f"psabench: {r.unstored}; stored {r.stored} of {r.received} messages", file=sys.stderr)
         return r.unstored.exit_status

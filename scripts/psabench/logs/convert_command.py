@@ -9,6 +9,7 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, add_board, node_of, positive
+from psabench.output import add_json, show_data
 from psabench.places import no_package
 
 EPILOG = """\
@@ -31,6 +32,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     add_board(p, "whose frames are decoded")
     p.add_argument("--ros2-imu", action="store_true", help="write a ROS 2 bag (.mcap) of one PSA-2's accelerations")
     p.add_argument("--v-per-g", type=positive, default=1.0, help="nominal scale for --ros2-imu, V/g (%(default)g)")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -58,7 +60,7 @@ def _convert_log(args: argparse.Namespace) -> int:
         trouble = e
     finally:
         stored = log.close()
-    print(f"{stored} messages in {args.out}")
+    show_data(args, {"file": str(args.out), "messages": stored}, [f"{stored} messages in {args.out}"])
     if error := log.error or trouble:
         print(f"psabench: {error}", file=sys.stderr)
         return error.exit_status
@@ -79,5 +81,6 @@ def _convert_imu(args: argparse.Namespace) -> int:
     stored = write_imu(read_frames(args.file), args.out, node_of(args), args.v_per_g)
     if not stored:
         raise BadInput(expected(f"frames of node {node_of(args)}", "none", args.file))
-    print(f"{stored} messages of sensor_msgs/Imu in {args.out}")
+    line = f"{stored} messages of sensor_msgs/Imu in {args.out}"
+    show_data(args, {"file": str(args.out), "messages": stored, "type": "sensor_msgs/Imu"}, [line])
     return 0

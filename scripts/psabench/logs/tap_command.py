@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import LINE_HZ, Parser, positive
+from psabench.output import STREAM, add_json, show_event
 
 if TYPE_CHECKING:
     from psabench.logs.tap import Tap
@@ -37,6 +38,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("out", type=Path, metavar="OUT", help="pcap file")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     p.add_argument("--line-hz", type=positive, default=LINE_HZ, help="samples a second of the line port (%(default)g)")
+    add_json(p, STREAM)
     return p.parse_args(words)
 
 
@@ -52,7 +54,10 @@ def _run_tap(args: argparse.Namespace) -> int:
             tap.read_capture(t, args.port, args.line_hz)
         else:
             _tap_port(args, t)
-    print(f"{t.packets[tap.TO_BOARD]} packets to the board, {t.packets[tap.FROM_BOARD]} from it, in {args.out}")
+    to, back = t.packets[tap.TO_BOARD], t.packets[tap.FROM_BOARD]
+    counts = {"to_board": to, "from_board": back, "cut": t.cut}
+    line = f"{to} packets to the board, {back} from it, in {args.out}"
+    show_event(args, {"event": "end", "file": str(args.out), **counts}, line)
     if t.cut:
         print(f"{t.cut} were too long and are in pieces", file=sys.stderr)
     return 0
@@ -70,8 +75,10 @@ def _tap_port(args: argparse.Namespace, t: Tap) -> None:
         t.take_bytes(direction, data, lambda at: start_ns + round(at * 1e9 / args.line_hz) if samples else now_ns)
 
     with Relay(args.port, one_way=samples) as relay:
-        print("ready" if samples else f"ready tap={relay.path}", flush=True)
+        where = {} if samples else {"tap": str(relay.path)}
+        show_event(args, {"event": "ready", **where}, " ".join(["ready", *(f"{k}={v}" for k, v in where.items())]))
         try:
             relay.pass_on(took, deadline_s)
         except KeyboardInterrupt:
-            print()
+            if not args.json:
+                print()

@@ -40,17 +40,16 @@ class Start:
         return " ".join([*(f"{k}={shlex.quote(v)}" for k, v in self.environment.items()), shlex.join(self.words)])
 
 
-def view_file(file: Path, program: str | None, *, show: bool) -> int:
-    """Opens FILE, in the program or in the first that is installed; show: prints the command line in its place.
-
-    Raises BadInput, BenchError.
-    """
+def start_of(file: Path, program: str | None) -> Start:
+    """What opens FILE in the program, or in the first that is installed. Raises BadInput, OutputError."""
     _check_kind(file)
-    program = program or _first_installed()
-    start = PROGRAMS[program](file, _ensure_sessions(file))
-    if show:
-        print(start.command_line())
-        return 0
+    return PROGRAMS[program or _first_installed()](file, _ensure_sessions(file))
+
+
+def view_file(file: Path, program: str | None) -> None:
+    """Opens FILE. Raises BadInput, BenchError."""
+    start = start_of(file, program)
+    program = start.words[0]
     if not shutil.which(program):
         raise BadInput(expected(f"{program} (apt-get install {program})", "none", "view"))
     if not any(os.environ.get(name) for name in DISPLAYS):
@@ -60,7 +59,6 @@ def view_file(file: Path, program: str | None, *, show: bool) -> int:
     done = subprocess.run(start.words, env={**os.environ, **start.environment}, check=False)
     if done.returncode:
         raise BenchError(expected("exit status 0", str(done.returncode), program))
-    return 0
 
 
 def _check_kind(file: Path) -> None:

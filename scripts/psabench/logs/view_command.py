@@ -9,6 +9,7 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected
 from psabench.options import CAN_HELP, Parser, add_board, node_of, port_number, positive
+from psabench.output import STREAM, add_json, show_data, show_event
 from psabench.places import no_package
 
 PORT = 8765  # what Foxglove offers
@@ -50,6 +51,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     )
     live.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
     live.add_argument("--v-per-g", type=positive, default=1.0, help="nominal scale of /nodeN/imu, V/g (%(default)g)")
+    add_json(p, f"{STREAM}; of --print: the words and the environment")
     args = p.parse_args(words)
     if args.file is None and (args.program or args.show):
         raise BadInput(expected("a VCD file", "none", "--with" if args.program else "--print"))
@@ -63,9 +65,14 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 def _run_view(args: argparse.Namespace) -> int:
     if args.file is None:
         return _view_bus(args)
-    from psabench.logs.vcd_view import view_file
+    from psabench.logs.vcd_view import start_of, view_file
 
-    return view_file(args.file, args.program, show=args.show)
+    if not args.show:
+        view_file(args.file, args.program)
+        return 0
+    start = start_of(args.file, args.program)
+    show_data(args, {"command": [*start.words], "environment": dict(start.environment)}, [start.command_line()])
+    return 0
 
 
 def _view_bus(args: argparse.Namespace) -> int:
@@ -77,10 +84,12 @@ def _view_bus(args: argparse.Namespace) -> int:
         raise no_package(e, "view") from e
 
     def ready(address: str) -> None:
-        print(f"ready {address}", flush=True)
+        show_event(args, {"event": "ready", "address": address}, f"ready {address}")
 
     v = view(open_bus(args.can), args.port, node_of(args), args.board, args.for_s, args.v_per_g, ready)
-    print(f"{v.frames} frames, {v.decoded} decoded; {v.warnings} warnings about clients")
+    counts = {"frames": v.frames, "decoded": v.decoded, "warnings": v.warnings}
+    line = f"{v.frames} frames, {v.decoded} decoded; {v.warnings} warnings about clients"
+    show_event(args, {"event": "end", **counts}, line)
     if v.broken:
         print(f"psabench: {v.broken}", file=sys.stderr)
         return 3

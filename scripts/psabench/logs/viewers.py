@@ -15,6 +15,7 @@ from psabench.link.own import replace_file
 from psabench.logs.sessions import SESSIONS, gtkwave_text, pulseview_text
 from psabench.logs.vcd_span import Span, read_head, span_of
 from psabench.options import Parser
+from psabench.output import add_json, show_data
 from psabench.places import BUNDLE, CHECKOUT, no_package
 from psabench.shell.units import number
 
@@ -55,6 +56,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     tick = "length of a column (the longest that shows every edge)"
     window.add_argument("--tick", dest="tick_ns", type=_time_ns, default=0, metavar="TIME", help=tick)
     window.add_argument("--title", default="", help="(name of FILE)")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -86,8 +88,8 @@ def _run_waveform(args: argparse.Namespace) -> int:
     written = write_pictures(args) if pictures else write_sessions(args.file) if args.file else []
     written += install_decoders(args.dir or user_decoders()) if args.decoders else []
     written += install_dissectors(args.dir or user_plugins()) if args.wireshark else []
-    for path in written:
-        print(path)
+    paths = [str(path) for path in written]
+    show_data(args, {"files": paths}, paths)
     return 0
 
 

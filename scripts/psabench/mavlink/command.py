@@ -12,6 +12,7 @@ from psabench.boards.registry import DBC_NODE
 from psabench.errors import BadInput, expected
 from psabench.instruments import EXAMPLES
 from psabench.options import BUS_HELP, Parser, natural, node_id, positive
+from psabench.output import STREAM, add_json, show_event
 from psabench.procedures.command_line.offered import G_MPS2, ON_THE_HEAD
 
 AUTOPILOTS = ("generic", "px4", "ardupilot", "invalid")  # psabench.mavlink.station has their numbers
@@ -78,6 +79,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--angles", type=stream_rate, default=5.0, metavar="HZ", help="rate of ATTITUDE (%(default)g)")
     p.add_argument("--codes", type=stream_rate, metavar="HZ", help="rate of PSABENCH_ACCEL (each reading)")
     p.add_argument("--for", dest="for_s", type=positive, metavar="SECONDS", help="stop after this wall time")
+    add_json(p, STREAM)
     group = p.add_argument_group("the bench")
     group.add_argument("--can", help=BUS_HELP)
     group.add_argument("--head", metavar="VISA-ADDRESS", help=f"dividing head: {EXAMPLES}")
@@ -110,9 +112,9 @@ def _run_mavlink(args: argparse.Namespace) -> int:
     options = _bridge_options(args)
     if args.log:
         log = LogBridge(options, args.log, args.node, args.speed)
-        return _run_bridge(log)
+        return _run_bridge(args, log)
     with _open_bench(args) as bench:
-        return _run_bridge(LiveBridge(options, bench))
+        return _run_bridge(args, LiveBridge(options, bench))
 
 
 def _bridge_options(args: argparse.Namespace) -> Any:
@@ -143,9 +145,11 @@ def _open_bench(args: argparse.Namespace) -> Any:
     return Bench.start(args.scenario, pace=pace, seed=args.seed, node=args.node)
 
 
-def _run_bridge(bridge: Any) -> int:
+def _run_bridge(args: argparse.Namespace, bridge: Any) -> int:
     port = bridge.station.port
-    print(f"ready mavlink={bridge.options.port.kind} host={port.host} port={port.port}\nready all", flush=True)
+    where = {"mavlink": bridge.options.port.kind, "host": port.host, "port": port.port}
+    line = f"ready mavlink={bridge.options.port.kind} host={port.host} port={port.port}\nready all"
+    show_event(args, {"event": "ready", **where}, line)
     try:
         bridge.run()
     except KeyboardInterrupt:  # the usual end
@@ -153,9 +157,14 @@ def _run_bridge(bridge: Any) -> int:
     finally:
         bridge.close()
         s = bridge.station
-        print(
-            f"readings {bridge.samples.count}, messages sent {s.messages_sent}, lost {port.lost}, "
-            f"received {s.received}, malformed {s.malformed}",
-            file=sys.stderr,
-        )
+        counts = {
+            "readings": bridge.samples.count,
+            "messages_sent": s.messages_sent,
+            "lost": port.lost,
+            "received": s.received,
+            "malformed": s.malformed,
+        }
+        print(", ".join(f"{k.replace('_', ' ')} {v}" for k, v in counts.items()), file=sys.stderr)
+        if args.json:
+            show_event(args, {"event": "end", **counts}, "")
     return 0

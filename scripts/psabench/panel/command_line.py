@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psabench.options import BUS_HELP, Parser, add_scpi, node_id, port_number
+from psabench.output import STREAM, add_json
 from psabench.places import no_package
 
 EPILOG = """\
@@ -36,6 +37,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     panel.add_argument("--can", help=f"{BUS_HELP}; default: the bus of the emulator")
     add_scpi(panel, "VISA address of an instrument; may be repeated")
     panel.add_argument("--node", type=node_id, help="CANopen node of the unit (the emulator's, else 5)")
+    add_json(panel, STREAM)
     return panel.parse_args(words)
 
 

@@ -7,7 +7,7 @@ import asyncio
 import contextlib
 import logging
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
@@ -15,6 +15,7 @@ import uvicorn
 from psabench.bench import Bench
 from psabench.errors import LinkError
 from psabench.options import of_fields
+from psabench.output import show_event
 from psabench.panel.bench_view import BenchView
 from psabench.panel.guard import Door, Log
 from psabench.panel.hub import Hub
@@ -37,13 +38,16 @@ def run(args: argparse.Namespace) -> int:
     def restored(path: Path) -> BenchView:
         return bench_of(lambda: Bench.restore(path, pace=opening.pace or "step"), lambda b: BenchView(b, out))
 
+    def ready(address: str) -> None:
+        show_event(args, {"event": "ready", "address": address}, f"ready {address}")
+
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
     worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
     with _listen_loopback(args.port) as listener:
         try:
             worker.start()
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
-                asyncio.run(_serve(listener, hub, worker, runs.out))
+                asyncio.run(_serve(listener, hub, worker, runs.out, ready))
         finally:
             runs.close()
             worker.stop()
@@ -70,7 +74,9 @@ def _listen_loopback(port: int) -> Iterator[socket.socket]:
         yield listener
 
 
-async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, reports: Path) -> None:
+async def _serve(
+    listener: socket.socket, hub: ThreadedHub, worker: Worker, reports: Path, ready: Callable[[str], None]
+) -> None:
     hub.loop = asyncio.get_running_loop()
     door = Door(port=listener.getsockname()[1])
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # a hostile client must not fill the terminal
@@ -90,5 +96,5 @@ async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, repo
         timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)
-    print(f"ready {door.address}", flush=True)
+    ready(door.address)
     await server.serve(sockets=[listener])

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,6 +28,7 @@ OFFERED: Mapping[str, str] = {
     **offered.ON_THE_PLATFORM,
     **dict([offered.COMPARE, offered.THERMAL, offered.MEMS_GYRO, offered.SINS, offered.COVARIANCE, offered.SNAKE]),
 }
+AGAIN: Mapping[str, Sequence[str]] = {offered.THERMAL[0]: ("--fresh",)}  # of those that do not overwrite by themselves
 REPORT = "report.html"
 LINES = 30  # of what it printed
 END_S = 10.0  # after Ctrl-C
@@ -81,7 +82,7 @@ class Runs:
         (folder / REPORT).unlink(missing_ok=True)
         self.progress, self._stopped = Progress(name=name, state="running"), False
         ours, theirs = pty.openpty()
-        command = [sys.executable, "-m", "psabench.cli", "run", name, "--out", str(folder)]
+        command = [sys.executable, "-m", "psabench.cli", "run", name, "--out", str(folder), *AGAIN.get(name, ())]
         try:
             self._process = subprocess.Popen(
                 command,

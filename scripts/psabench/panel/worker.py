@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import queue
 import threading
 import time
@@ -16,6 +15,7 @@ from typing import Any, Protocol
 
 from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
+from psabench.output import without_nan
 from psabench.panel.bench_view import BenchView
 from psabench.panel.procedures import OFFERED, Runs
 
@@ -330,15 +330,7 @@ def text_of(message: dict[str, Any]) -> str:
     try:
         return json.dumps(message, allow_nan=False, separators=(",", ":"))
     except ValueError:
-        return json.dumps(_without_nan(message), allow_nan=False, separators=(",", ":"))
-
-
-def _without_nan(x: Any) -> Any:
-    if isinstance(x, dict):
-        return {k: _without_nan(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_without_nan(v) for v in x]
-    return None if isinstance(x, float) and not math.isfinite(x) else x
+        return json.dumps(without_nan(message), allow_nan=False, separators=(",", ":"))
 
 
 def bench_of(opened: Callable[[], Bench], make: Callable[[Bench], BenchView]) -> BenchView:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from psabench.options import Parser, add_json, print_json
+from psabench.options import Parser
+from psabench.output import add_json, print_json, show_data
 
 STORE = Path("build/passports.sqlite")
 
@@ -37,6 +38,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     add.add_argument("result", type=Path, metavar="RESULT", help="folder of a report, or its result.json")
     add.add_argument("--serial", required=True, metavar="SERIAL", help="of the unit; made where it is new")
     add.add_argument("--type", required=True, metavar="TYPE", help="of the unit: mems, quartz, ...")
+    add_json(add)
     add_json(_add_subcommand(commands, "list", "list the units", _list_units))
     show = _add_subcommand(commands, "show", "show what is valid of a unit", _show_unit)
     show.add_argument("serial", metavar="SERIAL")
@@ -71,9 +73,16 @@ def _add_results(args: argparse.Namespace) -> int:
 
     runs = runs_of_result(args.result)
     with PassportStore(args.store) as store:
-        for run in runs:
-            number = store.put_run(args.serial, args.type, run)
-            print(f"{args.serial}: run {number}, {run.method}, {len(run.quantities)} quantities")
+        entered = [
+            {
+                "serial": args.serial,
+                "run": store.put_run(args.serial, args.type, run),
+                "method": run.method,
+                "quantities": len(run.quantities),
+            }
+            for run in runs
+        ]
+    show_data(args, entered, ("{serial}: run {run}, {method}, {quantities} quantities".format(**e) for e in entered))
     return 0
 
 
@@ -83,10 +92,7 @@ def _list_units(args: argparse.Namespace) -> int:
 
     with PassportStore(args.store, read_only=True) as store:
         units = [store.read_passport(serial) for serial in store.unit_serials()]
-    if args.json:
-        print_json([passport_dict(unit) for unit in units])
-    else:
-        print("\n".join(list_lines(units)))
+    show_data(args, [passport_dict(unit) for unit in units], list_lines(units))
     return 0
 
 
@@ -121,10 +127,7 @@ def _compare_runs(args: argparse.Namespace) -> int:
         a = find_run(store, args.a)
         b = find_run(store, args.b, lambda run: run.method == a.method, f"a run of {a.method}")
     found = diff.compare_results(comparable_dict(a), comparable_dict(b))
-    if args.json:
-        print_json(diff.diff_dict(found))
-    else:
-        print("\n".join(diff.diff_lines(found)))
+    show_data(args, diff.diff_dict(found), diff.diff_lines(found))
     return 0 if found.same else 1
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, natural
+from psabench.output import add_json, show_data, show_report
 
 if TYPE_CHECKING:
     from psabench.quartz.element import Figures
@@ -51,6 +53,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument(
         "--out", type=Path, default=Path("build/quartz-deformation"), help="folder of the report (%(default)s)"
     )
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -59,7 +62,8 @@ def _run_command(args: argparse.Namespace) -> int:
 
     figures = element.change_figures(args.set)
     if args.list:
-        print("\n".join(element.figure_lines(figures)))
+        rows = [{"name": name, **asdict(f)} for name, f in figures.items()]
+        show_data(args, rows, element.figure_lines(figures))
         return 0
     _check_numbers(args)
     return _run_study(args, figures)
@@ -82,7 +86,6 @@ def _run_study(args: argparse.Namespace, figures: Figures) -> int:
     how = {"elements": args.elements, "units": args.units, "seed": args.seed}
     found = deformation.run_study(figures, args.batch, progress=Bar(), **how)
     provenance.note_digest("quartz-deformation", args.seed, page.origin_dict(found))
-    print("\n".join(page.console_lines(found)))
-    print(page.verdict_words(found))
-    print(f"report: {page.write_page(args.out, found)}")
+    lines = [*page.console_lines(found), page.verdict_words(found)]
+    show_report(args, lines, lambda: page.write_page(args.out, found))
     return 0 if page.is_within(found) else 1

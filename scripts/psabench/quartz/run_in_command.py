@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import KEPT, Parser, natural, of_fields
+from psabench.output import add_json, show_report
 from psabench.report import provenance
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--store", type=Path, help="database of results (OUT/store.sqlite)")
     p.add_argument("--out", type=Path, default=usual.out, help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -119,9 +121,8 @@ def _run_command(args: argparse.Namespace) -> int:
     from psabench.quartz import run_in_page as page  # matplotlib takes a second
 
     found = run_campaign(of_fields(Options, args, settings=args.set), Bar())
-    print("\n".join(page.console_lines(found)))
-    print(page.verdict_words(found))
-    print(f"report: {page.write_page(args.out, found)}")
+    lines = [*page.console_lines(found), page.verdict_words(found)]
+    show_report(args, lines, lambda: page.write_page(args.out, found))
     return 0 if found.within else 1
 
 

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import Parser, add_json, print_json
+from psabench.options import Parser
+from psabench.output import add_json, show_data
 
 EPILOG = """\
 A and B are folders of reports, or files result.json or conform.json. The results are the same when all but provenance
@@ -39,8 +40,5 @@ def _compare_reports(args: argparse.Namespace) -> int:
     from psabench.report import diff
 
     found = diff.compare_results(diff.read_result(args.a), diff.read_result(args.b))
-    if args.json:
-        print_json(diff.diff_dict(found))
-    else:
-        print("\n".join(diff.diff_lines(found)))
+    show_data(args, diff.diff_dict(found), diff.diff_lines(found))
     return 0 if found.same else 1

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psabench.options import BUS_HELP, Parser, add_scpi, node_id
+from psabench.output import STREAM, add_json
 
 SHELL_EPILOG = """\
 examples:
@@ -68,7 +69,7 @@ def _add_common(p: argparse.ArgumentParser) -> None:
     p.add_argument("--can", help=f"{BUS_HELP}; default: the bus of the emulator")
     add_scpi(p, "VISA address of an instrument; may be repeated")
     p.add_argument("--node", type=node_id, help="CANopen node of the unit (the emulator's, else 5)")
-    p.add_argument("--json", action="store_true", help="print one JSON object per line instead of text")
+    add_json(p, STREAM)
 
 
 def _shell(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.options import Parser
+from psabench.output import add_json, show_data
 
 if TYPE_CHECKING:
     from psabench.sins.increments import Increments
@@ -35,8 +36,10 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     _add_recording(apply)
     apply.add_argument("--calibration", type=Path, required=True, metavar="FILE", help="result.json with a correction")
     apply.add_argument("--out", type=Path, required=True, metavar="FILE", help="increments as CSV")
+    add_json(apply)
     check = _add_subcommand(commands, "check", "look for what is wrong with a recording", _check)
     _add_recording(check)
+    add_json(check)
     header = _add_subcommand(commands, "header", "write a correction as a C header", _write_header)
     header.add_argument("calibration", type=Path, metavar="CALIBRATION")
     header.add_argument("--name", default="unit", metavar="NAME", help="that names in C begin with (%(default)s)")
@@ -62,7 +65,8 @@ def _apply(args: argparse.Namespace) -> int:
     correction = read_correction(args.calibration)
     corrected = correction.apply(_read(args))
     write_csv(args.out, corrected)
-    print(f"{args.out}: {len(corrected)} intervals of {corrected.dt_s:g} s")
+    data = {"file": str(args.out), "intervals": len(corrected), "interval_s": corrected.dt_s}
+    show_data(args, data, [f"{args.out}: {len(corrected)} intervals of {corrected.dt_s:g} s"])
     return 0
 
 
@@ -71,9 +75,14 @@ def _check(args: argparse.Namespace) -> int:
 
     data = _read(args)
     found = findings(data)
-    print(f"{args.recording}: {len(data)} intervals of {data.dt_s:g} s, {len(found)} findings")
-    for f in found:
-        print(f"  {f}")
+    show_data(
+        args,
+        {"file": str(args.recording), "intervals": len(data), "interval_s": data.dt_s, "findings": found},
+        [
+            f"{args.recording}: {len(data)} intervals of {data.dt_s:g} s, {len(found)} findings",
+            *(f"  {f}" for f in found),
+        ],
+    )
     return 1 if found else 0
 
 

@@ -58,6 +58,7 @@ class ThermalOptions:
     seed: int | None = None
     gravity: float | None = None
     real_time: bool = False
+    fresh: bool = False  # recordings of an earlier run in the folder go
     params: dict[str, Any] = field(default_factory=dict)  # of BenchAccuracy
 
 
@@ -81,7 +82,7 @@ def run_thermal(options: ThermalOptions, progress: Progress) -> Iterator[Thermal
     new = None if options.resume else _new_setup(options)
     with folder.own_folder():
         if new is not None:
-            _refuse_unfinished(folder)
+            _refuse_kept(options, folder)
         setup = _resumed_setup(options, folder) if new is None else new
         yield _run_of(options, setup, folder, progress)
         folder.drop_checkpoints()
@@ -106,12 +107,16 @@ def _accuracy_of(given: dict[str, Any], *, exact: bool) -> BenchAccuracy:
     return made_params(BenchAccuracy, "accuracy of the bench", {**(EXACT if exact else {}), **given})
 
 
-def _refuse_unfinished(folder: RunFolder) -> None:
-    """Hours of recordings are not overwritten. Raises BadInput."""
+def _refuse_kept(options: ThermalOptions, folder: RunFolder) -> None:
+    """Hours of recordings are not overwritten but on request. Raises BadInput."""
     rows = max(len(whole_lines(folder.data)) - 1, 0)
-    if rows and not _is_complete(folder):
-        what = f"another folder, or --resume {folder.path} to continue its run"
-        raise BadInput(expected(what, f"one with {rows} recordings of a run that is not complete", "--out"))
+    if not rows or options.fresh:
+        return
+    complete = _is_complete(folder)
+    resumed = "for its report again" if complete else "to continue its run"
+    what = f"another folder, --resume {folder.path} {resumed}, or --fresh to measure again"
+    state = "complete" if complete else "not complete"
+    raise BadInput(expected(what, f"one with {rows} recordings of a run that is {state}", "--out"))
 
 
 def _is_complete(folder: RunFolder) -> bool:
@@ -147,6 +152,7 @@ def _new_setup(options: ThermalOptions) -> dict[str, Any]:
 
 def _resumed_setup(options: ThermalOptions, folder: RunFolder) -> dict[str, Any]:
     given = [f"--{name}" for name in FIXED if getattr(options, name) is not None]
+    given += ["--fresh"] if options.fresh else []
     if given:
         raise BadInput(expected("no option that the run has already", ", ".join(given), "--resume"))
     setup = folder.read_setup()

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -48,3 +51,27 @@ def test_what_fails_half_way_leaves_the_file_as_it_was(
     with pytest.raises(BenchError, match=r"page.html: (Permission denied|No space left on device); not written"):
         replace_file(page, "new")
     assert page.read_text() == "old"
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from psabench.link.own import replace_file
+os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+replace_file(Path(sys.argv[1]), "new")
+"""
+
+
+def test_what_a_killed_process_has_left_goes_with_the_next_writing(tmp_path: Path) -> None:
+    page = tmp_path / "page [1].html"
+    replace_file(page, "old")
+    killed = subprocess.run([sys.executable, "-c", KILLED, page], timeout=60, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    [left] = tmp_path.glob("*.part")
+    assert (page.read_text(), left.read_text()) == ("old", "new")
+    others = [page.with_name(f"{page.name}.{os.getppid()}.part"), page.with_name(f"{page.name}.mine.part")]
+    for other in others:  # of a process that is at work, and of no process
+        other.write_text("")
+    replace_file(page, "newer")
+    assert sorted(tmp_path.iterdir()) == sorted([page, *others])
+    assert page.read_text() == "newer"

@@ -64,14 +64,14 @@ MISTAKES: list[tuple[str, str]] = [
     (
         "run compare-converters --real-time",
         "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, "
-        "got --real-time",
+        "--json, got --real-time",
     ),
     ("run gyrocompass --window-s 0", "gyrocompass: window_s, repeat: expected at least 0.1 s and 1, got 0.0 s and 1"),
     (
         "run script nothing.psa --axis x",
         "script: expected --scenario, --pace, --control, --seed, --can, --scpi, --node, --json, got --axis",
     ),
-    ("record run.log --speed 3", "record: expected --can, --lcm, --board, --node, --for, --count, got --speed"),
+    ("record run.log --speed 3", "record: expected --can, --lcm, --board, --node, --for, --count, --json, got --speed"),
     ("run all --axis w", "turns: axis: expected x, y or z, got 'w'"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
     ("run turns --can socketcand:127.0.0.1:1", "--head: expected the VISA address of the dividing head"),

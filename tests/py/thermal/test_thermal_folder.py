@@ -14,6 +14,7 @@ import pytest
 from psabench import cli
 from psabench.errors import BadInput
 from psabench.procedures.head_bench import Silent
+from psabench.thermal import run as thermal_run
 from psabench.thermal.records import COLUMNS, TRUTH_COLUMNS, RunFolder, read_recordings, read_rows
 from psabench.thermal.run import ThermalOptions, run_thermal
 
@@ -171,6 +172,26 @@ def complete_run(path: Path) -> None:
         series.store_rows(rows)
     (path / "checkpoint-18.snapshot").write_text("")
     (path / "checkpoint-12.part").write_text("")
+
+
+def test_a_complete_run_is_not_written_over_but_on_request(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    complete_run(tmp_path)
+    files = {path: path.read_bytes() for path in tmp_path.glob("thermal*")}
+    status, line = error_of(capsys, "--out", str(tmp_path))
+    ways = f"another folder, --resume {tmp_path} for its report again, or --fresh to measure again"
+    assert status == 2
+    assert line == f"psabench: --out: expected {ways}, got one with 18 recordings of a run that is complete"
+    assert {path: path.read_bytes() for path in files} == files
+
+    def begun(*_: object) -> None:
+        raise BadInput("begun")
+
+    monkeypatch.setattr(thermal_run, "_run_of", begun)
+    assert error_of(capsys, "--out", str(tmp_path), "--fresh") == (2, "psabench: begun")
+    status, line = error_of(capsys, "--resume", str(tmp_path), "--fresh")
+    assert (status, line) == (2, "psabench: --resume: expected no option that the run has already, got --fresh")
 
 
 def test_checkpoints_of_a_complete_run_go_after_its_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

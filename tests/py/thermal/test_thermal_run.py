@@ -384,7 +384,10 @@ def test_a_folder_without_a_run_is_not_resumed(text: str | None, says: str, tmp_
 
 def test_recordings_of_a_run_that_is_not_complete_are_not_overwritten(short: list[Recording], tmp_path: Path) -> None:
     folder = stored_in(tmp_path, short[:4])
-    with pytest.raises(BadInput, match=r"--resume .* got one with 4 recordings of a run that is not complete"):
+    with pytest.raises(
+        BadInput,
+        match=r"--resume .* or --fresh to measure again, got one with 4 recordings of a run that is not complete",
+    ):
         refused(ThermalOptions(out=tmp_path))
     assert read_recordings(folder.data) == short[:4]
 

@@ -1,7 +1,7 @@
 /* SCPI: standard syntax, standard error numbers, messages, IEEE 488.2 status, the page of headers. */
 #include "scpi_say.h"
 
-#include "app/list.h"
+#include "app/list/list.h"
 
 /* ---- matching */
 

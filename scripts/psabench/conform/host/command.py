@@ -81,7 +81,7 @@ def handle(args: argparse.Namespace) -> int:
         selection=selection_of(("--only", args.only), ("--case", args.case)),
         out_of_reach=out_of_reach,
     )
-    return report.publish(args.out, told, everything=args.verbose)
+    return report.publish(args.out, told, args)
 
 
 def wants_form(case: str) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import KEPT, Parser, natural
+from psabench.output import add_json, show_report
 from psabench.report import provenance
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--seed", type=natural, default=SEED, help="random seed (%(default)s)")
     p.add_argument("-o", "--out", type=Path, default=OUT, help="folder of store and report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -64,8 +66,7 @@ def _run_command(args: argparse.Namespace) -> int:
     from psabench.progress import Bar
 
     found = run_campaign(_fleet_of(args), args, Bar())
-    print("\n".join(page.console_lines(found)))
-    print(f"report: {page.write_page(args.out, found)}")
+    show_report(args, page.console_lines(found), lambda: page.write_page(args.out, found))
     return 0
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from psabench.boards.registry import DBC_NODE
 from psabench.instruments import EXAMPLES
 from psabench.options import natural, node_id, positive
+from psabench.output import FLAG
 from psabench.passport.command import STORE
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2
 
@@ -71,6 +72,10 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
     },
     "--verbose": {"action": "store_true", "help": "print the tables of results as well"},
 }
+# Of every procedure: each writes a report.
+OF_A_REPORT: Mapping[str, Mapping[str, Any]] = {
+    "--json": {**FLAG, "help": "print the report's result.json instead of text"},
+}
 # Of the calibration on a rate table alone.
 ON_THE_TABLE: Mapping[str, Mapping[str, Any]] = {
     "--table": {"metavar": "VISA-ADDRESS", "help": f"rate table, real or emulated: {EXAMPLES}"},
@@ -103,6 +108,7 @@ FROM_OUTPUTS: Mapping[str, Mapping[str, Any]] = {
 IN_THE_CHAMBER: Mapping[str, Mapping[str, Any]] = {
     "--schedule": {"metavar": "NAME|FILE", "help": "quick, full or a YAML file (quick)"},
     "--resume": {"type": Path, "metavar": "FOLDER", "help": "continue the run of this folder where it was interrupted"},
+    "--fresh": {"action": "store_true", "help": "measure again in a folder that has recordings; they go"},
     "--chamber": {"metavar": "VISA-ADDRESS", "help": f"thermal chamber, real or emulated: {EXAMPLES}"},
 }
 
@@ -127,4 +133,11 @@ IN_FLIGHT: Mapping[str, Mapping[str, Any]] = {
     "--receiver": {"metavar": "PORT", "help": "serial port of the satellite receiver (the emulator's only one)"},
 }
 
-EVERY: Mapping[str, Mapping[str, Any]] = {**COMMON, **IN_THE_CHAMBER, **ON_THE_TABLE, **FROM_OUTPUTS, **IN_FLIGHT}
+EVERY: Mapping[str, Mapping[str, Any]] = {
+    **COMMON,
+    **IN_THE_CHAMBER,
+    **ON_THE_TABLE,
+    **FROM_OUTPUTS,
+    **IN_FLIGHT,
+    **OF_A_REPORT,
+}

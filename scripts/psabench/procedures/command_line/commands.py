@@ -16,6 +16,7 @@ from psabench.procedures.command_line.bench_options import (
     FROM_OUTPUTS,
     IN_A_CLIMATE,
     OF_A_BATCH,
+    OF_A_REPORT,
     ON_THE_TABLE,
 )
 from psabench.procedures.command_line.offered import (
@@ -81,7 +82,7 @@ class Command:
     name: str
     summary: str
     handler: Callable[[argparse.Namespace], int]
-    common: Sequence[str]  # of COMMON
+    common: Sequence[str]  # of EVERY
     own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # of this one alone, whatever others call so
     load: Callable[[], Parameters] = Parameters  # imports the procedure, and NumPy with it
     examples: str
@@ -102,7 +103,18 @@ _PLATFORM = (
 _HEAD = tuple(COMMON)
 _TABLE = ("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose")
 _CHAMBER = (
-    *("--schedule", "--resume", "--can", "--head", "--chamber", "--control", "--truth", "--scenario", "--node"),
+    *(
+        "--schedule",
+        "--resume",
+        "--fresh",
+        "--can",
+        "--head",
+        "--chamber",
+        "--control",
+        "--truth",
+        "--scenario",
+        "--node",
+    ),
     *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
 )
 
@@ -253,9 +265,12 @@ def _of_outputs(name: str) -> Parameters:
     return Parameters(fields=kind.__dataclass_fields__)
 
 
-def _command(offered: tuple[str, str], handler: Callable[[argparse.Namespace], int], **how: Any) -> Command:
+def _command(
+    offered: tuple[str, str], handler: Callable[[argparse.Namespace], int], common: Sequence[str], **how: Any
+) -> Command:
     name, summary = offered
-    return Command(name=name, summary=summary, handler=handler, examples=_EXAMPLES[name], **how)
+    taken = (*common, *OF_A_REPORT)
+    return Command(name=name, summary=summary, handler=handler, common=taken, examples=_EXAMPLES[name], **how)
 
 
 def _on_the_head() -> Iterator[Command]:
@@ -263,14 +278,14 @@ def _on_the_head() -> Iterator[Command]:
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
         load = _of_all if name == ALL else partial(_of_the_head, name)
         own = {} if name == ALL else {**IN_A_CLIMATE, **(OF_A_BATCH if name == "turns" else {})}
-        how = {"common": _HEAD, "own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
-        yield _command((name, summary), handlers.run_on_head, **how)
+        how: dict[str, Any] = {"own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
+        yield _command((name, summary), handlers.run_on_head, _HEAD, **how)
 
 
 def _on_the_platform() -> Iterator[Command]:
     for name, summary in ON_THE_PLATFORM.items():
-        how = {"common": _PLATFORM, "load": partial(_of_the_platform, name), "notes": NOTES_PLATFORM}
-        yield _command((name, summary), handlers.run_on_platform, **how)
+        load = partial(_of_the_platform, name)
+        yield _command((name, summary), handlers.run_on_platform, _PLATFORM, load=load, notes=NOTES_PLATFORM)
 
 
 _THERMAL = _command(

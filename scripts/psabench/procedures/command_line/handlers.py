@@ -6,6 +6,7 @@ Returns the exit status.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import given_parameters, of_fields, refuse_beside
+from psabench.output import show_report
 from psabench.procedures.command_line.offered import ALL, CONDITIONS
 from psabench.progress import Bar
 
@@ -51,12 +53,8 @@ def run_on_head(args: argparse.Namespace) -> int:
     with progress_of(args) as followers:
         page, sections, nominal = run.run(options, followers.progress)
         followers.show_sections(sections)
-    if args.verbose:
-        for section in sections:
-            print(report.console_table(section))
-        print(console_nominal(sections, nominal), end="")
-    print(grading.verdict(sections))
-    print(f"report: {page}")
+    tables = [*map(report.console_table, sections), *console_nominal(sections, nominal).splitlines()]
+    show_report(args, [*(tables if args.verbose else ()), grading.verdict(sections)], lambda: page)
     return 0 if report.within_limits(sections) else 1
 
 
@@ -67,12 +65,9 @@ def _run_in_climate(args: argparse.Namespace, options: RunOptions) -> int:
     with progress_of(args) as followers:
         r = sensors.run_climate(options, followers.progress)
         followers.show_sections(r.sections)
-    if args.verbose:
-        print("\n".join(grading.console_table(s) for s in r.sections))
-    print(sensors.console_table(r))
-    print(grading.verdict(r.sections))
-    print(sensors.verdict_of_slopes(r))
-    print(f"report: {r.page}")
+    tables = [grading.console_table(s) for s in r.sections] if args.verbose else []
+    verdicts = [grading.verdict(r.sections), sensors.verdict_of_slopes(r)]
+    show_report(args, [*tables, sensors.console_table(r), *verdicts], lambda: r.page)
     return 0 if r.within else 1
 
 
@@ -84,12 +79,9 @@ def _run_batch(args: argparse.Namespace, options: RunOptions) -> int:
         r = batch.run_batch(options, followers.progress)
         sections = list(r.sections.values())
         followers.show_sections(sections)
-    if args.verbose:
-        print("\n".join(grading.console_table(s) for s in sections))
-    print(batch.console_table(r))
-    print(grading.verdict(sections))
-    print(f"passports: {r.store}")
-    print(f"report: {r.page}")
+    tables = [grading.console_table(s) for s in sections] if args.verbose else []
+    ends = [batch.console_table(r), grading.verdict(sections), f"passports: {r.store}"]
+    show_report(args, [*tables, *ends], lambda: r.page)
     return 0 if r.within else 1
 
 
@@ -123,10 +115,7 @@ def progress_of(args: argparse.Namespace) -> Iterator[Followers]:
 
 def _show_end(args: argparse.Namespace, table: Callable[[], str], verdict: str, page: Path, *, within: bool) -> int:
     """What a run prints last; returns the exit status."""
-    if args.verbose:
-        print(table())
-    print(verdict)
-    print(f"report: {page}")
+    show_report(args, [*([table()] if args.verbose else []), verdict], lambda: page)
     return 0 if within else 1
 
 
@@ -171,14 +160,9 @@ def run_on_platform(args: argparse.Namespace) -> int:
         for s in sections:
             followers.result(options.procedure, s.label, s.result.estimates, gyro_grading.within_limits([s]))
     page = gyro_page.write(args.out, sections, gyro_run.facts(options))
-    if args.verbose:
-        for section in sections:
-            print(gyro_grading.console_table(section))
-    else:
-        for section in sections:
-            print("".join(f"DOUBT: {section.label}: {d}\n" for d in gyro_grading.doubts(section)), end="")
-    print(gyro_grading.verdict(sections))
-    print(f"report: {page}")
+    doubts = [f"DOUBT: {s.label}: {d}" for s in sections for d in gyro_grading.doubts(s)]
+    lines = [gyro_grading.console_table(s) for s in sections] if args.verbose else doubts
+    show_report(args, [*lines, gyro_grading.verdict(sections)], lambda: page)
     return 0 if gyro_grading.within_limits(sections) else 1
 
 
@@ -204,7 +188,10 @@ def calibrate_sins(args: argparse.Namespace) -> int:
     from psabench.sins.calibration_run import run_calibration
 
     options = of_fields(SinsOptions, args, params=given_parameters(args))
-    done = run_calibration(options, Bar(), lambda lines: print(*lines, sep="\n", flush=True) if lines else None)
+    to = sys.stderr if args.json else sys.stdout
+    done = run_calibration(
+        options, Bar(), lambda lines: print(*lines, sep="\n", file=to, flush=True) if lines else None
+    )
     page = calibration_page.write_page(args.out, done)
     verdict = "\n".join([*(f"DOUBT: {d}" for d in done.result.doubts), calibration_page.verdict_words(done)])
     rows = calibration_page.table_rows(done)
@@ -233,8 +220,7 @@ def predict_sins(args: argparse.Namespace) -> int:
     study = covariance_run.run_study(
         made_params(covariance_run.CovarianceParams, args.procedure, given_parameters(args))
     )
-    print(covariance_run.console_lines(study))
-    print(f"report: {covariance_run.write_page(args.out, study)}")
+    show_report(args, [covariance_run.console_lines(study)], lambda: covariance_run.write_page(args.out, study))
     return 0
 
 
@@ -243,9 +229,8 @@ def fly_snake(args: argparse.Namespace) -> int:
     from psabench.sins import snake, snake_page
 
     found = snake.run_snake(made_params(snake.SnakeParams, snake.NAME, given_parameters(args)))
-    print("\n".join(snake_page.console_lines(found)))
-    print(snake_page.verdict_words(found))
-    print(f"report: {snake_page.write_page(args.out, found)}")
+    lines = [*snake_page.console_lines(found), snake_page.verdict_words(found)]
+    show_report(args, lines, lambda: snake_page.write_page(args.out, found))
     return 1 if found.within is False else 0
 
 
@@ -257,9 +242,8 @@ def calibrate_secondary(args: argparse.Namespace) -> int:
 
     params = made_params(secondary_run.SecondaryParams, secondary_run.NAME, given_parameters(args))
     found = secondary_run.run_secondary(params, of_fields(secondary_run.SecondaryOptions, args), Bar())
-    print("\n".join(secondary_page.console_lines(found)))
-    print(secondary_page.verdict_words(found))
-    print(f"report: {secondary_page.write_page(args.out, found)}")
+    lines = [*secondary_page.console_lines(found), secondary_page.verdict_words(found)]
+    show_report(args, lines, lambda: secondary_page.write_page(args.out, found))
     return 1 if found.within is False else 0
 
 
@@ -271,8 +255,7 @@ def fly_koi(args: argparse.Namespace) -> int:
 
     done = run_flight(of_fields(KoiOptions, args, params=given_parameters(args)), Bar())
     page = flight_page.write_page(args.out, done)
-    print("\n".join(flight_page.console_lines(done, verbose=args.verbose)))
-    print(f"report: {page}")
+    show_report(args, flight_page.console_lines(done, verbose=args.verbose), lambda: page)
     return 1 if done.found.verdict else 0
 
 
@@ -283,6 +266,5 @@ def fly_season(args: argparse.Namespace) -> int:
 
     season = run_season(of_fields(SeasonOptions, args, params=given_parameters(args)), Bar())
     page = season_page.write_page(args.out, season)
-    print("\n".join(season_page.console_lines(season)))
-    print(f"report: {page}")
+    show_report(args, season_page.console_lines(season), lambda: page)
     return 0

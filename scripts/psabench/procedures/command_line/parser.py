@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, add_json, add_parameter, did_you_mean, option_name, print_json
+from psabench.options import Parser, add_parameter, did_you_mean, option_name
+from psabench.output import add_json, show_data
 from psabench.procedures.command_line.bench_options import EVERY
 from psabench.procedures.command_line.commands import COMMANDS, Command
 from psabench.shell import command_line
@@ -24,7 +25,16 @@ Exit status: 0 done and within limits, 1 a result is off by more than its limits
 """
 
 SCRIPT = "script"  # psabench.shell.command_line has its parser
-FLAGS = ("-h", "--help", "--list", "--real-time", "-v", "--verbose")  # the options that take no value
+FLAGS = (
+    "-h",
+    "--help",
+    "--list",
+    "--real-time",
+    "--fresh",
+    "--json",
+    "-v",
+    "--verbose",
+)  # the options that take no value
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -106,18 +116,17 @@ def _table() -> str:
 
 
 def _without_procedure(args: argparse.Namespace) -> int:
-    if args.list and args.json:
-        print_json([_command_dict(c) for c in COMMANDS.values()])
-        return 0
     if args.list:
-        for c in COMMANDS.values():
-            print(f"{c.name}: {c.summary}")
-            print(f"  {' '.join([*map(option_name, c.parameters.fields), *c.common])}")
+        show_data(args, [_command_dict(c) for c in COMMANDS.values()], map(_list_lines, COMMANDS.values()))
         return 0
     known = f"{', '.join(COMMANDS)} or {SCRIPT}"
     if args.procedure is None:
         raise BadInput(expected(f"{known} (psabench run --help explains them)", "none", "run"))
     raise BadInput(expected(known, f"{args.procedure!r}{did_you_mean(args.procedure, list(COMMANDS))}", "run"))
+
+
+def _list_lines(c: Command) -> str:
+    return f"{c.name}: {c.summary}\n  {' '.join([*map(option_name, c.parameters.fields), *c.common])}"
 
 
 def _command_dict(c: Command) -> dict[str, Any]:

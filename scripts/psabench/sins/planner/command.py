@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
 from psabench.options import Parser, natural, of_fields, positive
+from psabench.output import add_json, show_report
 from psabench.report import provenance
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--workers", type=natural, help="processes (one per core for long searches); 1: this process alone")
     p.add_argument("--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
     p.add_argument("--out", type=Path, default=usual.out, help="folder of the report (%(default)s)")
+    add_json(p)
     return p.parse_args(words)
 
 
@@ -98,8 +100,7 @@ def _run_command(args: argparse.Namespace) -> int:
 
     found = find_plan(of_fields(Options, args), Bar())
     where = page.write_page(args.out, found)
-    print("\n".join(page.console_lines(found)))
-    print(f"plan: {args.out / page.PLAN_NAME}\nreport: {where}")
+    show_report(args, [*page.console_lines(found), f"plan: {args.out / page.PLAN_NAME}"], lambda: where)
     if found.ended_early:
         print("psabench: interrupted; the best plan so far is kept", file=sys.stderr)
         return 130

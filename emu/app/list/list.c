@@ -1,4 +1,4 @@
-#include "app/list.h"
+#include "app/list/list.h"
 
 #include "control/control.h"
 #include "scenario/find.h"
@@ -9,8 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* First sentence of the comment that a file begins with, as far as it is on the first line: what the file is. */
-static void first_comment(const char *path, char *text, size_t cap)
+void list_comment(const char *path, char *text, size_t cap)
 {
     char line[256] = "";
     text[0] = '\0';
@@ -50,7 +49,7 @@ bool list_files(FILE *out, const char *proto_folder, char *why, size_t cap)
         return false;
     for (unsigned i = 0; i < count; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", folder, names[i]);
-        first_comment(path, comment, sizeof comment);
+        list_comment(path, comment, sizeof comment);
         if (profiles) list_profile(out, path, comment);
         else fprintf(out, "%-13s %s\n", names[i], comment);
     }

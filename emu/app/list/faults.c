@@ -1,5 +1,5 @@
 /* The page of faults: kinds with what they take, the matrix of kinds and places, and what each type of board has. */
-#include "app/list.h"
+#include "app/list/list.h"
 
 #include "fault/fault.h"
 #include "unit/boards.h"
@@ -52,7 +52,7 @@ static void print_matrix(FILE *out)
     fprintf(out, "\n");
 }
 
-static bool part_has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
+bool list_part_has(const struct board_type *t, const struct board_part *p, const struct fault_kind *k)
 {
     if (p == t->parts) return k->places & FAULT_BIT(FAULT_AT_CONTROLLER) && board_fault_bit(t, k->name);
     if (!(k->places & FAULT_BIT(FAULT_AT_CHIP))) return false;
@@ -64,7 +64,7 @@ static void print_part(FILE *out, const struct board_type *type, const struct bo
     const struct fault_kind *k;
     fprintf(out, "| %s | `UNIT.%s` |", type->title, p->name);
     for (unsigned i = 0; (k = fault_kind(i)) != NULL; i++) {
-        if (part_has(type, p, k)) fprintf(out, " `%s`", k->name);
+        if (list_part_has(type, p, k)) fprintf(out, " `%s`", k->name);
     }
     if (p->registers) fprintf(out, " (registers 0 to %u)", p->registers - 1);
     fprintf(out, " | %s |\n", p->unless ? p->unless : "");
