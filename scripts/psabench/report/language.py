@@ -1,6 +1,6 @@
 """Reports in another language: the texts of a finished page, looked up in a gettext catalogue.
 
-A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers taken out:
+A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers and quotes (lang=en) taken out:
 "residual <b>{} µV</b> rms". So each report is translated in one place, where it is written, and procedures know of no
 language. A text that is not in the catalogue as a whole is put together from its sentences and its parts. Texts of a
 drawn picture are translated before its layout. Numbers keep their decimal point, as in result.json.
@@ -25,8 +25,13 @@ LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
 _SEPARATOR = re.compile(r"( · |<br>)")
-# What a text is about: numbers and names of files.
-_NUMBER = re.compile(r"[\w./-]+\.(?:yaml|csv|json|log|sqlite)\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# What a text is about: quoted words, numbers, names of files.
+_QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
+_NUMBER = re.compile(
+    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf)\b"
+    r"|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    re.DOTALL,
+)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
@@ -58,6 +63,8 @@ class Language:
         return _BLOCK.sub(self._block, head) + page[end:]
 
     def _block(self, found: re.Match[str]) -> str:
+        if _QUOTED.fullmatch(found[1]):
+            return found[0]
         parts = _SEPARATOR.split(found[3])
         return found[1] + "".join(x if i % 2 else self._text(x) for i, x in enumerate(parts)) + found[4]
 
