@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import functools
 import re
-import sys
-from collections.abc import Iterator
 
 import pytest
+from psabench.report import page as page_module
 from psabench.report.language import Language, load_language
 
 NO_REPORTS = {"A page", "p"}  # of tests of the frame around a report
@@ -38,17 +37,15 @@ def untranslated(page: str) -> list[str]:
 
 
 @pytest.fixture(autouse=True)
-def reports_have_russian_texts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def reports_have_russian_texts(monkeypatch: pytest.MonkeyPatch) -> None:
     """A test that writes a report with an English text fails."""
-    if page_module := sys.modules.get("psabench.report.page"):
-        as_written = page_module.localised_page
+    as_written = page_module.localised_page
 
-        def checked(page: str) -> str:
-            title = TITLE.search(page)
-            if title is None or title[1] not in NO_REPORTS:
-                left = untranslated(page)
-                assert not left, f"English in {title and title[1]}:\n" + "\n".join(left)
-            return str(as_written(page))
+    def checked(page: str) -> str:
+        title = TITLE.search(page)
+        if title is None or title[1] not in NO_REPORTS:
+            left = untranslated(page)
+            assert not left, f"English in {title and title[1]}:\n" + "\n".join(left)
+        return as_written(page)
 
-        monkeypatch.setattr(page_module, "localised_page", checked)
-    yield
+    monkeypatch.setattr(page_module, "localised_page", checked)
