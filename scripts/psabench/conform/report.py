@@ -271,7 +271,9 @@ def _verdict(run: Run) -> str:
 
 def _failure(o: Outcome, folder: Path) -> str:
     rows = requirements().rows
-    due = "".join(f"<p lang=en><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements)
+    due = "".join(
+        f"<p lang=en><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements
+    )
     at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
     pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.excerpts if name.endswith(".svg")]
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)

@@ -154,6 +154,11 @@ def localised_page(page: str) -> str:
     return _current[0].translate_page(page) if _current else page
 
 
+def is_localised() -> bool:
+    """False: English."""
+    return bool(_current)
+
+
 def localised_label(text: str) -> str:
     """A text of a picture before it is drawn: the layout makes room for what will be there."""
     return _current[0].label(text) if _current else text

@@ -15,15 +15,13 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter
 
 from psabench.estimate import harmonics
 from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.result import FaceSeries
 from psabench.report.grading import Section, sensor_of
-from psabench.report.language import localised_label
 from psabench.report.nominal import Nominal
+from psabench.report.picture_texts import localise_texts
 
 # Stand-ins that matplotlib can draw with -> what the page defines. Series colours keep their contrast on both grounds.
 INK, MUTED, _GRID = "#010203", "#010204", "#010205"
@@ -81,7 +79,7 @@ def svg(figure: Figure, name: str) -> str:
     """Inline SVG in CSS variables; `name` keeps the ids of several pictures apart. Same input, same bytes."""
     out = io.StringIO()
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
-        _localise(figure)
+        localise_texts(figure)
         figure.draw_without_rendering()  # the layout may change the ticks, and their labels the layout
         figure.savefig(out, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     text = out.getvalue()
@@ -89,16 +87,6 @@ def svg(figure: Figure, name: str) -> str:
     for colour, variable in _CSS.items():
         text = text.replace(colour, variable)
     return text.replace('id="', f'id="{name}-').replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
-
-
-def _localise(figure: Figure) -> None:
-    """Labels, titles, legends and named ticks, before the layout."""
-    for text in figure.findobj(Text):
-        text.set_text(localised_label(text.get_text()))
-    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
-        named = axis.get_major_formatter()
-        if isinstance(named, FixedFormatter):
-            named.seq = [localised_label(x) for x in named.seq]
 
 
 def standalone(text: str) -> str:

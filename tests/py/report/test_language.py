@@ -74,7 +74,9 @@ def test_an_entry_has_the_numbers_and_the_markup_of_its_text() -> None:
     for entry in CATALOGUE:
         places = re.findall(r"\{\d*\}", entry.msgstr)
         assert len(places) == entry.msgid.count("{}"), entry.msgid
-        assert len(set(places)) == (len(places) if re.search(r"\{\d", entry.msgstr) else min(len(places), 1)), entry.msgid
+        assert len(set(places)) == (len(places) if re.search(r"\{\d", entry.msgstr) else min(len(places), 1)), (
+            entry.msgid
+        )
         assert sorted(tag.findall(entry.msgstr)) == sorted(tag.findall(entry.msgid)), entry.msgid
         assert entry.msgid == key_of(entry.msgid)
 
