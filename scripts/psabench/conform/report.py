@@ -19,7 +19,16 @@ from psabench.conform.requirements import Requirement, requirements
 from psabench.conform.verdict import Outcome, Verdict
 from psabench.link.own import replace_file
 from psabench.output import show_stored
-from psabench.report.page import bullets, figure, html_table, section, verdict_line, whole_page, write_report
+from psabench.report.page import (
+    bullets,
+    figure,
+    html_table,
+    quoted,
+    section,
+    verdict_html,
+    whole_page,
+    write_report,
+)
 from psabench.report.provenance import KEY
 
 DOCUMENT = "conform.json"
@@ -33,6 +42,7 @@ MARKS = {
     Verdict.NOT_APPLICABLE: "n/a",
 }
 
+SUITE_LANGUAGE = "en"  # of the requirements, their tests and what these saw: quoted in reports of each language
 CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUSIVE: "v-inconclusive"}
 
 
@@ -117,8 +127,15 @@ def told(o: Outcome) -> Iterator[str]:
 
 def summary(run: Run) -> str:
     """One line: what it came to, how many requirements were judged, and what became of the others."""
+    return _summary(run, _tested(run))
+
+
+def _tested(run: Run) -> str:
+    return f"{run.subject} ({run.selection})" if run.selection else run.subject
+
+
+def _summary(run: Run, what: str) -> str:
     c = run.coverage()
-    what = f"{run.subject} ({run.selection})" if run.selection else run.subject
     verb = c.result in (Result.CONFORMS, Result.VIOLATED)
     said = f"{what} {c.result.value}:" if verb else f"{what}: {c.result.value},"
     judged = f"{c.judged} of {len(c.verdicts)} requirements judged"
@@ -254,20 +271,23 @@ def html_page(run: Run, folder: Path) -> str:
 def _verdict(run: Run) -> str:
     why = [f"{count} not observable: {escape(reason)}" for reason, count in unseen(run).items()]
     colour = {Result.CONFORMS: True, Result.VIOLATED: False}.get(run.coverage().result)
-    return verdict_line(summary(run), colour) + bullets(why, "small")
+    return verdict_html(_summary(run, quoted(_tested(run))), colour) + bullets(why, "small")
 
 
 def _failure(o: Outcome, folder: Path) -> str:
     rows = requirements().rows
-    due = "".join(f"<p><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements)
+    due = "".join(
+        f"<p lang=en><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements
+    )
     at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
     pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.excerpts if name.endswith(".svg")]
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)
     return section(
         o.title,
-        f"{due}<p>Saw <b>{escape(o.saw)}</b>{at}; due {escape(o.due)}.</p>",
+        f"{due}<p>Saw <b>{quoted(o.saw)}</b>{at}; due {quoted(o.due)}.</p>",
         *pictures,
         f"<p class=small>{files}</p>" if files else "",
+        lang=SUITE_LANGUAGE,
     )
 
 
@@ -283,8 +303,9 @@ def _table(run: Run) -> str:
     verdicts = run.verdicts()
     rows = "".join(
         f"<tr><td class=id>{r.id}</td><td class={CSS.get(verdicts[r.id], 'v-other')}>{verdicts[r.id].value}</td>"
-        f"<td>{escape(r.text)}{_original(r.original)}</td><td>{escape('; '.join(r.source))}</td><td>{r.grade}</td>"
-        f"<td>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
+        f"<td lang={SUITE_LANGUAGE}>{escape(r.text)}{_original(r.original)}</td>"
+        f"<td lang={SUITE_LANGUAGE}>{escape('; '.join(r.source))}</td><td>{r.grade}</td>"
+        f"<td lang={SUITE_LANGUAGE}>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
         for r in run.rows
     )
     head = "".join(f"<th>{h}</th>" for h in ("", "verdict", "requirement", "source", "grade", "seen"))

@@ -1,8 +1,10 @@
 """Reports in another language: the texts of a finished page, looked up in a gettext catalogue.
 
-A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers taken out:
+A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers and quotes (lang=en) taken out:
 "residual <b>{} µV</b> rms". So each report is translated in one place, where it is written, and procedures know of no
-language. Numbers keep their decimal point, as in result.json. locale/LANG.po: docs/tools/languages.md
+language. A text that is not in the catalogue as a whole is put together from its sentences and its parts. Texts of a
+drawn picture are translated before its layout. Numbers keep their decimal point, as in result.json.
+locale/LANG/*.po: docs/tools/languages.md
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from html import escape, unescape
 from pathlib import Path
 
 from psabench.errors import BadInput, expected
@@ -22,12 +25,25 @@ LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
 _SEPARATOR = re.compile(r"( · |<br>)")
-_NUMBER = re.compile(r"(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# What a text is about: quoted words, numbers, names of files.
+_QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
+_NUMBER = re.compile(
+    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf)\b"
+    r"|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    re.DOTALL,
+)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
-# What has no words: tags, indices, functions, units and symbols that are the same in each language.
-_SYMBOLS = re.compile(r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b(?:sin|cos|atan|hypot|En|[mµn]V)\b")
+_CYRILLIC = re.compile(r"[А-Яа-яЁё]")  # of a picture whose texts were translated before it was drawn
+_QUANTITY = re.compile(r"\{\} [A-Za-z]")  # 5 m/s: a value that is no name
+# What has no words: tags, indices, functions, units, symbols and names of data that are the same in each language.
+_SYMBOLS = re.compile(
+    r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
+    r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
+)
+_GAP = re.compile(r"[;:,] |(?<=[.!?]) ")
+_CLAUSES = ("expected", "got")
 
 
 @dataclass(slots=True)
@@ -47,42 +63,73 @@ class Language:
         return _BLOCK.sub(self._block, head) + page[end:]
 
     def _block(self, found: re.Match[str]) -> str:
+        if _QUOTED.fullmatch(found[1]):
+            return found[0]
         parts = _SEPARATOR.split(found[3])
         return found[1] + "".join(x if i % 2 else self._text(x) for i, x in enumerate(parts)) + found[4]
 
     def _text(self, text: str) -> str:
         if wrapped := _DOUBT.fullmatch(text):
             return wrapped[1] + self._text(wrapped[2]) + wrapped[3]
-        found = self._known(text) or self._fact(text) or self._joined(text, ": ") or self._joined(text, ", ")
-        if found is None and _WORD.search(_SYMBOLS.sub("", text)):
+        found = self._known(text) or self._fact(text) or self._joined(text)
+        if found is None and _has_words(text) and not _CYRILLIC.search(text):
             self.missing.add(key_of(text))
         return found or text
+
+    def label(self, text: str) -> str:
+        """A text of a picture, which is no HTML yet."""
+        return text if "$" in text else unescape(self._text(escape(text, quote=False)))
 
     def _fact(self, text: str) -> str | None:
         """Name and value; the value may be a name, which no language has."""
         fact = _FACT.fullmatch(text)
         name = self._known(fact[1]) if fact else None
-        return (
-            f"{name} <b>{self._known(fact[2]) or self._joined(fact[2], ', ') or fact[2]}</b>" if fact and name else None
-        )
+        return f"{name} <b>{self._value(fact[2])}</b>" if fact and name else None
 
-    def _joined(self, text: str, by: str) -> str | None:
-        """A list of texts, each of them known."""
-        parts = [self._known(x) or (self._joined(x, ", ") if by != ", " else None) for x in text.split(by)]
-        return None if len(parts) < 2 or None in parts else by.join(x for x in parts if x)
+    def _value(self, text: str) -> str:
+        found = self._known(text) or self._joined(text)
+        if found is None and _QUANTITY.match(key_of(text)):
+            self.missing.add(key_of(text))
+        return found or text
+
+    def _joined(self, text: str) -> str | None:
+        """A list, or a row of sentences, each part known or without words: which of them a page has depends on the run.
+
+        The longest parts are tried first: a part may have commas of its own.
+        """
+        for gap in reversed(list(_GAP.finditer(text))):
+            head, rest = self._part(text[: gap.start()]), text[gap.end() :]
+            if head is not None and (tail := self._part(rest) or self._joined(rest)):
+                return head + gap[0] + tail
+        return None
+
+    def _part(self, text: str) -> str | None:
+        return self._known(text) or self._clause(text) or (None if _has_words(text) else text)
+
+    def _clause(self, text: str) -> str | None:
+        """Of psabench.errors.expected: what was expected, what was got."""
+        word, _, rest = text.partition(" ")
+        if word not in _CLAUSES or word not in self.texts:
+            return None
+        found = self._known(rest) or (None if _has_words(rest) else rest)
+        return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
-        key = key_of(text)
+        key, numbers = key_of(text), _NUMBER.findall(text)
         words = self.texts.get(key)
-        if not words:
+        if not words or key.count("{}") != len(numbers):  # braces of its own: a schema, a regular expression
             return None
         self.found.add(key)
-        return words.format(*_NUMBER.findall(text))
+        return words.format(*numbers)
 
 
 def key_of(text: str) -> str:
     """The msgid of a text."""
-    return _NUMBER.sub("{}", text.strip())
+    return _NUMBER.sub("{}", text.strip().replace("&#x27;", "'").replace("&quot;", '"'))
+
+
+def _has_words(text: str) -> bool:
+    return bool(_WORD.search(_SYMBOLS.sub("", key_of(text))))
 
 
 _current: list[Language] = []  # of this run of a command; none: English
@@ -107,6 +154,16 @@ def localised_page(page: str) -> str:
     return _current[0].translate_page(page) if _current else page
 
 
+def is_localised() -> bool:
+    """False: English."""
+    return bool(_current)
+
+
+def localised_label(text: str) -> str:
+    """A text of a picture before it is drawn: the layout makes room for what will be there."""
+    return _current[0].label(text) if _current else text
+
+
 def take_option(words: Sequence[str]) -> tuple[list[str], str]:
     """--lang LANG or --lang=LANG, anywhere in a command line: the other words, and the language. Raises BadInput."""
     left, name, rest = [], ENGLISH, iter(words)
@@ -123,7 +180,7 @@ def take_option(words: Sequence[str]) -> tuple[list[str], str]:
 
 
 def known_languages() -> Sequence[str]:
-    return (ENGLISH, *sorted(p.stem for p in LOCALE.glob("*.po")))
+    return (ENGLISH, *sorted(p.name for p in LOCALE.iterdir() if p.is_dir()))
 
 
 def load_language(name: str) -> Language | None:
@@ -135,5 +192,5 @@ def load_language(name: str) -> Language | None:
     need_extra("languages", OPTION)
     import polib  # of who asks for a translation
 
-    catalogue = polib.pofile(str(LOCALE / f"{name}.po"))
-    return Language(name=name, texts={e.msgid: e.msgstr for e in catalogue if not e.fuzzy and not e.obsolete})
+    entries = (e for path in sorted((LOCALE / name).glob("*.po")) for e in polib.pofile(str(path)))
+    return Language(name=name, texts={e.msgid: e.msgstr for e in entries if not e.fuzzy and not e.obsolete})

@@ -90,14 +90,24 @@ def write_report(folder: Path, data: Mapping[str, Any], page: str, json_name: st
 
 def verdict_line(text: str, good: bool | None) -> str:
     """The verdict, green or red; None: neither."""
+    return verdict_html(escape(text), good)
+
+
+def verdict_html(text: str, good: bool | None) -> str:
+    """The same of HTML."""
     kind = "plain" if good is None else "good" if good else "bad"
-    return f"<p class='verdict {kind}'>{escape(text)}</p>"
+    return f"<p class='verdict {kind}'>{text}</p>"
 
 
-def section(heading: str, *parts: str, kind: str = "") -> str:
-    """A card; parts are HTML."""
-    mark = f" class={kind}" if kind else ""
-    return f"<section{mark}><h2>{escape(heading)}</h2>{''.join(parts)}</section>"
+def quoted(text: str) -> str:
+    """A text that stays as it is in a report of another language."""
+    return f"<span lang=en>{escape(text)}</span>"
+
+
+def section(heading: str, *parts: str, kind: str = "", lang: str = "") -> str:
+    """A card; parts are HTML. lang: the heading is quoted, in this language."""
+    mark, quote = f" class={kind}" if kind else "", f" lang={lang}" if lang else ""
+    return f"<section{mark}><h2{quote}>{escape(heading)}</h2>{''.join(parts)}</section>"
 
 
 def table(

@@ -21,6 +21,7 @@ from psabench.estimate.uncertainty import Estimate
 from psabench.procedures.result import FaceSeries
 from psabench.report.grading import Section, sensor_of
 from psabench.report.nominal import Nominal
+from psabench.report.picture_texts import localise_texts
 
 # Stand-ins that matplotlib can draw with -> what the page defines. Series colours keep their contrast on both grounds.
 INK, MUTED, _GRID = "#010203", "#010204", "#010205"
@@ -78,6 +79,7 @@ def svg(figure: Figure, name: str) -> str:
     """Inline SVG in CSS variables; `name` keeps the ids of several pictures apart. Same input, same bytes."""
     out = io.StringIO()
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
+        localise_texts(figure)
         figure.draw_without_rendering()  # the layout may change the ticks, and their labels the layout
         figure.savefig(out, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     text = out.getvalue()

@@ -78,7 +78,7 @@ def write_page(out: Path, season: Season) -> Path:
         rows.append([f"{r.number}", error, "yes" if r.corrected else "no", f"{r.weight:.2f}", f"{nu:.4f}", f"{df:.2e}"])
     verdicts = [f"flight {r.number}: {r.verdict}" for r in season.rows if r.verdict]
     parts = [
-        verdict_line(verdict_words(season), None),
+        verdict_line(verdict_words(season).partition(": ")[2], None),  # the unit is in the page's head
         section("Flights", table(rows), figure(_draw_errors(season)), bullets(verdicts)),
         section("How to read it", bullets(NOTES)),
     ]

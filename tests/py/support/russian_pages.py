@@ -1,0 +1,51 @@
+"""Each report that a test of ours writes has a Russian text for each of its texts.
+
+Registered by tests/conftest.py. Reports of commands that tests start as processes say it themselves: --lang ru.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+
+import pytest
+from psabench.report import page as page_module
+from psabench.report.language import Language, load_language
+
+NO_REPORTS = {"A page", "p"}  # of tests of the frame around a report
+TITLE = re.compile(r"<title>(.*?)</title>")
+TEXT = re.compile(r">([^<>]+)<")
+HEAD = re.compile(r"<style>.*?</style>|<title>.*?</title>|<(?:defs|metadata)>.*?</(?:defs|metadata)>", re.DOTALL)
+QUOTED = re.compile(r"<(\w+)\b[^>]* lang=en>.*?</\1>", re.DOTALL)
+FACTS = re.compile(r"<p class=facts>.*?</p>", re.DOTALL)  # values may be names of the user's
+ENGLISH = re.compile(r"\b(?:the|of|and|is|are|no|not|in|with|from|at|by|to|all|each|it|its|error|run|time|unit)\b")
+
+
+@functools.cache
+def catalogue() -> Language:
+    found = load_language("ru")
+    assert found is not None
+    return found
+
+
+def untranslated(page: str) -> list[str]:
+    """Texts of a page that are English in Russian."""
+    ru = Language(name="ru", texts=catalogue().texts)
+    shown = ru.translate_page(page).partition("<footer>")[0]
+    texts = TEXT.findall(FACTS.sub("", QUOTED.sub("", HEAD.sub("", shown))))
+    return sorted(ru.missing) + [text for text in texts if ENGLISH.search(text)]
+
+
+@pytest.fixture(autouse=True)
+def reports_have_russian_texts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A test that writes a report with an English text fails."""
+    as_written = page_module.localised_page
+
+    def checked(page: str) -> str:
+        title = TITLE.search(page)
+        if title is None or title[1] not in NO_REPORTS:
+            left = untranslated(page)
+            assert not left, f"English in {title and title[1]}:\n" + "\n".join(left)
+        return as_written(page)
+
+    monkeypatch.setattr(page_module, "localised_page", checked)
