@@ -1,9 +1,10 @@
 """Reports in another language: the texts of a finished page, looked up in a gettext catalogue.
 
-A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers and quotes (lang=en) taken out:
-"residual <b>{} µV</b> rms". So each report is translated in one place, where it is written, and procedures know of no
-language. A text that is not in the catalogue as a whole is put together from its sentences and its parts. Texts of a
-drawn picture are translated before its layout. Numbers keep their decimal point, as in result.json.
+A text is what is between two tags of a block (heading, cell, paragraph, label of a picture), its numbers and quotes
+(lang=en) taken out: "residual <b>{} µV</b> rms". So each report is translated in one place, where it is written, and
+procedures know of no language. A text that is not in the catalogue as a whole is put together from its sentences and
+its parts. Texts of a drawn picture are translated before its layout. Numbers keep their decimal point, as in
+result.json.
 locale/LANG/*.po: docs/tools/languages.md
 """
 

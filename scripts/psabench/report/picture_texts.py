@@ -1,4 +1,4 @@
-"""Texts of a picture in the language of the report: translated before the layout, and made to fit where they are longer.
+"""Texts of a picture in the language of the report: translated before the layout, made to fit where they are longer.
 
 A label or a title that does not fit into its picture becomes two lines; a legend that is wider becomes smaller.
 """
