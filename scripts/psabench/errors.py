@@ -59,6 +59,11 @@ class LinkError(BenchError):
     """A link to the bench is missing, was closed, or lost something."""
 
 
+def port_in_use(port: int, where: str) -> LinkError:
+    """A port of this machine that another program has."""
+    return LinkError(expected("a free port of 127.0.0.1", f"{port}, which is in use", where))
+
+
 class ControlError(BenchError):
     """The emulator's control socket rejected a command; nothing has changed."""
 

@@ -54,6 +54,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *args: Any, **how: Any) -> None:
         super().__init__(*args, **{"formatter_class": Help, **how})
+        self.color = False  # Python 3.14 would colour the help of a terminal; nothing else of ours has colours
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Raises BadInput, for an unknown argument as well."""

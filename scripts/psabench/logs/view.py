@@ -20,7 +20,7 @@ from foxglove import Channel, Schema
 from mcap_ros2._dynamic import serialize_dynamic
 
 from psabench.boards.psa2.frames import FrameReader
-from psabench.errors import BadInput, LinkError, expected
+from psabench.errors import LinkError, expected
 from psabench.link.can_host import CanHost, Message, WallClock
 from psabench.link.record import ctrl_c_noted, receive_until
 from psabench.logs.records import RAW_SCHEMA, RAW_TOPIC, Decoder, raw_record, schema, stamp_ns, units
@@ -124,7 +124,7 @@ def view(
 ) -> Viewed:
     """Serve until for_s of wall time have passed, or Ctrl-C, or the link ends. Call it on the main thread.
 
-    port: 0 takes a free one. ready: gets the address when clients can connect. Raises BadInput for a port in use.
+    port: 0 takes a free one. ready: gets the address when clients can connect. Raises LinkError for a port in use.
     """
     context = foxglove.Context()
     publisher = Publisher(context, node, board, v_per_g)  # its channels first: a client may subscribe at once
@@ -172,7 +172,7 @@ class _Server:
                 name="psabench", host=HOST, port=port, context=context, message_backlog_size=BACKLOG
             )
         except (OSError, RuntimeError) as e:
-            raise BadInput(expected(f"a free port of {HOST}, or 0 (any free port)", f"{port} ({e})", "--port")) from e
+            raise LinkError(expected(f"a free port of {HOST}, or 0 (any free port)", f"{port} ({e})", "--port")) from e
         self.port = int(self._server.port)
 
     def close(self) -> None:

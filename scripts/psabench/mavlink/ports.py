@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from psabench.errors import BadInput, LinkError, expected
+from psabench.errors import LinkError, expected, port_in_use
 
 HOST = "127.0.0.1"
 DEFAULT_PORTS = {"udp": 14550, "udpin": 14550, "tcp": 5760}
@@ -56,7 +56,7 @@ class Peer:
 
 
 class Port:
-    """One port and its peers. Raises BadInput where the port is in use."""
+    """One port and its peers. Raises LinkError where the port is in use."""
 
     def __init__(self, spec: PortSpec, new_parser: Callable[[], Parser]) -> None:
         self.host, self.lost = HOST, 0
@@ -85,7 +85,7 @@ class Port:
         except OSError as e:
             s.close()
             if e.errno == errno.EADDRINUSE:
-                raise BadInput(expected(f"a free port of {HOST}", f"{spec.port}, which is in use", "--mavlink")) from e
+                raise port_in_use(spec.port, "--mavlink") from e
             raise LinkError(f"--mavlink {spec.kind}:{spec.port}: {e.strerror}") from e
         return s
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import errno
 import logging
 import socket
 from collections.abc import Callable, Iterator
@@ -13,7 +14,7 @@ from pathlib import Path
 import uvicorn
 
 from psabench.bench import Bench
-from psabench.errors import LinkError
+from psabench.errors import LinkError, port_in_use
 from psabench.options import of_fields
 from psabench.output import show_event
 from psabench.panel.bench_view import BenchView
@@ -70,6 +71,8 @@ def _listen_loopback(port: int) -> Iterator[socket.socket]:
             listener.bind(("127.0.0.1", port))
             listener.listen(64)
         except OSError as e:
+            if e.errno == errno.EADDRINUSE:
+                raise port_in_use(port, "--port") from e
             raise LinkError(f"127.0.0.1:{port}: {e.strerror}") from e
         yield listener
 

@@ -11,11 +11,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
 from psabench import cli
 from psabench.emulator import Emulator
+from psabench.errors import LinkError
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -140,11 +142,20 @@ def test_hostile_bytes_and_vanished_and_slow_readers_disturb_no_one() -> None:
         assert int(warned[1]) >= 6
 
 
-def test_a_port_in_use_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "line", ["view --can virtual:x --port PORT", "panel --port PORT", "mavlink --log run.log --mavlink tcp:PORT"]
+)
+def test_a_port_in_use_is_a_failed_link_in_every_command(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("run.log").write_text("(0.1) can0 185#0000000000000000\n")
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        assert cli.main(["view", "--can", "virtual:x", "--port", str(port)]) == 2
-    assert f"--port: expected a free port of 127.0.0.1, or 0 (any free port), got {port} (" in capsys.readouterr().err
+        port = str(taken.getsockname()[1])
+        assert cli.main(line.replace("PORT", port).split()) == LinkError.exit_status == 3
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert re.match(rf"psabench: --(port|mavlink): expected a free port of 127.0.0.1.*, got {port}\b", err)
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "x"])

@@ -429,6 +429,12 @@ def test_what_the_options_repeat_is_what_the_libraries_have() -> None:
     assert offered.COMPARE[0] == compare_converters.NAME
 
 
+def test_help_has_no_colours_whatever_python_offers() -> None:
+    """argparse of Python 3.14 looks at this attribute."""
+    assert vars(cli.parser())["color"] is False
+    assert vars(run_command._parser_of(COMMANDS["turns"]))["color"] is False
+
+
 @pytest.mark.parametrize(
     ("line", "kept"),
     [

@@ -162,7 +162,7 @@ def test_a_converted_log_is_counted(log: Path, tmp_path: Path, capsys: pytest.Ca
 def test_findings_in_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "still.csv"
     still = np.random.default_rng(1).normal(size=(400, 6)) * 1e-6
-    end_s = (np.arange(400) + 1) * 0.01
+    end_s = np.arange(1, 401, dtype=np.float64) * 0.01
     write_csv(path, Increments(dt_s=0.01, end_s=end_s, dtheta_rad=still[:, :3], dv_mps=still[:, 3:]))
     status, found = run_json(capsys, "nav", "check", str(path))
     assert status == 1

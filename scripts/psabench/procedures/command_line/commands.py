@@ -103,19 +103,8 @@ _PLATFORM = (
 _HEAD = tuple(COMMON)
 _TABLE = ("--scenario", "--can", "--control", *ON_THE_TABLE, "--seed", "--real-time", "--out", "--verbose")
 _CHAMBER = (
-    *(
-        "--schedule",
-        "--resume",
-        "--fresh",
-        "--can",
-        "--head",
-        "--chamber",
-        "--control",
-        "--truth",
-        "--scenario",
-        "--node",
-    ),
-    *("--gravity", "--seed", "--real-time", "--out", "--verbose"),
+    *("--schedule", "--resume", "--fresh", "--can", "--head", "--chamber", "--control", "--truth", "--scenario"),
+    *("--node", "--gravity", "--seed", "--real-time", "--out", "--verbose"),
 )
 
 _FLIGHT = ("--scenario", "--can", "--control", "--receiver", "--data", "--seed", "--real-time", "--out", "--verbose")

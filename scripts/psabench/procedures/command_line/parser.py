@@ -25,16 +25,8 @@ Exit status: 0 done and within limits, 1 a result is off by more than its limits
 """
 
 SCRIPT = "script"  # psabench.shell.command_line has its parser
-FLAGS = (
-    "-h",
-    "--help",
-    "--list",
-    "--real-time",
-    "--fresh",
-    "--json",
-    "-v",
-    "--verbose",
-)  # the options that take no value
+# The options that take no value.
+FLAGS = ("-h", "--help", "--list", "--real-time", "--fresh", "--json", "-v", "--verbose")
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
