@@ -48,7 +48,7 @@ MAY_INCLUDE = {
 # What nav takes of emu: elementary functions of the same bytes on every machine.
 NAV_FROM_EMU = {("nav/common", "emu/base/detmath.h")}
 INSIDE = {"board/bins": "board/psa2"}  # a board that has another one inside
-ONE_ROOM = {"base", "phys", "link"}  # layers whose parts may include each other
+ONE_ROOM = {"app", "base", "phys", "link"}  # layers whose parts may include each other
 # C11 without the headers of clocks, signals, locales, threads and jumps: those are the operating system's business.
 C_HEADERS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits math stdalign stdarg stdbool stddef stdint "

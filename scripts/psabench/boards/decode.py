@@ -38,19 +38,19 @@ def csv_table(out: IO[str]) -> WriteTable:
     """Names of columns before the first row."""
     csv_file = csv.writer(out, lineterminator="\n")
 
-    def write(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
+    def write_rows(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
         csv_file.writerows([names, *rows] if first else rows)
 
-    return write
+    return write_rows
 
 
 def json_table(out: IO[str]) -> WriteTable:
     """An object a row: its keys are the names of the columns."""
 
-    def write(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
+    def write_rows(names: Sequence[str], rows: Sequence[Row], first: bool) -> None:
         out.writelines(f"{json_line(dict(zip(names, row, strict=True)))}\n" for row in rows)
 
-    return write
+    return write_rows
 
 
 def decode_can(

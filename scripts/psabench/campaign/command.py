@@ -148,7 +148,7 @@ def _studies_dict() -> dict[str, Any]:
         {"study": s.name, "title": s.title, "cases": [{"case": c.name, "title": c.title} for c in s.cases(Setup())]}
         for s in STUDIES.values()
     ]
-    return {"studies": studies, "settings": settings.rows()}
+    return {"studies": studies, "settings": settings.setting_rows()}
 
 
 def _case_names(cases: Sequence[Case]) -> list[str]:

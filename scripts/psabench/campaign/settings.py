@@ -70,7 +70,7 @@ def lines() -> Iterator[str]:
         yield f"  {shown[name]:{width}}  {unit}{s.about}{choices}"
 
 
-def rows() -> list[dict[str, object]]:
+def setting_rows() -> list[dict[str, object]]:
     """Of --list --json: name, the article's value (null: any), unit, meaning, choices or range."""
     plain = Setup()
     return [
