@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,14 +38,13 @@ class BenchView:
     bench: Bench
     out: Path
     start: str = ""
-    tick: Callable[[], None] = lambda: None
     session: Session = field(init=False)
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
     _viewed_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.session = Session(self.bench, self.start, tick=self.tick)
+        self.session = Session(self.bench, self.start)
         self.channels = {name: Channels() for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import uvicorn
 
 from psabench.bench import Bench
-from psabench.errors import LinkError
+from psabench.errors import BenchError, LinkError
 from psabench.options import of_fields
 from psabench.panel.bench_view import BenchView
 from psabench.panel.guard import Door, Log
@@ -47,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
         finally:
             runs.close()
             worker.stop()
+    if worker.died:
+        raise BenchError(worker.died)
     return 0
 
 
@@ -71,11 +73,11 @@ def _listen_loopback(port: int) -> Iterator[socket.socket]:
 
 
 async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, reports: Path) -> None:
-    hub.loop = asyncio.get_running_loop()
+    hub.loop = loop = asyncio.get_running_loop()
     door = Door(port=listener.getsockname()[1])
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # a hostile client must not fill the terminal
     config = uvicorn.Config(
-        Pages(hub.hub, worker.ask, Log(), reports).app(door),
+        Pages(hub.hub, worker.ask, worker.inbox.greet, Log(), reports).app(door),
         log_config=None,
         access_log=False,
         proxy_headers=False,  # there is no proxy whose headers could be trusted
@@ -90,5 +92,12 @@ async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, repo
         timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)
+
+    def end() -> None:
+        loop.call_soon_threadsafe(setattr, server, "should_exit", True)
+
+    worker.on_death = end
+    if worker.died:
+        return
     print(f"ready {door.address}", flush=True)
     await server.serve(sockets=[listener])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import queue
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any, Protocol
 from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
 from psabench.panel.bench_view import BenchView
+from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
 
 UPDATE_S = 1 / 30
@@ -24,7 +24,6 @@ STATE_S = 0.25
 CAN_S = 0.2
 OVERVIEW_S = 0.5
 RETRY_S = 1.0  # real time between looks whether an emulator is there again
-WAITING = 64  # requests; a page that asks for more is refused
 SLOWEST, FASTEST = 0.001, 1000.0  # of simulated time to real time
 
 
@@ -70,11 +69,12 @@ class Worker:
     restored: Callable[[Path], BenchView] | None = None  # a view of a bench from a snapshot; None: it is another's
     playing: bool = True
     speed: float = 1.0
-    requests: queue.Queue[tuple[int, dict[str, Any]]] = field(default_factory=lambda: queue.Queue(WAITING))
+    inbox: Inbox = field(default_factory=Inbox)
     ready: threading.Event = field(default_factory=threading.Event)
     failed: BenchError | None = None  # of the first opening
+    died: str = ""  # why the thread has ended by itself: an error of ours
+    on_death: Callable[[], None] = lambda: None
     lost: str = ""
-    busy: str = ""
     _view: BenchView | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
@@ -101,7 +101,11 @@ class Worker:
 
     def ask(self, number: int, request: dict[str, Any]) -> None:
         """Raises queue.Full."""
-        self.requests.put_nowait((number, request))
+        if request["do"] == "interrupt":
+            answer = {"id": request.get("id"), "kind": "answer", "line": self.inbox.stop_line()}
+            self.outlet.answer(number, text_of(answer))
+            return
+        self.inbox.put(number, request)
 
     # ---- in its own
 
@@ -116,17 +120,18 @@ class Worker:
         try:
             while not self._stop.is_set():
                 self._turn()
-        except Exception:
-            self.outlet.publish(
-                text_of({"kind": "lost", "why": "an error in the panel, see its terminal; start it again"})
-            )
-            raise
+        except BaseException as e:
+            self.died = f"panel: an error of its own has ended it: {e!r} at {_place(e)}"
+            self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
+            self.on_death()
         finally:
             self._close()
 
     def _open(self) -> BenchView:
-        view = self.opened()
-        view.session.tick = self._tick
+        return self._prepared(self.opened())
+
+    def _prepared(self, view: BenchView) -> BenchView:
+        view.bench.between = self._between
         self._moved_s = time.monotonic()
         return view
 
@@ -140,7 +145,8 @@ class Worker:
         try:
             if self._view is None:
                 self._come_back()
-            self._answer_all()
+            self._answer(self.inbox.aside())
+            self._answer(self.inbox.in_order())
             if self._view is not None:
                 self._move(self._view)
                 self._say_news()
@@ -150,7 +156,7 @@ class Worker:
             self._lose(f"the bench does not go on: {e}")
 
     def _lose(self, why: str) -> None:
-        self.lost, self.busy = why, ""
+        self.lost = why
         self._close()
         self.outlet.publish(text_of({"kind": "lost", "why": why}))
 
@@ -187,20 +193,25 @@ class Worker:
     def _wait_request(self, for_s: float) -> None:
         """Sleep, but not while a page waits for an answer."""
         deadline_s = time.monotonic() + for_s
-        while self.requests.empty() and (left_s := deadline_s - time.monotonic()) > 0 and not self._stop.is_set():
+        while self.inbox.is_empty and (left_s := deadline_s - time.monotonic()) > 0 and not self._stop.is_set():
             time.sleep(min(left_s, 0.005))
 
-    def _tick(self) -> None:
-        """While a long line goes on: pages see it go."""
-        self._say_news()
+    def _between(self) -> None:
+        """Between two slices of time: while a line goes on, pages see it go, and can stop it."""
+        if not self.inbox.busy:
+            return
+        self.inbox.check()
         if self._stop.is_set():
             raise BenchError("panel: ended")
+        self._answer(self.inbox.aside())
+        self._say_news()
 
     def _say_news(self) -> None:
         view = self._view
         if view is None or not self._updates():
             return
-        buckets = view.take(self._overviews())
+        # A line of the unit waits for its frames: what it has not taken yet is not ours.
+        buckets = {} if self.inbox.busy.startswith("dut.") else view.take(self._overviews())
         if not self.outlet.is_watched():
             return
         self.outlet.publish(text_of({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
@@ -224,29 +235,20 @@ class Worker:
             "t_s": round(self._view.now_s(), 9),
             "playing": self.playing or self._view.bench.pace != "step",
             "speed": self.speed,
-            "busy": self.busy,
+            "busy": self.inbox.busy,
         }
 
     # ---- requests
 
-    def _answer_all(self) -> None:
-        for _ in range(WAITING):
+    def _answer(self, requests: Iterable[Asked]) -> None:
+        for number, request in requests:
             try:
-                number, request = self.requests.get_nowait()
-            except queue.Empty:
-                return
-            self._answer(number, request)
-
-    def _answer(self, number: int, request: dict[str, Any]) -> None:
-        try:
-            result = self._result(request)
-        except Exception as e:  # whatever a page asks for, the others go on
-            result = {"kind": "answer", "error": self._error_of(e)}
-        finally:
-            self.busy = ""
-        self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
-        if "error" in result and self._view is not None:
-            self._view.now_s()  # raises LinkError where it was the bench that has gone, and not a unit that is silent
+                result = self._result(request)
+            except Exception as e:  # whatever a page asks for, the others go on
+                result = {"kind": "answer", "error": self._error_of(e)}
+            self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
+            if "error" in result and self._view is not None:
+                self._view.now_s()  # raises LinkError where the bench has gone, and not where a unit is silent
 
     def _error_of(self, e: Exception) -> str:
         if isinstance(e, BenchError | ValueError | OSError):
@@ -271,9 +273,9 @@ class Worker:
 
     def line(self, text: str) -> dict[str, Any]:
         """Carry out a line of the shell."""
-        self.busy = text[:200]
         before = self.view.session.dut_name
-        done = self.view.line(text)
+        with self.inbox.doing(text.strip()):
+            done = self.view.line(text)
         self._moved_s = time.monotonic()
         if str(done.get("line", "")).startswith("bench.snapshot "):
             self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
@@ -287,9 +289,8 @@ class Worker:
             raise BenchError("panel: go back: this emulator was not started by the panel")
         new = self.restored(self.view.file(name))
         self._close()
-        self._view = new
-        new.session.tick = self._tick
-        self.playing, self._moved_s = False, time.monotonic()
+        self._view = self._prepared(new)
+        self.playing = False
         self.outlet.publish(text_of(self.hello()))
         return {"time": self._time()}
 
@@ -300,6 +301,12 @@ class Worker:
         self.playing, self.speed = request.get("on") is True, float(speed)
         self._moved_s = time.monotonic()
         return {"time": self._time()}
+
+
+def _place(e: BaseException) -> str:
+    """The line of ours that raised it."""
+    last = traceback.extract_tb(e.__traceback__)[-1]
+    return f"{Path(last.filename).name}:{last.lineno}"
 
 
 def _run_procedure(w: Worker, request: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
 import * as statistics from "./statistics.js";
 
@@ -82,10 +83,13 @@ function take(message) {
 function time(t) {
   now = t.t_s;
   playing = t.playing;
+  interrupt.show(t.busy);
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
   $("#play").textContent = playing ? "Pause" : "Run";
   $("#play").setAttribute("aria-pressed", playing);
 }
+
+interrupt.offer(link);
 
 const play = (on) => link.ask({ do: "play", on, speed: Number($("#speed").value) }).then((a) => time(a.time), (e) => complain(e.message));
 const step = async (length) => { if (playing) await play(false); say(`wait ${length}`); };
