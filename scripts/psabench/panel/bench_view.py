@@ -23,6 +23,7 @@ from psabench.report.waveform import frame_picture
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
+from psabench.shell.transcript import Transcript
 
 FILE_ARGS = ("path", "file")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
@@ -41,10 +42,12 @@ class BenchView:
     session: Session = field(init=False)
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
+    histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot, by its name
     _viewed_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.session = Session(self.bench, self.start)
+        self.session.transcript.lockstep = False  # the page moves time, and no line says so
         self.channels = {name: Channels() for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
 
@@ -62,6 +65,8 @@ class BenchView:
         outcome = self.session.do(self._allowed(text))
         if outcome is None:
             return {"text": "", "result": {}}
+        if outcome.call.command.name == "bench.snapshot":
+            self.histories[Path(str(outcome.call.args["path"])).name] = self.session.transcript.copy()
         return {"line": outcome.call.line, "text": outcome.text, "result": outcome.result, "failed": outcome.failed}
 
     def _allowed(self, text: str) -> str:
@@ -83,6 +88,12 @@ class BenchView:
         if not PLAIN_NAME.fullmatch(name):
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
         return self.out / name
+
+    def go_on_from(self, name: str, before: BenchView) -> None:
+        """This bench comes from a snapshot of the one before: so does its script, where the panel has seen it made."""
+        self.histories = before.histories
+        if name in self.histories:
+            self.session.transcript = self.histories[name].copy()
 
     def frame(self) -> str:
         """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""

@@ -288,6 +288,7 @@ class Worker:
         if self.restored is None:
             raise BenchError("panel: go back: this emulator was not started by the panel")
         new = self.restored(self.view.file(name))
+        new.go_on_from(name, self.view)
         self._close()
         self._view = self._prepared(new)
         self.playing = False
