@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import panel_run as run
-import pytest
 from psabench import Bench
 from websockets.sync.client import ClientConnection
 
