@@ -12,15 +12,15 @@ from pathlib import Path
 
 import uvicorn
 
-from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError
 from psabench.options import of_fields
-from psabench.panel.bench_view import BenchView
 from psabench.panel.guard import Door, Log
+from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
-from psabench.panel.worker import Worker, bench_of, text_of
+from psabench.panel.source import Source
+from psabench.panel.worker import Worker, text_of
 from psabench.shell.connect import Opening, addresses
 
 
@@ -30,15 +30,9 @@ def run(args: argparse.Namespace) -> int:
     hub = ThreadedHub(Hub())
 
     out = args.out.resolve()
-
-    def opened() -> BenchView:
-        return bench_of(lambda: _open_bench(opening, args.truth), lambda b: BenchView(b, out, opening.start))
-
-    def restored(path: Path) -> BenchView:
-        return bench_of(lambda: Bench.restore(path, pace=opening.pace or "step"), lambda b: BenchView(b, out))
-
+    source = Source(opening, out, args.truth)
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
-    worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
+    worker = Worker(source, hub, runs, HANDLERS, playing=not args.paused)
     with _listen_loopback(args.port) as listener:
         try:
             worker.start()
@@ -50,13 +44,6 @@ def run(args: argparse.Namespace) -> int:
     if worker.died:
         raise BenchError(worker.died)
     return 0
-
-
-def _open_bench(opening: Opening, truth: Path | None) -> Bench:
-    bench = opening.open()
-    if truth is not None:
-        bench.truth_path = truth
-    return bench
 
 
 @contextlib.contextmanager

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
 from psabench.panel.bench_view import BenchView
 from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
+from psabench.panel.source import Source
 
 UPDATE_S = 1 / 30
 STATE_S = 0.25
@@ -61,12 +61,12 @@ class Due:
 
 @dataclass(slots=True)
 class Worker:
-    """opened: brings up the bench; called again after it was lost. again: whether it comes back by itself."""
+    """handlers: what a page may ask for, by its "do" (psabench.panel.handlers)."""
 
-    opened: Callable[[], BenchView]
+    source: Source
     outlet: Outlet
     runs: Runs
-    restored: Callable[[Path], BenchView] | None = None  # a view of a bench from a snapshot; None: it is another's
+    handlers: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]]
     playing: bool = True
     speed: float = 1.0
     inbox: Inbox = field(default_factory=Inbox)
@@ -128,7 +128,7 @@ class Worker:
             self._close()
 
     def _open(self) -> BenchView:
-        return self._prepared(self.opened())
+        return self._prepared(self.source.open())
 
     def _prepared(self, view: BenchView) -> BenchView:
         view.bench.between = self._between
@@ -168,13 +168,13 @@ class Worker:
             self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
             return
         self.lost = ""
-        self.outlet.publish(text_of(self.hello()))
+        self.outlet.publish(text_of(self.hello() | {"began": "bench found again"}))
 
     def hello(self) -> dict[str, Any]:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
-        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.restored is not None}
-        return self._view.describe() | {"time": self._time()} | procedures
+        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
+        return self._view.describe() | {"time": self.time()} | procedures
 
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
@@ -214,7 +214,7 @@ class Worker:
         buckets = {} if self.inbox.busy.startswith("dut.") else view.take(self._overviews())
         if not self.outlet.is_watched():
             return
-        self.outlet.publish(text_of({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
+        self.outlet.publish(text_of({"kind": "update", "time": self.time(), **({"new": buckets} if buckets else {})}))
         if self._states():
             self.outlet.publish(text_of(view.state(lines=self.outlet.wants_lines())))
             if self.outlet.wants_truth():
@@ -229,7 +229,7 @@ class Worker:
             message = {"kind": "truth", "error": str(e)}
         self.outlet.publish(text_of(message), truth=True)
 
-    def _time(self) -> dict[str, Any]:
+    def time(self) -> dict[str, Any]:
         assert self._view is not None
         return {
             "t_s": round(self._view.now_s(), 9),
@@ -259,9 +259,9 @@ class Worker:
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
         what = str(request.get("do"))
-        handler = HANDLERS.get(what)
+        handler = self.handlers.get(what)
         if handler is None:
-            raise BenchError(expected(", ".join(HANDLERS), repr(what[:40]), "do"))
+            raise BenchError(expected(", ".join(self.handlers), repr(what[:40]), "do"))
         return {"kind": "answer", **handler(self, request)}
 
     @property
@@ -281,19 +281,14 @@ class Worker:
             self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
         if self.view.session.dut_name != before:
             self.outlet.publish(text_of(self.hello()))
-        return done | {"time": self._time()}
+        return done | {"time": self.time()}
 
-    def restore(self, name: str) -> dict[str, Any]:
-        """Go back: an emulator from the snapshot takes the place of ours. Raises BenchError, and ours goes on."""
-        if self.restored is None:
-            raise BenchError("panel: go back: this emulator was not started by the panel")
-        new = self.restored(self.view.file(name))
-        new.go_on_from(name, self.view)
+    def exchange(self, new: BenchView, why: str, *, playing: bool | None = None) -> None:
+        """A bench that takes the place of ours, which ends. playing: None: time goes on or stands still as before."""
         self._close()
-        self._view = self._prepared(new)
-        self.playing = False
-        self.outlet.publish(text_of(self.hello()))
-        return {"time": self._time()}
+        self._view, self.lost = self._prepared(new), ""
+        self.playing = self.playing if playing is None else playing
+        self.outlet.publish(text_of(self.hello() | {"began": why}))
 
     def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)
@@ -301,36 +296,13 @@ class Worker:
             raise BenchError(expected(f"{SLOWEST:g} to {FASTEST:g}", repr(speed)[:40], "speed"))
         self.playing, self.speed = request.get("on") is True, float(speed)
         self._moved_s = time.monotonic()
-        return {"time": self._time()}
+        return {"time": self.time()}
 
 
 def _place(e: BaseException) -> str:
     """The line of ours that raised it."""
     last = traceback.extract_tb(e.__traceback__)[-1]
     return f"{Path(last.filename).name}:{last.lineno}"
-
-
-def _run_procedure(w: Worker, request: Mapping[str, Any]) -> dict[str, Any]:
-    w.runs.start(str(request.get("name", "")))
-    return {}
-
-
-def _stop_procedure(w: Worker, _: Mapping[str, Any]) -> dict[str, Any]:
-    w.runs.stop()
-    return {}
-
-
-# What a page may ask for, by its "do"; `watch` is the server's own.
-HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = {
-    "hello": lambda w, _: w.hello(),
-    "play": lambda w, request: w.play(request),
-    "line": lambda w, request: w.line(str(request.get("line", ""))),
-    "frame": lambda w, _: {"svg": w.view.frame()},
-    "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
-    "restore": lambda w, request: w.restore(str(request.get("file", ""))),
-    "run": _run_procedure,
-    "stop": _stop_procedure,
-}
 
 
 def text_of(message: dict[str, Any]) -> str:
@@ -347,13 +319,3 @@ def _without_nan(x: Any) -> Any:
     if isinstance(x, list | tuple):
         return [_without_nan(v) for v in x]
     return None if isinstance(x, float) and not math.isfinite(x) else x
-
-
-def bench_of(opened: Callable[[], Bench], make: Callable[[Bench], BenchView]) -> BenchView:
-    """A view of a bench that is closed again where there is none to be had."""
-    bench = opened()
-    try:
-        return make(bench)
-    except BaseException:
-        bench.close()
-        raise

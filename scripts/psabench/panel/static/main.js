@@ -6,6 +6,7 @@ import * as plots from "./plots.js";
 import * as cards from "./cards.js";
 import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
+import * as scenario from "./scenario.js";
 import * as statistics from "./statistics.js";
 
 let hello = null, now = 0, playing = false;
@@ -53,6 +54,8 @@ const HANDLERS = {
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
+    scenario.offer(m, link);
+    if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },

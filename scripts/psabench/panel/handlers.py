@@ -1,0 +1,94 @@
+"""What a page may ask for, by its `do`; `watch` and `interrupt` are answered before (server, worker)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from psabench.errors import expected
+from psabench.panel import scenarios
+from psabench.panel.worker import Worker
+from psabench.shell.lexer import Wrong
+
+Request = Mapping[str, Any]
+Handler = Callable[[Worker, Request], dict[str, Any]]
+SEEDS = 2**53  # of psa-emu, whose numbers are those of JSON
+
+
+def _run_procedure(w: Worker, request: Request) -> dict[str, Any]:
+    w.runs.start(_text(request, "name"))
+    return {}
+
+
+def _stop_procedure(w: Worker, _: Request) -> dict[str, Any]:
+    w.runs.stop()
+    return {}
+
+
+def _scenarios(w: Worker, _: Request) -> dict[str, Any]:
+    """Names, and the text of the one that runs."""
+    w.source.check_own("scenario")
+    names = [{"name": s.name, "what": s.what} for s in scenarios.shipped()]
+    return {"names": names, "name": w.source.scenario, "text": scenarios.text_of(w.source.scenario)}
+
+
+def _scenario(w: Worker, request: Request) -> dict[str, Any]:
+    w.source.check_own("scenario")
+    name, known = _text(request, "name"), _known(w)
+    if name not in known:
+        raise Wrong(expected(", ".join(known), repr(name[:40]), "scenario"))
+    return {"text": scenarios.text_of(name)}
+
+
+def _known(w: Worker) -> list[str]:
+    """What a page may read: those that are shipped, and the file that was named when the panel was started."""
+    return list(dict.fromkeys([*(s.name for s in scenarios.shipped()), w.source.scenario]))
+
+
+def _begin(w: Worker, request: Request) -> dict[str, Any]:
+    """A scenario as it stands in the page takes the place of the one that runs."""
+    w.source.check_own("start")
+    text, name, seed = _text(request, "text"), _text(request, "name"), _seed(request)
+    unchanged = name in _known(w) and scenarios.text_of(name) == text
+    scenario = name if unchanged else str(scenarios.checked_file(text, w.source.out))
+    new = w.source.begin(scenario, seed)
+    w.exchange(new, f"scenario {scenario}{'' if seed is None else f', seed {seed}'}")
+    return {"time": w.time()}
+
+
+def _restore(w: Worker, request: Request) -> dict[str, Any]:
+    """Go back: an emulator from the snapshot takes the place of ours."""
+    name = _text(request, "file")
+    new = w.source.restored(w.view.file(name))
+    new.go_on_from(name, w.view)
+    w.exchange(new, f"snapshot {name}", playing=False)
+    return {"time": w.time()}
+
+
+def _text(request: Request, name: str) -> str:
+    value = request.get(name, "")
+    if not isinstance(value, str):
+        raise Wrong(expected("a text", repr(value)[:40], name))
+    return value
+
+
+def _seed(request: Request) -> int | None:
+    seed = request.get("seed")
+    if seed is None or (isinstance(seed, int) and not isinstance(seed, bool) and 0 <= seed <= SEEDS):
+        return seed
+    raise Wrong(expected(f"an integer from 0 to {SEEDS}", repr(seed)[:40], "seed"))
+
+
+HANDLERS: Mapping[str, Handler] = {
+    "hello": lambda w, _: w.hello(),
+    "play": lambda w, request: w.play(request),
+    "line": lambda w, request: w.line(str(request.get("line", ""))),
+    "frame": lambda w, _: {"svg": w.view.frame()},
+    "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
+    "scenarios": _scenarios,
+    "scenario": _scenario,
+    "begin": _begin,
+    "restore": _restore,
+    "run": _run_procedure,
+    "stop": _stop_procedure,
+}
