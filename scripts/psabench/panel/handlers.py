@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from psabench.errors import expected
-from psabench.panel import scenarios
+from psabench.panel import forks, scenarios
 from psabench.panel.worker import Worker
 from psabench.shell.lexer import Wrong
 
@@ -89,6 +89,9 @@ HANDLERS: Mapping[str, Handler] = {
     "scenario": _scenario,
     "begin": _begin,
     "restore": _restore,
+    "fork": lambda w, request: forks.fork(w, _text(request, "file"), _seed(request)),
+    "show": lambda w, request: forks.show(w, _text(request, "name")),
+    "drop": lambda w, request: forks.drop(w, _text(request, "name")),
     "run": _run_procedure,
     "stop": _stop_procedure,
 }

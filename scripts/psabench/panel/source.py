@@ -61,6 +61,16 @@ class Source:
             raise BenchError(f"panel: {what}: this emulator was not started by the panel")
 
 
+def forked(view: BenchView) -> BenchView:
+    """A second bench that goes on from this instant, with the script that leads there. Raises BenchError."""
+    new = bench_of(view.bench.fork, lambda b: BenchView(b, view.out, view.start))
+    new.histories = view.histories
+    new.session.transcript = view.session.transcript.copy()
+    if view.session.dut_name in new.bench.units:
+        new.session.use(view.session.dut_name)
+    return new
+
+
 def bench_of(opened: Callable[[], Bench], make: Callable[[Bench], BenchView]) -> BenchView:
     """A view of a bench that is closed again where there is none to be had."""
     bench = opened()

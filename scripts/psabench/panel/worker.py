@@ -24,6 +24,7 @@ STATE_S = 0.25
 CAN_S = 0.2
 OVERVIEW_S = 0.5
 RETRY_S = 1.0  # real time between looks whether an emulator is there again
+FIRST = "first"  # bench; others are its forks
 SLOWEST, FASTEST = 0.001, 1000.0  # of simulated time to real time
 
 
@@ -75,6 +76,8 @@ class Worker:
     died: str = ""  # why the thread has ended by itself: an error of ours
     on_death: Callable[[], None] = lambda: None
     lost: str = ""
+    name: str = FIRST  # of the bench that is shown
+    resting: dict[str, BenchView] = field(default_factory=dict)  # the others, whose time stands still
     _view: BenchView | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
@@ -126,6 +129,8 @@ class Worker:
             self.on_death()
         finally:
             self._close()
+            for view in self.resting.values():
+                _close_bench(view)
 
     def _open(self) -> BenchView:
         return self._prepared(self.source.open())
@@ -137,8 +142,7 @@ class Worker:
 
     def _close(self) -> None:
         if self._view is not None:
-            with suppress(Exception):  # a connection that is lost closes as it likes
-                self._view.bench.close()
+            _close_bench(self._view)
         self._view = None
 
     def _turn(self) -> None:
@@ -159,11 +163,14 @@ class Worker:
         self.lost = why
         self._close()
         self.outlet.publish(text_of({"kind": "lost", "why": why}))
+        if self.resting:
+            lost, self.name = self.name, FIRST if FIRST in self.resting else next(iter(self.resting))
+            self.exchange(self.resting.pop(self.name), f"{self.name}: {lost} was lost: {why}", playing=False)
 
     def _come_back(self) -> None:
         self._stop.wait(RETRY_S)
         try:
-            self._view = self._open()
+            self._view, self.name = self._open(), FIRST
         except (BenchError, OSError):
             self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
             return
@@ -174,7 +181,12 @@ class Worker:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
-        return self._view.describe() | {"time": self.time()} | procedures
+        return self._view.describe() | {"time": self.time(), "benches": self.benches()} | procedures
+
+    def benches(self) -> dict[str, Any]:
+        """Which bench is shown, and which rest; forks: whether one may be made."""
+        forks = self.source.is_own and self.view.bench.pace == "step"
+        return {"kind": "benches", "shown": self.name, "resting": sorted(self.resting), "forks": forks}
 
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
@@ -290,6 +302,12 @@ class Worker:
         self.playing = self.playing if playing is None else playing
         self.outlet.publish(text_of(self.hello() | {"began": why}))
 
+    def show(self, name: str, view: BenchView, why: str) -> None:
+        """Another bench is shown; ours rests."""
+        self.resting[self.name], self.name = self.view, name
+        self._view = None
+        self.exchange(view, why, playing=False)
+
     def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)
         if isinstance(speed, bool) or not isinstance(speed, int | float) or not SLOWEST <= speed <= FASTEST:
@@ -297,6 +315,11 @@ class Worker:
         self.playing, self.speed = request.get("on") is True, float(speed)
         self._moved_s = time.monotonic()
         return {"time": self.time()}
+
+
+def _close_bench(view: BenchView) -> None:
+    with suppress(Exception):  # a connection that is lost closes as it likes
+        view.bench.close()
 
 
 def _place(e: BaseException) -> str:

@@ -207,15 +207,9 @@ def test_units_of_every_board_show_channels_and_registers(scenario: str, boards:
 def test_an_emulator_of_the_panel_that_dies_is_started_again(tmp_path: Path) -> None:
     with run.running("quiet", "--out", tmp_path) as panel, panel.socket() as socket:
         run.received(socket, "hello")
-        (child,) = children(panel.process.pid)
+        (child,) = run.children(panel.process.pid)
         os.kill(child, signal.SIGKILL)
         assert LOST.search(run.received(socket, "lost")["why"])
         assert run.received(socket, "hello")["units"]
-        assert children(panel.process.pid) != [child]
+        assert run.children(panel.process.pid) != [child]
         assert "error" not in run.said(socket, 1, "head.turn 10")
-
-
-def children(pid: int) -> list[int]:
-    """Processes that any thread of this one has started."""
-    lists = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(word) for path in lists for word in path.read_text().split()]

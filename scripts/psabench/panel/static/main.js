@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as forks from "./forks.js";
 import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
 import * as scenario from "./scenario.js";
@@ -55,6 +56,7 @@ const HANDLERS = {
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
     scenario.offer(m, link);
+    forks.offer(m.benches, link);
     if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
@@ -72,6 +74,7 @@ const HANDLERS = {
     options($("#snapshots"), m.names);
   },
   can: cards.can,
+  benches: (m) => forks.offer(m, link),
   procedure: procedures.follow,
   truth: (m) => { if ($("#truth-switch").checked) $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1); },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
