@@ -174,7 +174,7 @@ class BenchView:
             "counters": ("counters", {}),
             "faults": ("fault.list", {}),
             "head": ("head.read", {}),
-            "table": ("table.read", {"axis": 1}),
+            **{name: ("table.read", {"axis": axis}) for axis, name in table_axes(self.session)},
             "chamber": ("chamber.read", {}),
             "supply": ("supply.read", {}),
         }
@@ -215,6 +215,13 @@ class BenchView:
         """Time of the bench, s."""
         t_ns = self.session.now_ns()
         return self.bench.time_s if t_ns is None else t_ns / 1e9
+
+
+def table_axes(session: Session) -> list[tuple[int, str]]:
+    """Axes of the rate table with the names of their readings: table, table2, table3."""
+    command = session.vocabulary.commands.get("table.read")
+    axes = int(command.args[0].high) if command is not None else 1
+    return [(k, "table" if k == 1 else f"table{k}") for k in range(1, axes + 1)]
 
 
 def any_received(host: CanHost) -> bool:

@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import { instruments, readings, turn } from "./instruments.js";
 import * as procedures from "./procedures.js";
 import * as statistics from "./statistics.js";
 
@@ -48,7 +49,7 @@ const HANDLERS = {
     if (until) options($("#event"), until.args[0].choices, "INT_FALL");
     options($("#names"), Object.keys(m.commands));
     cards.registers(m, say);
-    cards.instruments(m, say);
+    instruments(m, say);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
@@ -57,7 +58,7 @@ const HANDLERS = {
   },
   update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
   state: (m) => {
-    cards.readings(m);
+    readings(m);
     cards.faultList(m, now, say);
     cards.board(m);
     cards.overview(m, hello ? hello.unit : "", say);
@@ -81,6 +82,7 @@ function take(message) {
 
 function time(t) {
   now = t.t_s;
+  turn(now);
   playing = t.playing;
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
   $("#play").textContent = playing ? "Pause" : "Run";
