@@ -27,6 +27,7 @@ from psabench.shell.session import Session
 FILE_ARGS = ("path", "file")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
 TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
+TABLES = ("table", "table2", "table3")
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
@@ -42,12 +43,14 @@ class BenchView:
     session: Session = field(init=False)
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
+    tables: tuple[str, ...] = ()  # axes of the rate table: names of their readings
     _viewed_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.session = Session(self.bench, self.start, tick=self.tick)
         self.channels = {name: Channels() for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
+        self.tables = tuple(n for k, n in enumerate(TABLES, 1) if self._maybe("table.read", {"axis": k}))
 
     def _trace(self, bus: str) -> CanTrace:
         host = self.bench.hosts[bus]
@@ -113,7 +116,7 @@ class BenchView:
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        kept = {"history": self._history(), "snapshots": self.snapshots()}
+        kept = {"history": self._history(), "snapshots": self.snapshots(), "tables": self.tables}
         return {"kind": "hello", **describe_bench(self.session), **kept}
 
     def _history(self) -> dict[str, Any]:
@@ -174,7 +177,7 @@ class BenchView:
             "counters": ("counters", {}),
             "faults": ("fault.list", {}),
             "head": ("head.read", {}),
-            **{name: ("table.read", {"axis": axis}) for axis, name in table_axes(self.session)},
+            **{name: ("table.read", {"axis": axis}) for axis, name in enumerate(self.tables, 1)},
             "chamber": ("chamber.read", {}),
             "supply": ("supply.read", {}),
         }
@@ -215,13 +218,6 @@ class BenchView:
         """Time of the bench, s."""
         t_ns = self.session.now_ns()
         return self.bench.time_s if t_ns is None else t_ns / 1e9
-
-
-def table_axes(session: Session) -> list[tuple[int, str]]:
-    """Axes of the rate table with the names of their readings: table, table2, table3."""
-    command = session.vocabulary.commands.get("table.read")
-    axes = int(command.args[0].high) if command is not None else 1
-    return [(k, "table" if k == 1 else f"table{k}") for k in range(1, axes + 1)]
 
 
 def any_received(host: CanHost) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import panel_run as run
 import pytest
@@ -18,17 +17,24 @@ seed: 1
 site: {g_mps2: 9.8094}
 head: {turn_s: 1}
 table: {axes: [{along: x}, {along: y}]}
-chamber: {min_degc: -40, max_degc: 100, ramp_k_per_min: 10}
+chamber: {min_degc: -40, max_degc: 140, ramp_k_per_min: 10}
 supply: {volt_v: 12, volt_max_v: 15, brownout_v: 9, hysteresis_v: 0.5}
 units:
   - {name: a, axes: {x: {sensor: mems, u0_v: 2.5, kx_v_per_g: 1.0}}}
 """
 
 
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[run.Running]:
+    folder = tmp_path_factory.mktemp("out")
+    (folder / "bench.yaml").write_text(BENCH)
+    with run.running(folder / "bench.yaml", "--out", folder) as p:
+        yield p
+
+
 @pytest.fixture
-def page(browser: Browser, tmp_path: Path) -> Iterator[Page]:
-    (tmp_path / "bench.yaml").write_text(BENCH)
-    with run.running(tmp_path / "bench.yaml", "--out", tmp_path) as panel, opened(browser, panel) as p:
+def page(browser: Browser, panel: run.Running) -> Iterator[Page]:
+    with opened(browser, panel) as p:
         yield p
 
 
@@ -83,12 +89,19 @@ def test_the_thermometer_has_set_point_and_ramp(page: Page) -> None:
     assert page.get_attribute(f"{chamber} .way", "d")
     page.select_option("#speed", "100")
     expect(page.locator(chamber)).to_have_attribute("aria-label", re.compile("at 80 degC.*stable"))
-    assert float(page.evaluate(column)) < before - 30
+    assert float(page.evaluate(column)) < before - 25
     assert page.get_attribute(f"{chamber} .way", "d") == ""
+    order(page, "chamber.set", temp_degc="130")  # beyond the scale, which grows
+    expect(page.locator(chamber)).to_have_attribute("aria-label", re.compile("set point 130 degC"))
+    found = re.search(r"translate\(0 ([\d.]+)", page.get_attribute(f"{chamber} .mark", "transform") or "")
+    assert found is not None
+    assert 10 <= float(found[1]) < 20
+    page.select_option("#speed", "1")
 
 
 def test_a_dip_shorter_than_a_reading_is_seen_on_the_meter(page: Page) -> None:
     supply = drawing(page, "supply")
+    page.click("form[data-command='supply.reset'] button")
     expect(page.locator(supply)).to_have_attribute("aria-label", "supply at 12 V, set to 12 V")
     page.select_option("[aria-label='faults.add kind']", "supply.brownout")
     page.fill("[aria-label='faults.add for_s']", "0.02")

@@ -9,33 +9,34 @@ const THINGS = ["head", "table", "chamber", "supply", "vehicle", "gyro"];
 const COMPASS = { 0: "0", 90: "90", 180: "180", 270: "270" };
 const HAND = "M-4 10L0 -52L4 10Z";
 const AHEAD_MIN = 10; // what the ramp does in so many minutes is drawn
-const RECENT_S = 10; // so long a dip stays on the meter
+const RECENT_S = 10, SHOWN_S = 3; // so long a dip stays on the meter, of the bench's time and of the page's
+const CHAMBER_DEGC = [-60, 100], METERS_V = [1, 3, 10, 15, 30, 100, 300, 1000]; // ranges; what goes beyond takes the next
 const LONGEST_S = 1; // without a new reading the plate stops turning
 
-let drawn = {}, time_s = 0;
+let drawn = {}, time_s = 0, dipSeen = new Map();
 
 export function instruments(hello, say) {
   const list = $("#instrument-list");
   drawn = {};
+  dipSeen = new Map();
   list.replaceChildren();
   for (const thing of THINGS) {
     const commands = Object.entries(hello.commands).filter(([n]) => n.startsWith(`${thing}.`) && !n.endsWith(".read") && !n.endsWith(".log"));
     if (!commands.length) continue;
     const forms = commands.map(([n, c]) => commandForm(n, c, say));
     if (thing === "vehicle" || thing === "gyro") list.append(make("details", {}, make("summary", {}, thing), ...forms));
-    else list.append(make("h3", {}, thing), ...faces(thing, hello.commands), ...forms);
+    else list.append(make("h3", {}, thing), ...faces(thing, hello), ...forms);
   }
   const absent = THINGS.filter((t) => hello.absent[t]);
   if (absent.length) list.append(make("p", { class: "quiet" }, `Not in this scenario: ${absent.join(", ")}.`));
 }
 
-function faces(thing, commands) {
-  const of = (name, index) => commands[name]?.args[index] ?? {};
+function faces(thing, hello) {
   const makers = {
     head: () => [["head", headDial()]],
-    table: () => Array.from({ length: of("table.rate", 0).high ?? 1 }, (_, k) => [k ? `table${k + 1}` : "table", tableDial(k + 1)]),
-    chamber: () => [["chamber", thermometer(of("chamber.set", 0))]],
-    supply: () => [["supply", voltmeter(of("supply.set", 0).high ?? 15)]],
+    table: () => hello.tables.map((name, k) => [name, tableDial(k + 1)]),
+    chamber: () => [["chamber", thermometer()]],
+    supply: () => [["supply", voltmeter()]],
   };
   return makers[thing]().map(([name, face]) => {
     drawn[name] = face;
@@ -107,17 +108,24 @@ function arrow(sign) {
   return `${arcPath(50, -sign * 40, sign * 40)}M${a[0]} ${a[1]}L${x} ${y}L${b[0]} ${b[1]}`;
 }
 
-function thermometer(set) {
-  const low = set.low ?? -60, high = set.high ?? 120, [top, bottom] = [10, 118];
-  const y = (degc) => bottom - ((Math.min(Math.max(degc, low), high) - low) / (high - low)) * (bottom - top);
-  const marks = roundMarks(low, high, 7).flatMap((degc) => [svg("line", { x1: 48, x2: 55, y1: y(degc), y2: y(degc), class: "scale" }), text(44, y(degc) + 4, degc, "name", "end")]);
-  const column = svg("line", { x1: 64, x2: 64, y1: 132, class: "column" }), ramp = svg("path", { class: "way", d: "" });
+function thermometer() {
+  let [low, high] = CHAMBER_DEGC;
+  const y = (degc) => 118 - (108 * (degc - low)) / (high - low);
+  const scale = svg("g"), column = svg("line", { x1: 64, x2: 64, y1: 132, class: "column" }), ramp = svg("path", { class: "way", d: "" });
   const point = svg("path", { class: "mark", d: "M72 0L84 -6V6Z" }), setting = text(88, 0, "", "name", "start");
   const glass = svg("path", { class: "plate", d: "M58 128V10A6 6 0 0 1 70 10V128A11 11 0 1 1 58 128Z" });
-  const drawing = picture("thermal chamber", "0 0 160 156", glass, svg("circle", { cx: 64, cy: 137, r: 8, class: "bulb" }), column, ...marks, ramp, point, setting);
+  const drawing = picture("thermal chamber", "0 0 160 156", glass, svg("circle", { cx: 64, cy: 137, r: 8, class: "bulb" }), column, scale, ramp, point, setting);
+  const draw = () => scale.replaceChildren(...roundMarks(low, high, 7).flatMap((degc) => [
+    svg("line", { x1: 48, x2: 55, y1: y(degc), y2: y(degc), class: "scale" }), text(44, y(degc) + 4, degc, "name", "end")]));
+  draw();
   return {
     picture: drawing,
     show(r) {
+      const [least, most] = [Math.min(r.temp_degc, r.set_degc), Math.max(r.temp_degc, r.set_degc)];
+      if (least < low || most > high) {
+        [low, high] = [Math.min(low, 20 * Math.floor(least / 20)), Math.max(high, 20 * Math.ceil(most / 20))];
+        draw();
+      }
       column.setAttribute("y2", y(r.temp_degc));
       point.setAttribute("transform", `translate(0 ${y(r.set_degc)})`);
       setting.setAttribute("y", y(r.set_degc) + 4);
@@ -133,17 +141,21 @@ function thermometer(set) {
 // Where the ramp is in AHEAD_MIN minutes.
 const upOrDown = (x, from, to) => `M${x} ${from}V${to}M${x - 4} ${to + 5 * Math.sign(from - to)}L${x} ${to}L${x + 4} ${to + 5 * Math.sign(from - to)}`;
 
-function voltmeter(most) {
-  const angle = (v) => -70 + (140 * Math.min(Math.max(v, 0), most)) / most, volts = roundMarks(0, most, 5);
-  const names = volts.map((v) => { const [x, y] = onDial(78, angle(v)); return text(x, y + 4, v, "name"); });
+function voltmeter() {
+  let most = 0;
+  const angle = (v) => -70 + (140 * Math.min(Math.max(v, 0), most)) / most;
   const hand = svg("path", { class: "hand", d: "M-3 0L0 -60L3 0Z" }), set = svg("path", { class: "mark", d: "M0 -66L-5 -57H5Z" });
-  const dip = svg("path", { class: "dip", d: "" }), word = text(0, 18, "", "name");
-  const drawing = picture("supply", "-90 -90 180 114", svg("path", { class: "scale", d: arcPath(66, -70, 70) }),
-    ...volts.map((v) => spoke(62, 70, angle(v), "scale")), ...names, dip, set, hand, svg("circle", { r: 4, class: "pin" }), word);
+  const dip = svg("path", { class: "dip", d: "" }), word = text(0, 18, "", "name"), scale = svg("g");
+  const drawing = picture("supply", "-90 -90 180 114", svg("path", { class: "scale", d: arcPath(66, -70, 70) }), scale, dip, set, hand, svg("circle", { r: 4, class: "pin" }), word);
+  const draw = () => scale.replaceChildren(...roundMarks(0, most, 5).flatMap((v) => {
+    const [x, y] = onDial(78, angle(v));
+    return [spoke(62, 70, angle(v), "scale"), text(x, y + 4, v, "name")];
+  }));
   return {
     picture: drawing,
     show(r, faults) {
-      const drop_v = recentDip(faults), down_v = Math.max(r.volt_v - drop_v, 0);
+      const drop_v = recentDip(faults), down_v = Math.max(r.volt_v - drop_v, 0), high_v = Math.max(r.volt_v, r.measured_v);
+      if (high_v > most) { most = METERS_V.find((m) => m >= high_v) ?? high_v; draw(); }
       hand.setAttribute("transform", `rotate(${angle(r.measured_v)})`);
       set.setAttribute("transform", `rotate(${angle(r.volt_v)})`);
       dip.setAttribute("d", drop_v ? arcPath(60, angle(r.volt_v), angle(down_v)) : "");
@@ -154,8 +166,11 @@ function voltmeter(most) {
   };
 }
 
-// A dip may be shorter than the time between two readings: the list of faults has it.
+// A dip may be shorter than the time between two readings: the list of faults has it. At a great speed it is over at
+// once, so it stays for a while of the page's own time, too.
 function recentDip(faults) {
-  const dips = faults.filter((f) => f.drop_v && f.began_s !== undefined && f.began_s !== null && time_s - (f.ended_s ?? time_s) < RECENT_S);
-  return Math.max(0, ...dips.map((f) => f.drop_v));
+  const dips = faults.filter((f) => f.drop_v && f.began_s !== undefined && f.began_s !== null);
+  for (const f of dips) if (!dipSeen.has(f.id)) dipSeen.set(f.id, performance.now());
+  const recent = dips.filter((f) => time_s - (f.ended_s ?? time_s) < RECENT_S || performance.now() - dipSeen.get(f.id) < 1000 * SHOWN_S);
+  return Math.max(0, ...recent.map((f) => f.drop_v));
 }

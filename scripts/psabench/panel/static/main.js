@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
 import * as procedures from "./procedures.js";
 import * as statistics from "./statistics.js";
@@ -50,13 +51,14 @@ const HANDLERS = {
     options($("#names"), Object.keys(m.commands));
     cards.registers(m, say);
     instruments(m, say);
+    gyro.offer(m, say);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },
-  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
+  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
     readings(m);
     cards.faultList(m, now, say);
