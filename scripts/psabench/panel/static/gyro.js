@@ -63,6 +63,16 @@ export function feed(fresh) {
   drift();
 }
 
+// Only where the switch of the truth is on, and as long as it is.
+export function truth(state) {
+  const shown = !$("#gyro").hidden && state?.platform && state.vehicle;
+  $("#gyro-truth").hidden = !shown;
+  if (!shown) return;
+  const { vehicle, platform } = state;
+  $("#gyro-truth").textContent = `truth: heading of the vehicle ${digits(vehicle.heading_deg)} deg, azimuth angle ${digits(platform.alpha_deg)} deg, `
+    + `drift ${platform.drift_degph.map((d) => digits(+d.toPrecision(4))).join(", ")} deg/h`;
+}
+
 const word = (name, last) => choices[name]?.[Math.round(last[name])] ?? Math.round(last[name]);
 
 function keep(t_s, heading_deg) {

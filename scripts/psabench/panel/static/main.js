@@ -72,7 +72,11 @@ const HANDLERS = {
   },
   can: cards.can,
   procedure: procedures.follow,
-  truth: (m) => { if ($("#truth-switch").checked) $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1); },
+  truth: (m) => {
+    if (!$("#truth-switch").checked) return;
+    $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1);
+    gyro.truth(m.state);
+  },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
 };
 
@@ -128,6 +132,7 @@ $("#line").elements.line.oninput = (event) => {
 };
 $("#truth-switch").onchange = (event) => {
   $("#truth-state").hidden = !event.target.checked;
+  if (!event.target.checked) gyro.truth(null);
   link.sendWatch({ truth: event.target.checked });
 };
 

@@ -33,7 +33,7 @@ export function arcPath(radius, from, to) {
 // A full circle of degrees: a mark each 10, a longer one each 30, numbers or names at `named`.
 export function ring(radius, named) {
   const marks = Array.from({ length: 36 }, (_, k) => spoke(radius - (k % 3 ? 4 : 8), radius, 10 * k, "scale"));
-  const names = Object.entries(named).map(([deg, name]) => { const [x, y] = onDial(radius + 10, Number(deg)); return text(x, y + 4, name, "name"); });
+  const names = Object.entries(named).map(([deg, name]) => { const [x, y] = onDial(radius + (deg % 180 ? 13 : 10), Number(deg)); return text(x, y + 4, name, "name"); });
   return [svg("circle", { r: radius, class: "plate" }), ...marks, ...names];
 }
 
