@@ -74,7 +74,9 @@ def test_a_drift_that_the_unit_compensates_is_gone(page: Page) -> None:
 def test_the_platform_turns_and_the_truth_needs_its_switch(page: Page) -> None:
     plate = "document.querySelector('#gyro-pictures .turning').getAttribute('transform')"
     until(page, f"{plate} !== null")
-    expect(page.locator("#gyro-pictures svg:nth-of-type(2)")).to_have_attribute("aria-label", re.compile("^level: beta"))
+    expect(page.locator("#gyro-pictures svg:nth-of-type(2)")).to_have_attribute(
+        "aria-label", re.compile("^level: beta")
+    )
     said(page, "dut.set 2101h 1 90")
     said(page, "dut.set 2100h 1 3")  # slew
     said(page, "wait 40")
