@@ -1,4 +1,4 @@
-"""Instruments on the page in a real browser: drawn as they read, moved by their forms, in words for who does not see."""
+"""Instruments on the page in a real browser: drawn as they read, moved by their forms, in words for a screen reader."""
 
 from __future__ import annotations
 
