@@ -317,7 +317,7 @@ HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = 
     "hello": lambda w, _: w.hello(),
     "play": lambda w, request: w.play(request),
     "line": lambda w, request: w.line(str(request.get("line", ""))),
-    "frame": lambda w, _: {"svg": w.view.frame()},
+    "frame": lambda w, _: dict(w.view.frame()),
     "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
     "restore": lambda w, request: w.restore(str(request.get("file", ""))),
     "run": _run_procedure,

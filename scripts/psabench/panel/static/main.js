@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as frame from "./frame.js";
 import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
 import * as procedures from "./procedures.js";
@@ -52,6 +53,7 @@ const HANDLERS = {
     cards.registers(m, say);
     instruments(m, say);
     gyro.offer(m, say);
+    frame.offer(m, link, say);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
@@ -107,16 +109,6 @@ $("#restore").onclick = () => link.ask({ do: "restore", file: $("#snapshots").va
 $("#start-stream").onclick = () => say("dut.start");
 $("#stop-stream").onclick = () => say("dut.stop");
 $("#reset-unit").onclick = () => say("dut.reset");
-$("#frame").onclick = async () => {
-  try {
-    const answer = await link.ask({ do: "frame" });
-    const picture = $("#frame-picture");
-    URL.revokeObjectURL(picture.src);
-    picture.src = URL.createObjectURL(new Blob([answer.svg], { type: "image/svg+xml" }));
-    picture.alt = "frame on Int, Data and CLK";
-    picture.hidden = false;
-  } catch (error) { complain(error.message); }
-};
 $("#all-channels").onchange = plots.build;
 $("#compute").onclick = () => link.ask({ do: "statistics", channel: $("#channel").value }).then(statistics.show, (e) => complain(e.message));
 $("#window").onchange = plots.touch;
@@ -156,6 +148,6 @@ document.addEventListener("visibilitychange", () => link.sendWatch({ live: !docu
 new ResizeObserver(plots.resize).observe($("#plots"));
 
 theme(localStorage.getItem("theme") || "");
-(function frame() { plots.draw(); counts.drawn++; requestAnimationFrame(frame); })();
+(function redraw() { plots.draw(); counts.drawn++; requestAnimationFrame(redraw); })();
 
 window.panel = { counts, shown: plots.shown, link }; // for tests
