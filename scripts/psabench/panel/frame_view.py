@@ -11,8 +11,9 @@ import numpy as np
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.unit import Unit
 from psabench.link.protocol_files import dbc_node, message
+from psabench.link.signals import Ints
 from psabench.link.vcd import Vcd
-from psabench.report.drawing import Panel, Section, Tag, need, render
+from psabench.report.drawing import Panel, Section, need, render
 from psabench.report.waveform import frame_picture, frame_words
 from psabench.shell.commands import Command
 
@@ -44,7 +45,7 @@ def frames_of(vcd: Vcd) -> list[Seen]:
 
 
 def drawn_frame(vcd: Vcd) -> Mapping[str, Any]:
-    """The picture of the first torn frame, or else of the first whole one, and how many there are. Raises ValueError."""
+    """The picture of the first torn frame, else of the first whole one; how many there are. Raises ValueError."""
     need(vcd, set(ROWS))
     frames = frames_of(vcd)
     torn = [f for f in frames if f.is_torn]
@@ -69,8 +70,8 @@ def _torn_picture(vcd: Vcd, frame: Seen) -> str:
     return render(vcd, panels, title)
 
 
-def _irregular(rises: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[int, int]:
-    """The first pulse whose distance to the next is neither a period nor the pause between words, or the last; period."""
+def _irregular(rises: Ints) -> tuple[int, int]:
+    """The first pulse that is neither a period nor the pause between words before the next, or the last; the period."""
     steps = np.diff(rises)
     period_ns = int(np.median(steps))
     pause = steps[steps > 3 * period_ns]  # the pause is 4 or 5 periods from pulse to pulse, a lost pulse leaves 2
@@ -84,7 +85,7 @@ def _irregular(rises: np.ndarray[Any, np.dtype[np.int64]]) -> tuple[int, int]:
 
 
 def tears(add: Command | None, name: str, unit: Unit) -> list[dict[str, str]]:
-    """Lines of the shell that tear frames of a unit, until the fault is ended, where this bench has a point for them."""
+    """Lines of the shell that tear frames of a unit until the fault is ended, where this bench has a point for them."""
     if add is None:
         return []
     found = []

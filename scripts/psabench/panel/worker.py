@@ -17,6 +17,7 @@ from typing import Any, Protocol
 from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
 from psabench.panel.bench_view import BenchView
+from psabench.panel.converter import describe_converters, read_converter
 from psabench.panel.procedures import OFFERED, Runs
 
 UPDATE_S = 1 / 30
@@ -168,7 +169,7 @@ class Worker:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.restored is not None}
-        return self._view.describe() | {"time": self._time()} | procedures
+        return self._view.describe() | {"time": self._time(), "converters": describe_converters()} | procedures
 
     def _move(self, view: BenchView) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
@@ -318,6 +319,7 @@ HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = 
     "play": lambda w, request: w.play(request),
     "line": lambda w, request: w.line(str(request.get("line", ""))),
     "frame": lambda w, _: dict(w.view.frame()),
+    "converter": lambda _, request: read_converter(request),
     "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
     "restore": lambda w, request: w.restore(str(request.get("file", ""))),
     "run": _run_procedure,

@@ -9,6 +9,8 @@ import panel_run as run
 import pytest
 from panel_page import needs_browser, opened
 from playwright.sync_api import Browser, Page, expect
+from psabench.errors import BenchError
+from psabench.panel.converter import CONVERTERS, read_converter
 
 pytestmark = needs_browser
 
@@ -51,3 +53,42 @@ def test_a_sample_torn_on_can_is_counted_in_the_channels(page: Page) -> None:
     page.click("[data-tear='on CAN']")
     expect(page.locator("#faults tbody")).to_contain_text("link.drop")
     expect(page.locator("#health")).to_contain_text(re.compile(r", torn [1-9]"))
+
+
+@pytest.mark.parametrize("part", CONVERTERS)
+def test_a_torn_read_of_a_bare_converter_is_caused_and_seen(page: Page, part: str) -> None:
+    page.select_option("#read-converter select", part)
+    page.click("#read-converter button:text-is('Read')")
+    expect(page.locator("#converter-said")).to_contain_text(
+        re.compile(r"^read (\w+)h, whole: in time \1h.*no violation")
+    )
+    page.click("#read-across")
+    expect(page.locator("#converter-said")).to_contain_text(re.compile(r", torn: .*torn_reads 1"))
+    expect(page.locator("#converter-picture")).to_have_attribute("alt", f"edges of {part}: a torn read")
+    assert page.evaluate("document.querySelector('#converter-picture').naturalWidth") > 100
+    found = re.match(r"read (\w+)h, torn: in time (\w+)h, next word (\w+)h", page.inner_text("#converter-said"))
+    assert found is not None
+    read, own, following = found.groups()
+    assert own.startswith(read[:2])  # the first byte of its own word
+    assert read not in (own, following)
+
+
+def test_a_torn_read_s_picture_says_which_bits_are_whose() -> None:
+    answer = read_converter({"part": "ads1282", "sclk_hz": 1e6, "across": True})
+    assert "16 bits of the word" in answer["svg"]
+    assert "16 bits of the next word" in answer["svg"]
+    assert (answer["read"][:4], answer["read"][4:]) == (answer["in_time"][:4], answer["next"][4:])
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"part": "ad7190"},
+        {"part": "ads1256", "sclk_hz": 1},
+        {"part": "ads1256", "sclk_hz": True},
+        {"part": "ads1281", "sclk_hz": 1e6, "late_us": -1},
+    ],
+)
+def test_a_read_that_cannot_be_is_refused(request_: dict[str, object]) -> None:
+    with pytest.raises(BenchError, match="expected"):
+        read_converter(request_)

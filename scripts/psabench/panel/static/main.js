@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as converter from "./converter.js";
 import * as frame from "./frame.js";
 import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
@@ -54,6 +55,7 @@ const HANDLERS = {
     instruments(m, say);
     gyro.offer(m, say);
     frame.offer(m, link, say);
+    converter.offer(m, link);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
