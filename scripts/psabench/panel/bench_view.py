@@ -10,16 +10,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from psabench.bench import Bench
 from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
 from psabench.link.can_host import CanHost
+from psabench.link.signals import Ints
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, Envelope, samples_of
 from psabench.panel.describe import NOT_HERE, describe_bench
+from psabench.panel.frame_view import drawn_frame, tears
 from psabench.panel.statistics import channel_statistics
-from psabench.report.waveform import frame_picture
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
@@ -28,6 +31,7 @@ from psabench.shell.transcript import Transcript
 FILE_ARGS = ("path", "file")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
 TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
+TABLES = ("table", "table2", "table3")
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
@@ -43,13 +47,17 @@ class BenchView:
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
     histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot, by its name
+    lines: dict[str, Ints] = field(init=False)  # of a unit: frames drawn from its lines, torn ones
+    tables: tuple[str, ...] = ()  # axes of the rate table: names of their readings
     _viewed_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.session = Session(self.bench, self.start)
         self.session.transcript.lockstep = False  # the page moves time, and no line says so
         self.channels = {name: Channels() for name in self.bench.units}
+        self.lines = {name: np.zeros(2, dtype=np.int64) for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
+        self.tables = tuple(n for k, n in enumerate(TABLES, 1) if self._maybe("table.read", {"axis": k}))
 
     def _trace(self, bus: str) -> CanTrace:
         host = self.bench.hosts[bus]
@@ -95,8 +103,8 @@ class BenchView:
         if name in self.histories:
             self.session.transcript = self.histories[name].copy()
 
-    def frame(self) -> str:
-        """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""
+    def frame(self) -> Mapping[str, Any]:
+        """The next frame of the chosen unit on its lines, a torn one first, as SVG; counts. Raises BenchError."""
         if not self.bench.units:
             raise BenchError(expected("a PSA-2", "no unit", "frame"))
         if not isinstance(self.session.dut, Psa2):
@@ -109,9 +117,11 @@ class BenchView:
         finally:
             self.bench.probe.stop()
         try:
-            return frame_picture(read_vcd(path))
+            drawn = drawn_frame(read_vcd(path))
         except ValueError as e:
             raise BenchError(f"frame: {e}") from e
+        self.lines[self.session.dut_name] += (drawn["frames"], drawn["torn"])
+        return drawn
 
     def channel_statistics(self, channel: str) -> dict[str, Any]:
         """Of a channel of the chosen unit. Raises BenchError."""
@@ -123,8 +133,10 @@ class BenchView:
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        kept = {"history": self._history(), "snapshots": self.snapshots()}
-        return {"kind": "hello", **describe_bench(self.session), **kept}
+        kept = {"history": self._history(), "snapshots": self.snapshots(), "tables": self.tables}
+        add = self.session.vocabulary.commands.get("faults.add")
+        torn = tears(add, self.session.dut_name, self.session.dut) if self.bench.units else []
+        return {"kind": "hello", **describe_bench(self.session), **kept, "tears": torn}
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name
@@ -184,7 +196,7 @@ class BenchView:
             "counters": ("counters", {}),
             "faults": ("fault.list", {}),
             "head": ("head.read", {}),
-            "table": ("table.read", {"axis": 1}),
+            **{name: ("table.read", {"axis": axis}) for axis, name in enumerate(self.tables, 1)},
             "chamber": ("chamber.read", {}),
             "supply": ("supply.read", {}),
         }
@@ -207,7 +219,7 @@ class BenchView:
             ]
             rows.append(
                 {"name": name, "board": unit.title, "samples": c.count, "lost": counters.lost,
-                 "torn": getattr(counters, "torn", 0), "last": shown[:6]}
+                 "torn": getattr(counters, "torn", 0), "lines": self.lines[name].tolist(), "last": shown[:6]}
             )  # fmt: skip
         return rows
 

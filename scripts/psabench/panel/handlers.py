@@ -7,6 +7,7 @@ from typing import Any
 
 from psabench.errors import expected
 from psabench.panel import forks, scenarios
+from psabench.panel.converter import read_converter
 from psabench.panel.worker import Worker
 from psabench.shell.lexer import Wrong
 
@@ -83,7 +84,8 @@ HANDLERS: Mapping[str, Handler] = {
     "hello": lambda w, _: w.hello(),
     "play": lambda w, request: w.play(request),
     "line": lambda w, request: w.line(str(request.get("line", ""))),
-    "frame": lambda w, _: {"svg": w.view.frame()},
+    "frame": lambda w, _: dict(w.view.frame()),
+    "converter": lambda _, request: read_converter(request),
     "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
     "scenarios": _scenarios,
     "scenario": _scenario,

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from psabench.errors import BenchError, LinkError, expected
 from psabench.panel.bench_view import BenchView
+from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
 from psabench.panel.source import Source
@@ -181,7 +182,11 @@ class Worker:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
-        return self._view.describe() | {"time": self.time(), "benches": self.benches()} | procedures
+        return (
+            self._view.describe()
+            | {"time": self.time(), "benches": self.benches(), "converters": describe_converters()}
+            | procedures
+        )
 
     def benches(self) -> dict[str, Any]:
         """Which bench is shown, and which rest; forks: whether one may be made."""

@@ -10,7 +10,6 @@ import panel_run as run
 import pytest
 from panel_state import digest, replayed, say_all
 
-
 FORKS: dict[str, dict[str, object]] = {"fork 1": {}, "fork 2": {"seed": 9}, "fork 3": {"file": "start.psasnap"}}
 
 

@@ -4,7 +4,11 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as converter from "./converter.js";
 import * as forks from "./forks.js";
+import * as frame from "./frame.js";
+import * as gyro from "./gyro.js";
+import { instruments, readings, turn } from "./instruments.js";
 import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
 import * as scenario from "./scenario.js";
@@ -51,7 +55,10 @@ const HANDLERS = {
     if (until) options($("#event"), until.args[0].choices, "INT_FALL");
     options($("#names"), Object.keys(m.commands));
     cards.registers(m, say);
-    cards.instruments(m, say);
+    instruments(m, say);
+    gyro.offer(m, say);
+    frame.offer(m, link, say);
+    converter.offer(m, link);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
@@ -61,9 +68,9 @@ const HANDLERS = {
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },
-  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
+  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
-    cards.readings(m);
+    readings(m);
     cards.faultList(m, now, say);
     cards.board(m);
     cards.overview(m, hello ? hello.unit : "", say);
@@ -76,7 +83,11 @@ const HANDLERS = {
   can: cards.can,
   benches: (m) => forks.offer(m, link),
   procedure: procedures.follow,
-  truth: (m) => { if ($("#truth-switch").checked) $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1); },
+  truth: (m) => {
+    if (!$("#truth-switch").checked) return;
+    $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1);
+    gyro.truth(m.state);
+  },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
 };
 
@@ -88,6 +99,7 @@ function take(message) {
 
 function time(t) {
   now = t.t_s;
+  turn(now);
   playing = t.playing;
   interrupt.show(t.busy);
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
@@ -109,16 +121,6 @@ $("#restore").onclick = () => link.ask({ do: "restore", file: $("#snapshots").va
 $("#start-stream").onclick = () => say("dut.start");
 $("#stop-stream").onclick = () => say("dut.stop");
 $("#reset-unit").onclick = () => say("dut.reset");
-$("#frame").onclick = async () => {
-  try {
-    const answer = await link.ask({ do: "frame" });
-    const picture = $("#frame-picture");
-    URL.revokeObjectURL(picture.src);
-    picture.src = URL.createObjectURL(new Blob([answer.svg], { type: "image/svg+xml" }));
-    picture.alt = "frame on Int, Data and CLK";
-    picture.hidden = false;
-  } catch (error) { complain(error.message); }
-};
 $("#all-channels").onchange = plots.build;
 $("#compute").onclick = () => link.ask({ do: "statistics", channel: $("#channel").value }).then(statistics.show, (e) => complain(e.message));
 $("#window").onchange = plots.touch;
@@ -134,6 +136,7 @@ $("#line").elements.line.oninput = (event) => {
 };
 $("#truth-switch").onchange = (event) => {
   $("#truth-state").hidden = !event.target.checked;
+  if (!event.target.checked) gyro.truth(null);
   link.sendWatch({ truth: event.target.checked });
 };
 
@@ -157,6 +160,6 @@ document.addEventListener("visibilitychange", () => link.sendWatch({ live: !docu
 new ResizeObserver(plots.resize).observe($("#plots"));
 
 theme(localStorage.getItem("theme") || "");
-(function frame() { plots.draw(); counts.drawn++; requestAnimationFrame(frame); })();
+(function redraw() { plots.draw(); counts.drawn++; requestAnimationFrame(redraw); })();
 
 window.panel = { counts, shown: plots.shown, link }; // for tests
