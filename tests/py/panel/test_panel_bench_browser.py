@@ -60,6 +60,7 @@ def test_another_scenario_is_edited_and_a_wrong_line_selected(page: Page) -> Non
 
 def test_a_fork_is_made_shown_and_ended(page: Page) -> None:
     said(page, "wait 0.5")
+    page.click("#snapshot")
     page.fill("#fork-seed", "9")
     page.click("#fork")
     expect(page.locator("#shown")).to_have_text("fork 1 of 2")
@@ -70,3 +71,8 @@ def test_a_fork_is_made_shown_and_ended(page: Page) -> None:
     expect(page.locator("#shown")).to_have_text("first of 2")
     page.click("#drop-bench")
     expect(page.locator("#others")).to_be_hidden()
+    said(page, "wait 0.5")
+    expect(page.locator("#time")).to_have_text("1.000 s")
+    page.click("#fork-from")
+    expect(page.locator("#time")).to_have_text("0.500 s")
+    expect(page.locator("#log")).to_contain_text("(bench: fork 1, of snapshot panel-0.500s.psasnap, seed 9)")

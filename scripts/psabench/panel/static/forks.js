@@ -8,10 +8,10 @@ export function offer(m, link) {
   $("#shown").textContent = m.resting.length ? `${m.shown} of ${m.resting.length + 1}` : "";
   $("#others").hidden = !m.resting.length;
   options($("#resting"), m.resting);
-  $("#fork").onclick = () => {
-    const seed = $("#fork-seed").value;
-    ask({ do: "fork", ...(seed === "" ? {} : { seed: Number(seed) }) });
-  };
+  $("#fork-from").hidden = !m.forks;
+  const seed = () => ($("#fork-seed").value === "" ? {} : { seed: Number($("#fork-seed").value) });
+  $("#fork").onclick = () => ask({ do: "fork", ...seed() });
+  $("#fork-from").onclick = () => ask({ do: "fork", file: $("#snapshots").value, ...seed() });
   $("#show-bench").onclick = () => ask({ do: "show", name: $("#resting").value });
   $("#drop-bench").onclick = () => ask({ do: "drop", name: $("#resting").value });
 }
