@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,10 +19,9 @@ from psabench.link.can_host import CanHost
 from psabench.link.signals import Ints
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
-from psabench.panel.channels import Channels, Envelope, samples_of
+from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import NOT_HERE, describe_bench
 from psabench.panel.frame_view import drawn_frame, tears
-from psabench.panel.statistics import channel_statistics
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
@@ -58,6 +57,23 @@ class BenchView:
         self.lines = {name: np.zeros(2, dtype=np.int64) for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
         self.tables = tuple(n for k, n in enumerate(TABLES, 1) if self._maybe("table.read", {"axis": k}))
+
+    @property
+    def pace(self) -> str:
+        return self.bench.pace
+
+    @property
+    def unit(self) -> str:
+        return self.session.dut_name
+
+    def look_between(self, look: Callable[[], None]) -> None:
+        self.bench.between = look
+
+    def wait(self, for_s: float) -> None:
+        self.bench.wait(for_s)
+
+    def close(self) -> None:
+        self.bench.close()
 
     def _trace(self, bus: str) -> CanTrace:
         host = self.bench.hosts[bus]
@@ -125,11 +141,7 @@ class BenchView:
 
     def channel_statistics(self, channel: str) -> dict[str, Any]:
         """Of a channel of the chosen unit. Raises BenchError."""
-        c = self.channels.get(self.session.dut_name, Channels())
-        if channel not in c.names:
-            known = ", ".join(c.names) or "a channel: no sample has come"
-            raise BenchError(expected(known, repr(channel[:40]), "channel"))
-        return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
+        return channel_figures(self.channels.get(self.session.dut_name, Channels()), channel)
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
@@ -140,7 +152,7 @@ class BenchView:
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name
-        return self._of_unit(name, list(self.channels[name].history)) if name in self.channels else {}
+        return unit_message(name, c, list(c.history)) if (c := self.channels.get(name)) else {}
 
     def snapshots(self) -> list[str]:
         """Snapshots in our folder, the latest first."""
@@ -166,12 +178,8 @@ class BenchView:
                 continue
             buckets = self.channels[name].add(samples_of(unit.frames.take()))
             if name == self.session.dut_name and buckets:
-                found = self._of_unit(name, buckets)
+                found = unit_message(name, self.channels[name], buckets)
         return found
-
-    def _of_unit(self, name: str, buckets: list[Envelope]) -> dict[str, Any]:
-        c = self.channels[name]
-        return {"unit": name, "names": c.names, "units": c.units, **c.message(buckets)}
 
     def state(self, *, lines: bool) -> dict[str, Any]:
         """Instruments, faults, lines, counters of the bench, and the overview of units."""
@@ -209,19 +217,11 @@ class BenchView:
         return {}
 
     def _overview(self) -> list[dict[str, Any]]:
-        rows = []
-        for name, unit in self.bench.units.items():
-            c, counters = self.channels[name], unit.frames.counters
-            last = c.history[-1].bands if c.history else ()
-            shown = [
-                [n, None if b is None else float(f"{b[2]:.7g}"), u]
-                for n, b, u in zip(c.names, last, c.units, strict=False)
-            ]
-            rows.append(
-                {"name": name, "board": unit.title, "samples": c.count, "lost": counters.lost,
-                 "torn": getattr(counters, "torn", 0), "lines": self.lines[name].tolist(), "last": shown[:6]}
-            )  # fmt: skip
-        return rows
+        return [
+            overview_row(name, unit.title, self.channels[name], unit.frames.counters)
+            | {"lines": self.lines[name].tolist()}
+            for name, unit in self.bench.units.items()
+        ]
 
     def can(self, now_s: float) -> dict[str, Any]:
         """The CAN card."""

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import BUS_HELP, Parser, add_scpi, node_id, port_number
+from psabench.options import BUS_HELP, Parser, add_scpi, board_name, node_id, port_number
 from psabench.places import no_package
 
 EPILOG = """\
@@ -14,6 +14,7 @@ examples:
   psabench panel                            an emulator with the scenario calibrate, its time driven by the page
   psabench panel stream --pace wall         in real time
   psabench panel --connect /tmp/psa.ctl     a running emulator; its bus and instruments are found
+  psabench panel --recording run.log        what was recorded
 
 Open the printed address in a browser of this machine. Ctrl-C ends the panel, and the emulator that it has started.
 """
@@ -36,6 +37,10 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     panel.add_argument("--can", help=f"{BUS_HELP}; default: the bus of the emulator")
     add_scpi(panel, "VISA address of an instrument; may be repeated")
     panel.add_argument("--node", type=node_id, help="CANopen node of the unit (the emulator's, else 5)")
+    panel.add_argument(
+        "--recording", type=Path, metavar="PATH", help="instead of a bench: a CAN log, or a folder of them"
+    )
+    panel.add_argument("--board", type=board_name, help="with --recording: board of the nodes (psa2)")
     return panel.parse_args(words)
 
 

@@ -12,12 +12,14 @@ from pathlib import Path
 
 import uvicorn
 
-from psabench.errors import BenchError, LinkError
-from psabench.options import of_fields
+from psabench.errors import BadInput, BenchError, LinkError, expected
+from psabench.options import of_fields, refuse_beside
+from psabench.panel import view
 from psabench.panel.guard import Door, Log
 from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
+from psabench.panel.recording_view import RecordingSource
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
 from psabench.panel.source import Source
 from psabench.panel.worker import Worker, text_of
@@ -26,11 +28,10 @@ from psabench.shell.connect import Opening, addresses
 
 def run(args: argparse.Namespace) -> int:
     """Handler of `psabench panel`."""
-    opening = of_fields(Opening, args, scpi=addresses(args.scpi))
     hub = ThreadedHub(Hub())
 
     out = args.out.resolve()
-    source = Source(opening, out, args.truth)
+    source = _source(args, out)
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
     worker = Worker(source, hub, runs, HANDLERS, playing=not args.paused)
     with _listen_loopback(args.port) as listener:
@@ -44,6 +45,18 @@ def run(args: argparse.Namespace) -> int:
     if worker.died:
         raise BenchError(worker.died)
     return 0
+
+
+def _source(args: argparse.Namespace, out: Path) -> view.Source:
+    """A recording, or a bench. Raises BadInput where options do not go together."""
+    if args.recording is None:
+        if args.board is not None:
+            raise BadInput(expected("--recording with it", args.board, "--board"))
+        return Source(of_fields(Opening, args, scpi=addresses(args.scpi)), out, args.truth)
+    names = ("scenario", "pace", "connect", "truth", "seed", "can")
+    refuse_beside("--recording", {f"--{n}": getattr(args, n) for n in names}, "panel")
+    refuse_beside("--recording", {"--scpi": args.scpi or None}, "panel")
+    return RecordingSource(args.recording, args.board or "psa2", args.node)
 
 
 @contextlib.contextmanager

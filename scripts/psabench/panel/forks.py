@@ -6,7 +6,8 @@ from typing import Any
 
 from psabench.errors import BenchError, expected
 from psabench.panel.bench_view import BenchView
-from psabench.panel.source import forked
+from psabench.panel.source import Source, bench_view, forked, own_source
+from psabench.panel.view import View
 from psabench.panel.worker import Worker, text_of
 
 MOST = 4  # benches that rest: each is a process with a whole bench
@@ -17,17 +18,17 @@ def fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
 
     Raises BenchError, and the bench that is shown goes on.
     """
-    w.source.check_own("fork")
-    if w.view.bench.pace != "step":
-        raise BenchError(expected("step pace", w.view.bench.pace, "fork"))
+    source, view = own_source(w.source, "fork"), bench_view(w.view)
+    if view.pace != "step":
+        raise BenchError(expected("step pace", view.pace, "fork"))
     if len(w.resting) >= MOST:
         raise BenchError(expected(f"up to {MOST} benches beside the one that is shown", "more", "fork"))
-    new = _from_snapshot(w, file) if file else forked(w.view)
+    new = _from_snapshot(source, view, file) if file else forked(view)
     try:
         if seed is not None:
             new.line(f"reseed {seed}")
     except BaseException:
-        new.bench.close()
+        new.close()
         raise
     of = f"snapshot {file}" if file else w.name
     name = _free_name(w)
@@ -35,9 +36,9 @@ def fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
     return {"time": w.time(), "name": name}
 
 
-def _from_snapshot(w: Worker, file: str) -> BenchView:
-    new = w.source.restored(w.view.file(file))
-    new.go_on_from(file, w.view)
+def _from_snapshot(source: Source, view: BenchView, file: str) -> BenchView:
+    new = source.restored(view.file(file))
+    new.go_on_from(file, view)
     return new
 
 
@@ -55,12 +56,12 @@ def show(w: Worker, name: str) -> dict[str, Any]:
 
 def drop(w: Worker, name: str) -> dict[str, Any]:
     """End a bench that rests."""
-    _taken(w, name).bench.close()
+    _taken(w, name).close()
     w.outlet.publish(text_of(w.benches()))
     return {}
 
 
-def _taken(w: Worker, name: str) -> BenchView:
+def _taken(w: Worker, name: str) -> View:
     if name not in w.resting:
         known = ", ".join(w.resting) or "a bench that rests: there is none"
         raise BenchError(expected(known, repr(name[:40]), "bench"))

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from psabench.errors import expected
+from psabench.errors import BenchError, expected
 from psabench.panel import forks, scenarios
 from psabench.panel.converter import read_converter
+from psabench.panel.recording_view import RecordingSource
+from psabench.panel.source import Source, bench_view, own_source
 from psabench.panel.worker import Worker
 from psabench.shell.lexer import Wrong
 
@@ -28,41 +30,53 @@ def _stop_procedure(w: Worker, _: Request) -> dict[str, Any]:
 
 def _scenarios(w: Worker, _: Request) -> dict[str, Any]:
     """Names, and the text of the one that runs."""
-    w.source.check_own("scenario")
+    source = own_source(w.source, "scenario")
     names = [{"name": s.name, "what": s.what} for s in scenarios.shipped()]
-    return {"names": names, "name": w.source.scenario, "text": scenarios.text_of(w.source.scenario)}
+    return {"names": names, "name": source.scenario, "text": scenarios.text_of(source.scenario)}
 
 
 def _scenario(w: Worker, request: Request) -> dict[str, Any]:
-    w.source.check_own("scenario")
-    name, known = _text(request, "name"), _known(w)
+    name, known = _text(request, "name"), _known(own_source(w.source, "scenario"))
     if name not in known:
         raise Wrong(expected(", ".join(known), repr(name[:40]), "scenario"))
     return {"text": scenarios.text_of(name)}
 
 
-def _known(w: Worker) -> list[str]:
+def _known(source: Source) -> list[str]:
     """What a page may read: those that are shipped, and the file that was named when the panel was started."""
-    return list(dict.fromkeys([*(s.name for s in scenarios.shipped()), w.source.scenario]))
+    return list(dict.fromkeys([*(s.name for s in scenarios.shipped()), source.scenario]))
 
 
 def _begin(w: Worker, request: Request) -> dict[str, Any]:
     """A scenario as it stands in the page takes the place of the one that runs."""
-    w.source.check_own("start")
+    source = own_source(w.source, "start")
     text, name, seed = _text(request, "text"), _text(request, "name"), _seed(request)
-    unchanged = name in _known(w) and scenarios.text_of(name) == text
-    scenario = name if unchanged else str(scenarios.checked_file(text, w.source.out))
-    new = w.source.begin(scenario, seed)
+    unchanged = name in _known(source) and scenarios.text_of(name) == text
+    scenario = name if unchanged else str(scenarios.checked_file(text, source.out))
+    new = source.begin(scenario, seed)
     w.exchange(new, f"scenario {scenario}{'' if seed is None else f', seed {seed}'}")
     return {"time": w.time()}
 
 
 def _restore(w: Worker, request: Request) -> dict[str, Any]:
     """Go back: an emulator from the snapshot takes the place of ours."""
-    name = _text(request, "file")
-    new = w.source.restored(w.view.file(name))
-    new.go_on_from(name, w.view)
+    source, name = own_source(w.source, "go back"), _text(request, "file")
+    before = bench_view(w.view)
+    new = source.restored(before.file(name))
+    new.go_on_from(name, before)
     w.exchange(new, f"snapshot {name}", playing=False)
+    return {"time": w.time()}
+
+
+def _recording(w: Worker, request: Request) -> dict[str, Any]:
+    """Another file of the folder that the panel was started with."""
+    name = _text(request, "name")
+    if not isinstance(w.source, RecordingSource):
+        raise BenchError(expected("a recording", "a bench", "panel"))
+    source = w.source.choose(name)
+    new = source.open()
+    w.source = source
+    w.exchange(new, f"recording {name}", playing=False)
     return {"time": w.time()}
 
 
@@ -94,6 +108,7 @@ HANDLERS: Mapping[str, Handler] = {
     "fork": lambda w, request: forks.fork(w, _text(request, "file"), _seed(request)),
     "show": lambda w, request: forks.show(w, _text(request, "name")),
     "drop": lambda w, request: forks.drop(w, _text(request, "name")),
+    "recording": _recording,
     "run": _run_procedure,
     "stop": _stop_procedure,
 }

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psabench.bench import Bench
-from psabench.errors import BenchError
+from psabench.errors import BenchError, expected
+from psabench.panel import view
 from psabench.panel.bench_view import BenchView
 from psabench.shell.connect import Opening
 
@@ -61,13 +62,28 @@ class Source:
             raise BenchError(f"panel: {what}: this emulator was not started by the panel")
 
 
-def forked(view: BenchView) -> BenchView:
+def own_source(source: view.Source, what: str) -> Source:
+    """That of an emulator which the panel has started. Raises BenchError."""
+    if not isinstance(source, Source):
+        raise BenchError(expected("a bench", "a recording", f"panel: {what}"))
+    source.check_own(what)
+    return source
+
+
+def bench_view(shown: view.View) -> BenchView:
+    """What is shown, where it is a bench. Raises BenchError."""
+    if not isinstance(shown, BenchView):
+        raise BenchError(expected("a bench", "a recording", "panel"))
+    return shown
+
+
+def forked(origin: BenchView) -> BenchView:
     """A second bench that goes on from this instant, with the script that leads there. Raises BenchError."""
-    new = bench_of(view.bench.fork, lambda b: BenchView(b, view.out, view.start))
-    new.histories = view.histories
-    new.session.transcript = view.session.transcript.copy()
-    if view.session.dut_name in new.bench.units:
-        new.session.use(view.session.dut_name)
+    new = bench_of(origin.bench.fork, lambda b: BenchView(b, origin.out, origin.start))
+    new.histories = origin.histories
+    new.session.transcript = origin.session.transcript.copy()
+    if origin.unit in new.bench.units:
+        new.session.use(origin.unit)
     return new
 
 

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from psabench.errors import BenchError, LinkError, expected
-from psabench.panel.bench_view import BenchView
 from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
-from psabench.panel.source import Source
+from psabench.panel.view import Source, View
 
 UPDATE_S = 1 / 30
 STATE_S = 0.25
@@ -78,8 +77,8 @@ class Worker:
     on_death: Callable[[], None] = lambda: None
     lost: str = ""
     name: str = FIRST  # of the bench that is shown
-    resting: dict[str, BenchView] = field(default_factory=dict)  # the others, whose time stands still
-    _view: BenchView | None = None
+    resting: dict[str, View] = field(default_factory=dict)  # the others, whose time stands still
+    _view: View | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
     _states: Due = field(default_factory=lambda: Due(STATE_S))
@@ -133,11 +132,11 @@ class Worker:
             for view in self.resting.values():
                 _close_bench(view)
 
-    def _open(self) -> BenchView:
+    def _open(self) -> View:
         return self._prepared(self.source.open())
 
-    def _prepared(self, view: BenchView) -> BenchView:
-        view.bench.between = self._between
+    def _prepared(self, view: View) -> View:
+        view.look_between(self._between)
         self._moved_s = time.monotonic()
         return view
 
@@ -190,12 +189,12 @@ class Worker:
 
     def benches(self) -> dict[str, Any]:
         """Which bench is shown, and which rest; forks: whether one may be made."""
-        forks = self.source.is_own and self.view.bench.pace == "step"
+        forks = self.source.is_own and self.view.pace == "step"
         return {"kind": "benches", "shown": self.name, "resting": sorted(self.resting), "forks": forks}
 
-    def _move(self, view: BenchView) -> None:
+    def _move(self, view: View) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
-        if view.bench.pace != "step":
+        if view.pace != "step":
             view.receive(self._updates.left_s)
             return
         now_s = time.monotonic()
@@ -204,7 +203,7 @@ class Worker:
             self._wait_request(self._updates.left_s)
             return
         passed_s, self._moved_s = min(now_s - self._moved_s, 2 * UPDATE_S), now_s
-        view.bench.wait(passed_s * self.speed)
+        view.wait(passed_s * self.speed)
         self._wait_request(self._updates.left_s)
 
     def _wait_request(self, for_s: float) -> None:
@@ -239,7 +238,7 @@ class Worker:
         if self._cans():
             self.outlet.publish(text_of(view.can(view.now_s())))
 
-    def _say_truth(self, view: BenchView) -> None:
+    def _say_truth(self, view: View) -> None:
         try:
             message = view.truth()
         except BenchError as e:
@@ -250,7 +249,7 @@ class Worker:
         assert self._view is not None
         return {
             "t_s": round(self._view.now_s(), 9),
-            "playing": self.playing or self._view.bench.pace != "step",
+            "playing": self.playing or self._view.pace != "step",
             "speed": self.speed,
             "busy": self.inbox.busy,
         }
@@ -282,7 +281,7 @@ class Worker:
         return {"kind": "answer", **handler(self, request)}
 
     @property
-    def view(self) -> BenchView:
+    def view(self) -> View:
         """The bench. Raises BenchError while it is lost."""
         if self._view is None:
             raise BenchError(f"panel: no bench: {self.lost}")
@@ -290,24 +289,24 @@ class Worker:
 
     def line(self, text: str) -> dict[str, Any]:
         """Carry out a line of the shell."""
-        before = self.view.session.dut_name
+        before = self.view.unit
         with self.inbox.doing(text.strip()):
             done = self.view.line(text)
         self._moved_s = time.monotonic()
         if str(done.get("line", "")).startswith("bench.snapshot "):
             self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
-        if self.view.session.dut_name != before:
+        if self.view.unit != before or done.get("rewound"):
             self.outlet.publish(text_of(self.hello()))
         return done | {"time": self.time()}
 
-    def exchange(self, new: BenchView, why: str, *, playing: bool | None = None) -> None:
+    def exchange(self, new: View, why: str, *, playing: bool | None = None) -> None:
         """A bench that takes the place of ours, which ends. playing: None: time goes on or stands still as before."""
         self._close()
         self._view, self.lost = self._prepared(new), ""
         self.playing = self.playing if playing is None else playing
         self.outlet.publish(text_of(self.hello() | {"began": why}))
 
-    def show(self, name: str, view: BenchView, why: str) -> None:
+    def show(self, name: str, view: View, why: str) -> None:
         """Another bench is shown; ours rests."""
         self.resting[self.name], self.name = self.view, name
         self._view = None
@@ -322,9 +321,9 @@ class Worker:
         return {"time": self.time()}
 
 
-def _close_bench(view: BenchView) -> None:
+def _close_bench(view: View) -> None:
     with suppress(Exception):  # a connection that is lost closes as it likes
-        view.bench.close()
+        view.close()
 
 
 def _place(e: BaseException) -> str:

@@ -11,6 +11,7 @@ import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
 import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
+import * as recording from "./recording.js";
 import * as scenario from "./scenario.js";
 import * as statistics from "./statistics.js";
 
@@ -64,12 +65,14 @@ const HANDLERS = {
     procedures.offer(m, link);
     scenario.offer(m, link);
     forks.offer(m.benches, link);
+    recording.offer(m.recording, link, say, () => now);
     if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },
   update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
+    recording.state(m);
     readings(m);
     cards.faultList(m, now, say);
     cards.board(m);
