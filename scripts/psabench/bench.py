@@ -17,9 +17,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,44 +33,21 @@ from psabench.errors import BadInput, BenchError, ControlError, TimeOut, expecte
 from psabench.faults import Fault, Faults
 from psabench.instruments import KINDS, Chamber, Head, Instrument, Supply, Table, open_instrument
 from psabench.link.can_host import QUANTUM_S, CanHost, StepClock, WallClock, open_bus
-from psabench.link.control import Control, Reply
+from psabench.link.control import Control
 from psabench.link.endpoints import FIRST, emulator_buses, emulator_endpoints, opening_order, scpi_addresses
 from psabench.link.probe import Probe
 from psabench.report import provenance
+from psabench.status import GrowingFile, Status
 
 NS = 1_000_000_000
 SLICE_NS = NS  # long runs go in slices of simulated time, so that Ctrl-C is heard
 SERIAL_SLICE_NS = NS // 20  # with slcan: a full pseudo-terminal stops time, and no one reads it while a slice runs
+UNTIL_SLICE_NS = NS // 10  # of a wait for an event, which may never come
 AWAY_SLICE_NS = 60 * NS  # no one receives meanwhile: they are as short
 NONE = "none"  # as the CAN specification: no bus
 
 Kind = TypeVar("Kind", bound=Instrument)
 Board = TypeVar("Board", bound=Unit)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GrowingFile:
-    """A file that the emulator is writing."""
-
-    kind: str  # vcd, can log, truth log
-    size_bytes: int
-    max_bytes: int = 0  # at which it ends; 0: none
-    error: str  # why it has ended early; "": it has not
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Status:
-    """How the bench is; None: the bench has no such instrument, or no control socket."""
-
-    time_s: float
-    pace: str  # wall, step, free; real: no emulator
-    angle_deg: float | None  # of the table's outermost axis, as its readout shows it
-    rate_dps: float | None
-    temp_degc: float | None  # of the chamber's air
-    frames: int  # CAN frames that this program has received
-    late: int | None  # events that the emulator ran late
-    lost: int  # samples missing between the frames received
-    files: tuple[GrowingFile, ...]
 
 
 class Bench(AbstractContextManager["Bench"]):
@@ -91,6 +67,7 @@ class Bench(AbstractContextManager["Bench"]):
         self.emulator = emulator
         self.truth_path = truth
         self.addresses = dict(scpi or {})
+        self.between: Callable[[], None] = lambda: None  # after each slice of a wait; what it raises ends the wait
         self._specs = dict(cans)
         self._open: dict[str, Instrument] = {}
         with ExitStack() as stack:
@@ -295,6 +272,7 @@ class Bench(AbstractContextManager["Bench"]):
         clock: WallClock | StepClock = WallClock(hosts if len(hosts) > 1 else ())
         if self._control is not None and self.pace == "step":
             clock = StepClock(self._control, hosts)
+        clock.between = lambda: self.between()
         for host in hosts:
             host.clock = clock
         return clock
@@ -388,29 +366,38 @@ class Bench(AbstractContextManager["Bench"]):
         In step pace time stands still there; in wall pace this returns soon after it. Events: "DRD_A", "INT_FALL", ...;
         see docs/program.md. Raises TimeOut when it has not come within limit_s of the bench's time.
         """
-        args: dict[str, object] = {"event": event, "count": count, "limit_s": limit_s}
-        if unit is not None:
-            args["unit"] = unit
         if isinstance(self._clock, StepClock):
-            reply = self._clock.command(None, "run.until", **args)
+            seen = self._run_to(self._clock, event, count, unit, limit_s)
         else:
-            reply = self._watch(event, count, unit, limit_s)
-        if not reply.result.get("reached", True):
-            raise TimeOut(expected(f"{count} within {limit_s:g} s", reply.result.get("seen", 0), str(event)))
+            seen = self._watch(event, count, unit, limit_s)
+        if seen < count:
+            raise TimeOut(expected(f"{count} within {limit_s:g} s", seen, str(event)))
         return self.time_s
 
-    def _watch(self, event: str, count: int, unit: str | None, limit_s: float) -> Reply:
+    def _run_to(self, clock: StepClock, event: str, count: int, unit: str | None, limit_s: float) -> int:
+        """How many came, in slices: the last ends at the instant of the count-th."""
+        of_unit = {} if unit is None else {"unit": unit}
+        seen = 0
+        for slice_s in slices_s(limit_s, SERIAL_SLICE_NS if self._serial else UNTIL_SLICE_NS) if limit_s else [0.0]:
+            reply = clock.command(None, "run.until", event=event, count=count - seen, limit_s=slice_s, **of_unit)
+            seen += int(reply.result.get("seen", 0))
+            if seen >= count:
+                break
+        return seen
+
+    def _watch(self, event: str, count: int, unit: str | None, limit_s: float) -> int:
         """`run_until` where time moves by itself: events as they come, on a connection of their own."""
         seen = 0
         deadline_s = time.monotonic() + limit_s
         with Control(self.control.path) as watcher:
-            reply = watcher.call("subscribe", what="events")
+            watcher.call("subscribe", what="events")
             first = unit or next(iter(self.units), None)
             while seen < count and (left_s := deadline_s - time.monotonic()) > 0.0:
                 self.wait(0.0)
+                self.between()
                 came = watcher.next_event(min(left_s, 0.01))
                 seen += came is not None and came["event"] == event and came.get("unit", first) == first
-        return Reply(t_ns=reply.t_ns, can_rx=0, rx={}, result={"reached": seen >= count, "seen": seen})
+        return seen
 
     # ---- looking
 

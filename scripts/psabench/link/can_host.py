@@ -40,8 +40,14 @@ Message = can.Message
 Listener = Callable[[Message], None]
 
 
+def _nothing() -> None:
+    """Between two slices of a wait, where no program wants to look."""
+
+
 class Clock(Protocol):
-    """Whose time it is."""
+    """Whose time it is. between: called after each slice of a wait; what it raises ends the wait."""
+
+    between: Callable[[], None]
 
     def now_s(self) -> float:
         """Bench time, s."""
@@ -57,6 +63,7 @@ class WallClock:
 
     def __init__(self, others: Sequence[CanHost] = ()) -> None:
         self._others = others
+        self.between: Callable[[], None] = _nothing
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -64,10 +71,11 @@ class WallClock:
     def advance(self, host: CanHost, dwell_s: float) -> None:
         deadline = time.monotonic() + dwell_s
         while (left := deadline - time.monotonic()) > 0.0:
-            host.receive(min(left, OTHERS_S) if self._others else left)
+            host.receive(min(left, OTHERS_S if self._others else LOOK_S))
             for other in self._others:
                 while other is not host and other.receive(0.0):
                     pass
+            self.between()
 
 
 class StepClock:
@@ -88,6 +96,7 @@ class StepClock:
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
         self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
         self.deadline_s = math.inf  # no time passes after it
+        self.between: Callable[[], None] = _nothing
 
     def now_s(self) -> float:
         return self._t_ns * 1e-9
@@ -122,6 +131,7 @@ class StepClock:
         for h, count in zip(hosts, self._counts(reply), strict=False):
             _receive_all(h, count)
         self._check_deadline()
+        self.between()
         return reply
 
     def start_run(self, dwell_s: float) -> None:

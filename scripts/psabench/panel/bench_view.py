@@ -10,23 +10,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from psabench.bench import Bench
 from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
 from psabench.link.can_host import CanHost
+from psabench.link.signals import Ints
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
-from psabench.panel.channels import Channels, Envelope, samples_of
+from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import NOT_HERE, describe_bench
-from psabench.panel.statistics import channel_statistics
-from psabench.report.waveform import frame_picture
+from psabench.panel.frame_view import drawn_frame, tears
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
+from psabench.shell.transcript import Transcript
 
 FILE_ARGS = ("path", "file")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
 TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
+TABLES = ("table", "table2", "table3")
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
 
@@ -38,16 +42,38 @@ class BenchView:
     bench: Bench
     out: Path
     start: str = ""
-    tick: Callable[[], None] = lambda: None
     session: Session = field(init=False)
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
+    histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot, by its name
+    lines: dict[str, Ints] = field(init=False)  # of a unit: frames drawn from its lines, torn ones
+    tables: tuple[str, ...] = ()  # axes of the rate table: names of their readings
     _viewed_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.session = Session(self.bench, self.start, tick=self.tick)
+        self.session = Session(self.bench, self.start)
+        self.session.transcript.lockstep = False  # the page moves time, and no line says so
         self.channels = {name: Channels() for name in self.bench.units}
+        self.lines = {name: np.zeros(2, dtype=np.int64) for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
+        self.tables = tuple(n for k, n in enumerate(TABLES, 1) if self._maybe("table.read", {"axis": k}))
+
+    @property
+    def pace(self) -> str:
+        return self.bench.pace
+
+    @property
+    def unit(self) -> str:
+        return self.session.dut_name
+
+    def look_between(self, look: Callable[[], None]) -> None:
+        self.bench.between = look
+
+    def wait(self, for_s: float) -> None:
+        self.bench.wait(for_s)
+
+    def close(self) -> None:
+        self.bench.close()
 
     def _trace(self, bus: str) -> CanTrace:
         host = self.bench.hosts[bus]
@@ -63,6 +89,8 @@ class BenchView:
         outcome = self.session.do(self._allowed(text))
         if outcome is None:
             return {"text": "", "result": {}}
+        if outcome.call.command.name == "bench.snapshot":
+            self.histories[Path(str(outcome.call.args["path"])).name] = self.session.transcript.copy()
         return {"line": outcome.call.line, "text": outcome.text, "result": outcome.result, "failed": outcome.failed}
 
     def _allowed(self, text: str) -> str:
@@ -85,8 +113,14 @@ class BenchView:
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
         return self.out / name
 
-    def frame(self) -> str:
-        """The next frame of the chosen unit on its lines, with the words decoded, as SVG. Raises BenchError."""
+    def go_on_from(self, name: str, before: BenchView) -> None:
+        """This bench comes from a snapshot of the one before: so does its script, where the panel has seen it made."""
+        self.histories = before.histories
+        if name in self.histories:
+            self.session.transcript = self.histories[name].copy()
+
+    def frame(self) -> Mapping[str, Any]:
+        """The next frame of the chosen unit on its lines, a torn one first, as SVG; counts. Raises BenchError."""
         if not self.bench.units:
             raise BenchError(expected("a PSA-2", "no unit", "frame"))
         if not isinstance(self.session.dut, Psa2):
@@ -99,26 +133,26 @@ class BenchView:
         finally:
             self.bench.probe.stop()
         try:
-            return frame_picture(read_vcd(path))
+            drawn = drawn_frame(read_vcd(path))
         except ValueError as e:
             raise BenchError(f"frame: {e}") from e
+        self.lines[self.session.dut_name] += (drawn["frames"], drawn["torn"])
+        return drawn
 
     def channel_statistics(self, channel: str) -> dict[str, Any]:
         """Of a channel of the chosen unit. Raises BenchError."""
-        c = self.channels.get(self.session.dut_name, Channels())
-        if channel not in c.names:
-            known = ", ".join(c.names) or "a channel: no sample has come"
-            raise BenchError(expected(known, repr(channel[:40]), "channel"))
-        return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
+        return channel_figures(self.channels.get(self.session.dut_name, Channels()), channel)
 
     def describe(self) -> dict[str, Any]:
         """The whole state of the page, for one that opens or has missed something."""
-        kept = {"history": self._history(), "snapshots": self.snapshots()}
-        return {"kind": "hello", **describe_bench(self.session), **kept}
+        kept = {"history": self._history(), "snapshots": self.snapshots(), "tables": self.tables}
+        add = self.session.vocabulary.commands.get("faults.add")
+        torn = tears(add, self.session.dut_name, self.session.dut) if self.bench.units else []
+        return {"kind": "hello", **describe_bench(self.session), **kept, "tears": torn}
 
     def _history(self) -> dict[str, Any]:
         name = self.session.dut_name
-        return self._of_unit(name, list(self.channels[name].history)) if name in self.channels else {}
+        return unit_message(name, c, list(c.history)) if (c := self.channels.get(name)) else {}
 
     def snapshots(self) -> list[str]:
         """Snapshots in our folder, the latest first."""
@@ -144,12 +178,8 @@ class BenchView:
                 continue
             buckets = self.channels[name].add(samples_of(unit.frames.take()))
             if name == self.session.dut_name and buckets:
-                found = self._of_unit(name, buckets)
+                found = unit_message(name, self.channels[name], buckets)
         return found
-
-    def _of_unit(self, name: str, buckets: list[Envelope]) -> dict[str, Any]:
-        c = self.channels[name]
-        return {"unit": name, "names": c.names, "units": c.units, **c.message(buckets)}
 
     def state(self, *, lines: bool) -> dict[str, Any]:
         """Instruments, faults, lines, counters of the bench, and the overview of units."""
@@ -174,7 +204,7 @@ class BenchView:
             "counters": ("counters", {}),
             "faults": ("fault.list", {}),
             "head": ("head.read", {}),
-            "table": ("table.read", {"axis": 1}),
+            **{name: ("table.read", {"axis": axis}) for axis, name in enumerate(self.tables, 1)},
             "chamber": ("chamber.read", {}),
             "supply": ("supply.read", {}),
         }
@@ -187,19 +217,11 @@ class BenchView:
         return {}
 
     def _overview(self) -> list[dict[str, Any]]:
-        rows = []
-        for name, unit in self.bench.units.items():
-            c, counters = self.channels[name], unit.frames.counters
-            last = c.history[-1].bands if c.history else ()
-            shown = [
-                [n, None if b is None else float(f"{b[2]:.7g}"), u]
-                for n, b, u in zip(c.names, last, c.units, strict=False)
-            ]
-            rows.append(
-                {"name": name, "board": unit.title, "samples": c.count, "lost": counters.lost,
-                 "torn": getattr(counters, "torn", 0), "last": shown[:6]}
-            )  # fmt: skip
-        return rows
+        return [
+            overview_row(name, unit.title, self.channels[name], unit.frames.counters)
+            | {"lines": self.lines[name].tolist()}
+            for name, unit in self.bench.units.items()
+        ]
 
     def can(self, now_s: float) -> dict[str, Any]:
         """The CAN card."""

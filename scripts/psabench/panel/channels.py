@@ -14,13 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from psabench.boards.psa2.frames import Frames
+from psabench.boards.psa2.frames import FrameCounters, Frames
 from psabench.boards.readings import Readings
+from psabench.errors import BenchError, expected
 from psabench.link.signals import Floats
+from psabench.panel.statistics import channel_statistics
 
 BUCKET_S = 1 / 30  # of the bench's time; a longer span in one update is split
 MOST_BUCKETS = 120  # in one update
 KEPT = 1800  # buckets of a unit: 60 s of time that passes as real time does
+SHOWN = 6  # channels of a unit in the list of all
 RAW = 8192  # samples of a unit for histogram, Allan deviation and spectrum
 
 
@@ -124,3 +127,26 @@ class Channels:
 
 def _nine_digits(band: tuple[float, float, float] | None, i: int) -> float | None:
     return None if band is None else float(f"{band[i]:.9g}")
+
+
+def unit_message(name: str, c: Channels, buckets: list[Envelope]) -> dict[str, Any]:
+    """Buckets of a unit for the page."""
+    return {"unit": name, "names": c.names, "units": c.units, **c.message(buckets)}
+
+
+def channel_figures(c: Channels, channel: str) -> dict[str, Any]:
+    """Statistics of one channel. Raises BenchError."""
+    if channel not in c.names:
+        known = ", ".join(c.names) or "a channel: no sample has come"
+        raise BenchError(expected(known, repr(channel[:40]), "channel"))
+    return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
+
+
+def overview_row(name: str, title: str, c: Channels, counters: FrameCounters) -> dict[str, Any]:
+    """A unit in the list of all: the latest values of its first channels, and what was lost."""
+    last = c.history[-1].bands if c.history else ()
+    shown = [
+        [n, None if b is None else float(f"{b[2]:.7g}"), u] for n, b, u in zip(c.names, last, c.units, strict=False)
+    ]
+    head = {"name": name, "board": title, "samples": c.count, "lost": counters.lost}
+    return head | {"torn": counters.torn, "last": shown[:SHOWN]}

@@ -13,37 +13,33 @@ from pathlib import Path
 
 import uvicorn
 
-from psabench.bench import Bench
-from psabench.errors import LinkError, port_in_use
-from psabench.options import of_fields
+from psabench.errors import BadInput, BenchError, LinkError, expected, port_in_use
+from psabench.options import of_fields, refuse_beside
 from psabench.output import show_event
-from psabench.panel.bench_view import BenchView
+from psabench.panel import view
 from psabench.panel.guard import Door, Log
+from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
+from psabench.panel.recording_view import RecordingSource
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
-from psabench.panel.worker import Worker, bench_of, text_of
+from psabench.panel.source import Source
+from psabench.panel.worker import Worker, text_of
 from psabench.shell.connect import Opening, addresses
 
 
 def run(args: argparse.Namespace) -> int:
     """Handler of `psabench panel`."""
-    opening = of_fields(Opening, args, scpi=addresses(args.scpi))
     hub = ThreadedHub(Hub())
 
     out = args.out.resolve()
-
-    def opened() -> BenchView:
-        return bench_of(lambda: _open_bench(opening, args.truth), lambda b: BenchView(b, out, opening.start))
-
-    def restored(path: Path) -> BenchView:
-        return bench_of(lambda: Bench.restore(path, pace=opening.pace or "step"), lambda b: BenchView(b, out))
+    source = _source(args, out)
 
     def ready(address: str) -> None:
         show_event(args, {"event": "ready", "address": address}, f"ready {address}")
 
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
-    worker = Worker(opened, hub, runs, None if opening.there else restored, playing=not args.paused)
+    worker = Worker(source, hub, runs, HANDLERS, playing=not args.paused)
     with _listen_loopback(args.port) as listener:
         try:
             worker.start()
@@ -52,14 +48,21 @@ def run(args: argparse.Namespace) -> int:
         finally:
             runs.close()
             worker.stop()
+    if worker.died:
+        raise BenchError(worker.died)
     return 0
 
 
-def _open_bench(opening: Opening, truth: Path | None) -> Bench:
-    bench = opening.open()
-    if truth is not None:
-        bench.truth_path = truth
-    return bench
+def _source(args: argparse.Namespace, out: Path) -> view.Source:
+    """A recording, or a bench. Raises BadInput where options do not go together."""
+    if args.recording is None:
+        if args.board is not None:
+            raise BadInput(expected("--recording with it", args.board, "--board"))
+        return Source(of_fields(Opening, args, scpi=addresses(args.scpi)), out, args.truth)
+    names = ("scenario", "pace", "connect", "truth", "seed", "can")
+    refuse_beside("--recording", {f"--{n}": getattr(args, n) for n in names}, "panel")
+    refuse_beside("--recording", {"--scpi": args.scpi or None}, "panel")
+    return RecordingSource(args.recording, args.board or "psa2", args.node)
 
 
 @contextlib.contextmanager
@@ -80,11 +83,11 @@ def _listen_loopback(port: int) -> Iterator[socket.socket]:
 async def _serve(
     listener: socket.socket, hub: ThreadedHub, worker: Worker, reports: Path, ready: Callable[[str], None]
 ) -> None:
-    hub.loop = asyncio.get_running_loop()
+    hub.loop = loop = asyncio.get_running_loop()
     door = Door(port=listener.getsockname()[1])
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # a hostile client must not fill the terminal
     config = uvicorn.Config(
-        Pages(hub.hub, worker.ask, Log(), reports).app(door),
+        Pages(hub.hub, worker.ask, worker.inbox.greet, Log(), reports).app(door),
         log_config=None,
         access_log=False,
         proxy_headers=False,  # there is no proxy whose headers could be trusted
@@ -99,5 +102,12 @@ async def _serve(
         timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)
+
+    def end() -> None:
+        loop.call_soon_threadsafe(setattr, server, "should_exit", True)
+
+    worker.on_death = end
+    if worker.died:
+        return
     ready(door.address)
     await server.serve(sockets=[listener])

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from psabench.boards.unit import Unit
+from psabench.link.protocol_files import message
 from psabench.shell.commands import Arg, Command
 from psabench.shell.registers import FIELDS, group
 from psabench.shell.session import Session
@@ -55,6 +56,13 @@ def register_fields(unit: Unit) -> dict[str, Any]:
     return found
 
 
+def signal_choices(unit: Unit) -> dict[str, Any]:
+    """By signal of its readings: what its numbers mean, where the DBC has words for them."""
+    layout = getattr(unit, "layout", None)
+    signals = [s for name in layout.messages for s in message(name).signals] if layout else []
+    return {s.name: {str(k): str(v) for k, v in s.choices.items()} for s in signals if s.choices}
+
+
 def describe_bench(session: Session) -> Mapping[str, Any]:
     """All of it."""
     bench = session.bench
@@ -63,6 +71,7 @@ def describe_bench(session: Session) -> Mapping[str, Any]:
         "units": [{"name": n, "board": u.title, "node": u.node.node_id} for n, u in bench.units.items()],
         "unit": session.dut_name,
         "registers": register_fields(session.dut) if bench.units else {},
+        "choices": signal_choices(session.dut) if bench.units else {},
         "commands": {n: describe_command(c) for n, c in session.vocabulary.commands.items() if n not in NOT_HERE},
         "absent": dict(session.vocabulary.absent),
         "truth": bench.truth_path is not None,

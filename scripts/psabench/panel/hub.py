@@ -21,7 +21,7 @@ class Client:
     truth: bool = False  # its switch
     lines: bool = False  # it shows the levels of the lines; the emulator computes them only when they are read
     live: bool = True  # False: its tab is hidden
-    missed: bool = False  # updates were dropped: it needs the whole state
+    missed: bool = False  # texts were dropped: it needs the whole state
     answers: int = 0  # of the texts that wait
     texts: deque[tuple[bool, str]] = field(default_factory=deque)  # whether it is an answer; oldest first
     wake: asyncio.Event = field(default_factory=asyncio.Event)
@@ -39,6 +39,8 @@ class Client:
         if self.answers < ANSWERS:
             self.answers += 1
             self.texts.append((True, text))
+        else:
+            self.missed = True
         self.wake.set()
 
     async def next_text(self) -> str:

@@ -29,6 +29,7 @@ REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; f
 KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css", "LICENSE": "text/plain"}
 
 Ask = Callable[[int, dict[str, Any]], None]
+Greet = Callable[[int], None]
 
 
 class ThreadedHub:
@@ -60,10 +61,10 @@ class ThreadedHub:
 
 
 class Pages:
-    """The application. ask: hands a request to the worker, raises queue.Full."""
+    """The application. ask: hands a request to the worker, raises queue.Full; greet: that a page needs the state."""
 
-    def __init__(self, hub: Hub, ask: Ask, log: Log, reports: Path) -> None:
-        self._hub, self._ask, self._log, self._reports = hub, ask, log, reports
+    def __init__(self, hub: Hub, ask: Ask, greet: Greet, log: Log, reports: Path) -> None:
+        self._hub, self._ask, self._greet, self._log, self._reports = hub, ask, greet, log, reports
         folder = files("psabench.panel") / "static"
         self._files = {f.name: f.read_bytes() for f in folder.iterdir() if f.is_file()}
 
@@ -99,7 +100,7 @@ class Pages:
         self._hub.clients[client.number] = client
         sender = asyncio.create_task(self._send_all(socket, client))
         try:
-            self._ask_worker(client, {"do": "hello"})
+            self._greet(client.number)
             async for request in self._requests(socket):
                 self._take(client, request)
         finally:
@@ -115,7 +116,7 @@ class Pages:
                 await socket.send_text(text)
                 if client.missed:
                     client.missed = False
-                    self._ask_worker(client, {"do": "hello"})
+                    self._greet(client.number)
 
     async def _requests(self, socket: WebSocket) -> AsyncIterator[dict[str, Any]]:
         """Until the page goes, or does what ours never does: then it is closed and one line is logged."""
@@ -146,7 +147,7 @@ class Pages:
             client.live, client.truth = request.get("live") is True, request.get("truth") is True
             client.lines = request.get("lines") is True
             if woken:
-                self._ask_worker(client, {"do": "hello"})
+                self._greet(client.number)
             return
         self._ask_worker(client, request)
 

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import json
-import queue
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from psabench.bench import Bench
 from psabench.errors import BenchError, LinkError, expected
 from psabench.output import without_nan
-from psabench.panel.bench_view import BenchView
+from psabench.panel.converter import describe_converters
+from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
+from psabench.panel.view import Source, View
 
 UPDATE_S = 1 / 30
 STATE_S = 0.25
 CAN_S = 0.2
 OVERVIEW_S = 0.5
 RETRY_S = 1.0  # real time between looks whether an emulator is there again
-WAITING = 64  # requests; a page that asks for more is refused
+FIRST = "first"  # bench; others are its forks
 SLOWEST, FASTEST = 0.001, 1000.0  # of simulated time to real time
 
 
@@ -62,20 +62,23 @@ class Due:
 
 @dataclass(slots=True)
 class Worker:
-    """opened: brings up the bench; called again after it was lost. again: whether it comes back by itself."""
+    """handlers: what a page may ask for, by its "do" (psabench.panel.handlers)."""
 
-    opened: Callable[[], BenchView]
+    source: Source
     outlet: Outlet
     runs: Runs
-    restored: Callable[[Path], BenchView] | None = None  # a view of a bench from a snapshot; None: it is another's
+    handlers: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]]
     playing: bool = True
     speed: float = 1.0
-    requests: queue.Queue[tuple[int, dict[str, Any]]] = field(default_factory=lambda: queue.Queue(WAITING))
+    inbox: Inbox = field(default_factory=Inbox)
     ready: threading.Event = field(default_factory=threading.Event)
     failed: BenchError | None = None  # of the first opening
+    died: str = ""  # why the thread has ended by itself: an error of ours
+    on_death: Callable[[], None] = lambda: None
     lost: str = ""
-    busy: str = ""
-    _view: BenchView | None = None
+    name: str = FIRST  # of the bench that is shown
+    resting: dict[str, View] = field(default_factory=dict)  # the others, whose time stands still
+    _view: View | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
     _states: Due = field(default_factory=lambda: Due(STATE_S))
@@ -101,7 +104,11 @@ class Worker:
 
     def ask(self, number: int, request: dict[str, Any]) -> None:
         """Raises queue.Full."""
-        self.requests.put_nowait((number, request))
+        if request["do"] == "interrupt":
+            answer = {"id": request.get("id"), "kind": "answer", "line": self.inbox.stop_line()}
+            self.outlet.answer(number, text_of(answer))
+            return
+        self.inbox.put(number, request)
 
     # ---- in its own
 
@@ -116,31 +123,34 @@ class Worker:
         try:
             while not self._stop.is_set():
                 self._turn()
-        except Exception:
-            self.outlet.publish(
-                text_of({"kind": "lost", "why": "an error in the panel, see its terminal; start it again"})
-            )
-            raise
+        except BaseException as e:
+            self.died = f"panel: an error of its own has ended it: {e!r} at {_place(e)}"
+            self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
+            self.on_death()
         finally:
             self._close()
+            for view in self.resting.values():
+                _close_bench(view)
 
-    def _open(self) -> BenchView:
-        view = self.opened()
-        view.session.tick = self._tick
+    def _open(self) -> View:
+        return self._prepared(self.source.open())
+
+    def _prepared(self, view: View) -> View:
+        view.look_between(self._between)
         self._moved_s = time.monotonic()
         return view
 
     def _close(self) -> None:
         if self._view is not None:
-            with suppress(Exception):  # a connection that is lost closes as it likes
-                self._view.bench.close()
+            _close_bench(self._view)
         self._view = None
 
     def _turn(self) -> None:
         try:
             if self._view is None:
                 self._come_back()
-            self._answer_all()
+            self._answer(self.inbox.aside())
+            self._answer(self.inbox.in_order())
             if self._view is not None:
                 self._move(self._view)
                 self._say_news()
@@ -150,29 +160,41 @@ class Worker:
             self._lose(f"the bench does not go on: {e}")
 
     def _lose(self, why: str) -> None:
-        self.lost, self.busy = why, ""
+        self.lost = why
         self._close()
         self.outlet.publish(text_of({"kind": "lost", "why": why}))
+        if self.resting:
+            lost, self.name = self.name, FIRST if FIRST in self.resting else next(iter(self.resting))
+            self.exchange(self.resting.pop(self.name), f"{self.name}: {lost} was lost: {why}", playing=False)
 
     def _come_back(self) -> None:
         self._stop.wait(RETRY_S)
         try:
-            self._view = self._open()
+            self._view, self.name = self._open(), FIRST
         except (BenchError, OSError):
             self.outlet.publish(text_of({"kind": "lost", "why": self.lost}))
             return
         self.lost = ""
-        self.outlet.publish(text_of(self.hello()))
+        self.outlet.publish(text_of(self.hello() | {"began": "bench found again"}))
 
     def hello(self) -> dict[str, Any]:
         if self._view is None:
             return {"kind": "lost", "why": self.lost}
-        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.restored is not None}
-        return self._view.describe() | {"time": self._time()} | procedures
+        procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
+        return (
+            self._view.describe()
+            | {"time": self.time(), "benches": self.benches(), "converters": describe_converters()}
+            | procedures
+        )
 
-    def _move(self, view: BenchView) -> None:
+    def benches(self) -> dict[str, Any]:
+        """Which bench is shown, and which rest; forks: whether one may be made."""
+        forks = self.source.is_own and self.view.pace == "step"
+        return {"kind": "benches", "shown": self.name, "resting": sorted(self.resting), "forks": forks}
+
+    def _move(self, view: View) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
-        if view.bench.pace != "step":
+        if view.pace != "step":
             view.receive(self._updates.left_s)
             return
         now_s = time.monotonic()
@@ -181,29 +203,34 @@ class Worker:
             self._wait_request(self._updates.left_s)
             return
         passed_s, self._moved_s = min(now_s - self._moved_s, 2 * UPDATE_S), now_s
-        view.bench.wait(passed_s * self.speed)
+        view.wait(passed_s * self.speed)
         self._wait_request(self._updates.left_s)
 
     def _wait_request(self, for_s: float) -> None:
         """Sleep, but not while a page waits for an answer."""
         deadline_s = time.monotonic() + for_s
-        while self.requests.empty() and (left_s := deadline_s - time.monotonic()) > 0 and not self._stop.is_set():
+        while self.inbox.is_empty and (left_s := deadline_s - time.monotonic()) > 0 and not self._stop.is_set():
             time.sleep(min(left_s, 0.005))
 
-    def _tick(self) -> None:
-        """While a long line goes on: pages see it go."""
-        self._say_news()
+    def _between(self) -> None:
+        """Between two slices of time: while a line goes on, pages see it go, and can stop it."""
+        if not self.inbox.busy:
+            return
+        self.inbox.check()
         if self._stop.is_set():
             raise BenchError("panel: ended")
+        self._answer(self.inbox.aside())
+        self._say_news()
 
     def _say_news(self) -> None:
         view = self._view
         if view is None or not self._updates():
             return
-        buckets = view.take(self._overviews())
+        # A line of the unit waits for its frames: what it has not taken yet is not ours.
+        buckets = {} if self.inbox.busy.startswith("dut.") else view.take(self._overviews())
         if not self.outlet.is_watched():
             return
-        self.outlet.publish(text_of({"kind": "update", "time": self._time(), **({"new": buckets} if buckets else {})}))
+        self.outlet.publish(text_of({"kind": "update", "time": self.time(), **({"new": buckets} if buckets else {})}))
         if self._states():
             self.outlet.publish(text_of(view.state(lines=self.outlet.wants_lines())))
             if self.outlet.wants_truth():
@@ -211,42 +238,33 @@ class Worker:
         if self._cans():
             self.outlet.publish(text_of(view.can(view.now_s())))
 
-    def _say_truth(self, view: BenchView) -> None:
+    def _say_truth(self, view: View) -> None:
         try:
             message = view.truth()
         except BenchError as e:
             message = {"kind": "truth", "error": str(e)}
         self.outlet.publish(text_of(message), truth=True)
 
-    def _time(self) -> dict[str, Any]:
+    def time(self) -> dict[str, Any]:
         assert self._view is not None
         return {
             "t_s": round(self._view.now_s(), 9),
-            "playing": self.playing or self._view.bench.pace != "step",
+            "playing": self.playing or self._view.pace != "step",
             "speed": self.speed,
-            "busy": self.busy,
+            "busy": self.inbox.busy,
         }
 
     # ---- requests
 
-    def _answer_all(self) -> None:
-        for _ in range(WAITING):
+    def _answer(self, requests: Iterable[Asked]) -> None:
+        for number, request in requests:
             try:
-                number, request = self.requests.get_nowait()
-            except queue.Empty:
-                return
-            self._answer(number, request)
-
-    def _answer(self, number: int, request: dict[str, Any]) -> None:
-        try:
-            result = self._result(request)
-        except Exception as e:  # whatever a page asks for, the others go on
-            result = {"kind": "answer", "error": self._error_of(e)}
-        finally:
-            self.busy = ""
-        self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
-        if "error" in result and self._view is not None:
-            self._view.now_s()  # raises LinkError where it was the bench that has gone, and not a unit that is silent
+                result = self._result(request)
+            except Exception as e:  # whatever a page asks for, the others go on
+                result = {"kind": "answer", "error": self._error_of(e)}
+            self.outlet.answer(number, text_of({"id": request.get("id"), **result}))
+            if "error" in result and self._view is not None:
+                self._view.now_s()  # raises LinkError where the bench has gone, and not where a unit is silent
 
     def _error_of(self, e: Exception) -> str:
         if isinstance(e, BenchError | ValueError | OSError):
@@ -257,13 +275,13 @@ class Worker:
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
         what = str(request.get("do"))
-        handler = HANDLERS.get(what)
+        handler = self.handlers.get(what)
         if handler is None:
-            raise BenchError(expected(", ".join(HANDLERS), repr(what[:40]), "do"))
+            raise BenchError(expected(", ".join(self.handlers), repr(what[:40]), "do"))
         return {"kind": "answer", **handler(self, request)}
 
     @property
-    def view(self) -> BenchView:
+    def view(self) -> View:
         """The bench. Raises BenchError while it is lost."""
         if self._view is None:
             raise BenchError(f"panel: no bench: {self.lost}")
@@ -271,27 +289,28 @@ class Worker:
 
     def line(self, text: str) -> dict[str, Any]:
         """Carry out a line of the shell."""
-        self.busy = text[:200]
-        before = self.view.session.dut_name
-        done = self.view.line(text)
+        before = self.view.unit
+        with self.inbox.doing(text.strip()):
+            done = self.view.line(text)
         self._moved_s = time.monotonic()
         if str(done.get("line", "")).startswith("bench.snapshot "):
             self.outlet.publish(text_of({"kind": "snapshots", "names": self.view.snapshots()}))
-        if self.view.session.dut_name != before:
+        if self.view.unit != before or done.get("rewound"):
             self.outlet.publish(text_of(self.hello()))
-        return done | {"time": self._time()}
+        return done | {"time": self.time()}
 
-    def restore(self, name: str) -> dict[str, Any]:
-        """Go back: an emulator from the snapshot takes the place of ours. Raises BenchError, and ours goes on."""
-        if self.restored is None:
-            raise BenchError("panel: go back: this emulator was not started by the panel")
-        new = self.restored(self.view.file(name))
+    def exchange(self, new: View, why: str, *, playing: bool | None = None) -> None:
+        """A bench that takes the place of ours, which ends. playing: None: time goes on or stands still as before."""
         self._close()
-        self._view = new
-        new.session.tick = self._tick
-        self.playing, self._moved_s = False, time.monotonic()
-        self.outlet.publish(text_of(self.hello()))
-        return {"time": self._time()}
+        self._view, self.lost = self._prepared(new), ""
+        self.playing = self.playing if playing is None else playing
+        self.outlet.publish(text_of(self.hello() | {"began": why}))
+
+    def show(self, name: str, view: View, why: str) -> None:
+        """Another bench is shown; ours rests."""
+        self.resting[self.name], self.name = self.view, name
+        self._view = None
+        self.exchange(view, why, playing=False)
 
     def play(self, request: Mapping[str, Any]) -> dict[str, Any]:
         speed = request.get("speed", self.speed)
@@ -299,30 +318,18 @@ class Worker:
             raise BenchError(expected(f"{SLOWEST:g} to {FASTEST:g}", repr(speed)[:40], "speed"))
         self.playing, self.speed = request.get("on") is True, float(speed)
         self._moved_s = time.monotonic()
-        return {"time": self._time()}
+        return {"time": self.time()}
 
 
-def _run_procedure(w: Worker, request: Mapping[str, Any]) -> dict[str, Any]:
-    w.runs.start(str(request.get("name", "")))
-    return {}
+def _close_bench(view: View) -> None:
+    with suppress(Exception):  # a connection that is lost closes as it likes
+        view.close()
 
 
-def _stop_procedure(w: Worker, _: Mapping[str, Any]) -> dict[str, Any]:
-    w.runs.stop()
-    return {}
-
-
-# What a page may ask for, by its "do"; `watch` is the server's own.
-HANDLERS: Mapping[str, Callable[[Worker, Mapping[str, Any]], dict[str, Any]]] = {
-    "hello": lambda w, _: w.hello(),
-    "play": lambda w, request: w.play(request),
-    "line": lambda w, request: w.line(str(request.get("line", ""))),
-    "frame": lambda w, _: {"svg": w.view.frame()},
-    "statistics": lambda w, request: w.view.channel_statistics(str(request.get("channel", ""))),
-    "restore": lambda w, request: w.restore(str(request.get("file", ""))),
-    "run": _run_procedure,
-    "stop": _stop_procedure,
-}
+def _place(e: BaseException) -> str:
+    """The line of ours that raised it."""
+    last = traceback.extract_tb(e.__traceback__)[-1]
+    return f"{Path(last.filename).name}:{last.lineno}"
 
 
 def text_of(message: dict[str, Any]) -> str:
@@ -331,13 +338,3 @@ def text_of(message: dict[str, Any]) -> str:
         return json.dumps(message, allow_nan=False, separators=(",", ":"))
     except ValueError:
         return json.dumps(without_nan(message), allow_nan=False, separators=(",", ":"))
-
-
-def bench_of(opened: Callable[[], Bench], make: Callable[[Bench], BenchView]) -> BenchView:
-    """A view of a bench that is closed again where there is none to be had."""
-    bench = opened()
-    try:
-        return make(bench)
-    except BaseException:
-        bench.close()
-        raise

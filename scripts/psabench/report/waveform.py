@@ -22,7 +22,7 @@ from psabench.report.drawing import Panel, Section, Tag, need, render
 
 
 def frame_words(vcd: Vcd, fall_ns: int, rise_ns: int, word_bits: int) -> list[Tag]:
-    """The words of a frame, from the rises of CLK between two edges of INT."""
+    """The words of a frame, from the rises of CLK between two edges of INT; of a torn one as far as its bits go."""
     rises = vcd.wires["CLK"].edges_ns(1)
     rises = rises[(rises > fall_ns) & (rises < rise_ns)]
     bits = vcd.wires["Data"].at(rises).astype(np.int64)
@@ -30,10 +30,12 @@ def frame_words(vcd: Vcd, fall_ns: int, rise_ns: int, word_bits: int) -> list[Ta
     tags = []
     for i, name in enumerate("XYZT"):
         at, sent = rises[i * word_bits :][:word_bits], bits[i * word_bits :][:word_bits]
-        value = int((sent << np.arange(word_bits)).sum())
+        if not at.size:
+            break
+        value = int((sent << np.arange(at.size)).sum())
         signed = value - (value >> (word_bits - 1) << word_bits)
         fields = f"{value & 0xFFFF:04X}h" + (f" ch{value >> 16 & 15} st{value >> 20 & 15:X}" if word_bits > 16 else "")
-        text = f"{name} = {fields if name == 'T' else signed}"
+        text = f"{name} = {fields if name == 'T' else signed}" if at.size == word_bits else f"{at.size} bits"
         tags.append(Tag("Data", int(at[0]) - half, int(at[-1]) + half, text))
     return tags
 

@@ -127,7 +127,7 @@ def _expect(session: Context, args: Args) -> Mapping[str, Any]:
 
 def _save(session: Context, args: Args) -> Mapping[str, Any]:
     path = Path(str(args["file"]))
-    text = session.transcript.script()
+    text = session.transcript.script(session.now_ns())
     replace_file(path, text)
     return {"file": str(path), "lines": text.count("\n")}
 

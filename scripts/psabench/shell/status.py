@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from psabench.bench import Bench, GrowingFile, Status
+from psabench.bench import Bench
 from psabench.errors import BenchError
+from psabench.status import GrowingFile, Status
 
 EVERY_S = 0.25  # real time between two looks
 

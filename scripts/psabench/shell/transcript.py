@@ -22,14 +22,18 @@ class Transcript:
     """start: the `start` line that brings up the same bench; "": the script is given where its bench is."""
 
     start: str
-    lockstep: bool  # time moved only when a line said so: no instants need to be written down
+    lockstep: bool  # time moves only when a line says so: no instants need to be written down
     said: list[Said] = field(default_factory=list)
 
     def add(self, line: str, t_ns: int | None, wrong: str = "") -> None:
         self.said.append(Said(line, t_ns, wrong))
 
-    def script(self) -> str:
-        """The session as a script. What was rejected is in comments."""
+    def copy(self) -> Transcript:
+        """As far as it is now."""
+        return Transcript(self.start, self.lockstep, list(self.said))
+
+    def script(self, end_ns: int | None = None) -> str:
+        """The session as a script, to end_ns. What was rejected is in comments."""
         lines = [HEADER, *([self.start] if self.start else [])]
         for said in self.said:
             if said.wrong:
@@ -38,6 +42,8 @@ class Transcript:
             if not self.lockstep and said.t_ns is not None and not said.line.startswith("at "):
                 lines.append(f"at {seconds(said.t_ns)}")
             lines.append(said.line)
+        if not self.lockstep and end_ns is not None:
+            lines.append(f"at {seconds(end_ns)}")
         return "\n".join(_without_repeats(lines)) + "\n"
 
 

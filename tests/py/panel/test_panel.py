@@ -6,8 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -17,8 +15,6 @@ from psabench.emulator import Emulator
 from psabench.panel.hub import UPDATES
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
-
-LINES = ("dut.ready", "head.turn 30", "wait 0.3", "faults.add sensor.bias a.sensor.x bias_v=0.1 for_s=0.1", "wait 0.2")
 
 HELLOS = 40  # of 100 kB each
 LOST = re.compile("connection (closed|lost)|gone away")  # CAN or the control socket, whichever is used first
@@ -139,17 +135,6 @@ def test_floods_and_malformed_messages_close_the_page_with_one_line_each() -> No
     assert len(lines) == len(set(lines)) == 4, lines
 
 
-def test_the_same_lines_by_panel_and_shell_end_in_the_same_state(tmp_path: Path) -> None:
-    with run.running("quiet", "--seed", "3", "--paused", "--out", tmp_path) as panel, panel.socket() as socket:
-        for k, line in enumerate((*LINES, "bench.snapshot by-panel")):
-            assert "error" not in run.said(socket, k + 1, line)
-    words = [w for line in (*LINES, f"bench.snapshot {tmp_path / 'by-shell'}") for w in ("--command", line)]
-    subprocess.run([sys.executable, "-m", "psabench.cli", "shell", "quiet", "--seed", "3", *words], check=True)
-    digests = [re.findall(r'"state":"([0-9a-f]{64})"', (tmp_path / n).read_text()) for n in ("by-panel", "by-shell")]
-    assert digests[0]
-    assert digests[0] == digests[1]
-
-
 def test_a_unit_that_is_silent_loses_no_bench(tmp_path: Path) -> None:
     """Its SDO times out; faults, time and unit are there as before."""
     with run.running("climate", "--paused", "--out", tmp_path) as panel, panel.socket() as socket:
@@ -222,15 +207,9 @@ def test_units_of_every_board_show_channels_and_registers(scenario: str, boards:
 def test_an_emulator_of_the_panel_that_dies_is_started_again(tmp_path: Path) -> None:
     with run.running("quiet", "--out", tmp_path) as panel, panel.socket() as socket:
         run.received(socket, "hello")
-        (child,) = children(panel.process.pid)
+        (child,) = run.children(panel.process.pid)
         os.kill(child, signal.SIGKILL)
         assert LOST.search(run.received(socket, "lost")["why"])
         assert run.received(socket, "hello")["units"]
-        assert children(panel.process.pid) != [child]
+        assert run.children(panel.process.pid) != [child]
         assert "error" not in run.said(socket, 1, "head.turn 10")
-
-
-def children(pid: int) -> list[int]:
-    """Processes that any thread of this one has started."""
-    lists = Path(f"/proc/{pid}/task").glob("*/children")
-    return [int(word) for path in lists for word in path.read_text().split()]

@@ -5,9 +5,7 @@ from __future__ import annotations
 import http.server
 import os
 import re
-import shutil
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,25 +15,13 @@ import numpy as np
 import numpy.typing as npt
 import panel_run as run
 import pytest
+from panel_page import LONG_MS, REBOUND, WAIT_MS, needs_browser, opened, said, until
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
-CHROMIUM = shutil.which("chromium")
-WAIT_MS, LONG_MS = 60_000, 240_000  # a starved machine takes its time
-REBOUND = "rebound.example"  # resolves to 127.0.0.1 for this browser: an attacker's name with a short-lived record
 UPDATES = "panel.counts.update"
 
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="no chromium: apt-get install chromium")
-expect.set_options(timeout=WAIT_MS)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as p:
-        arguments = [f"--host-resolver-rules=MAP {REBOUND} 127.0.0.1"]
-        chromium = p.chromium.launch(executable_path=str(CHROMIUM), args=arguments)
-        yield chromium
-        chromium.close()
+pytestmark = needs_browser
 
 
 @pytest.fixture(scope="module")
@@ -49,40 +35,6 @@ def page(browser: Browser, panel: run.Running) -> Iterator[Page]:
     """Our page, open; at its end nothing has gone to the console, and nothing was loaded from elsewhere."""
     with opened(browser, panel) as p:
         yield p
-
-
-@contextmanager
-def opened(browser: Browser, panel: run.Running, **how: object) -> Iterator[Page]:
-    page = browser.new_page(**{"viewport": {"width": 1280, "height": 900}, **how})  # type: ignore[arg-type]
-    wrong: list[str] = []
-    page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)
-    page.on("pageerror", lambda e: wrong.append(str(e)))
-    page.on("request", lambda r: None if own(r.url, panel) else wrong.append(r.url))
-    page.set_default_timeout(WAIT_MS)
-    page.goto(panel.address)
-    expect(page.locator("#link")).to_have_text("connected")
-    until(page, "panel.counts.hello > 0")
-    yield page
-    page.close()
-    assert wrong == []
-
-
-def own(url: str, panel: run.Running) -> bool:
-    return url.startswith((f"http://127.0.0.1:{panel.port}/", f"blob:http://127.0.0.1:{panel.port}/"))
-
-
-def until(page: Page, expression: str) -> None:
-    """Wait until it is true. Not wait_for_function, which evaluates in the page, where its own policy forbids that."""
-    deadline_s = time.monotonic() + WAIT_MS / 1000
-    while not page.evaluate(expression):
-        assert time.monotonic() < deadline_s, expression
-        page.wait_for_timeout(20)
-
-
-def said(page: Page, line: str) -> None:
-    page.fill("#line input", line)
-    page.press("#line input", "Enter")
-    expect(page.locator("#log")).to_contain_text(f"> {line}", timeout=LONG_MS)
 
 
 def test_a_fault_is_injected_and_seen_on_the_plot(page: Page) -> None:

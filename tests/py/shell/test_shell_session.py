@@ -9,13 +9,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from psabench.bench import GrowingFile
 from psabench.errors import BadInput, BenchError, ControlError, DeviceError
 from psabench.shell import status
 from psabench.shell.connect import Opening, addresses
 from psabench.shell.lexer import Wrong
 from psabench.shell.script import Voice, run_file, run_lines, run_stream
 from psabench.shell.session import Session
+from psabench.status import GrowingFile
 from shell_bench import fake
 
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
@@ -83,7 +83,10 @@ def running(*options: str | Path) -> Iterator[Running]:
             panel = Running(process, words[1])
             yield panel
             panel.end()
-        finally:
+        finally:  # of a test that fails, too: killed at once, a panel leaves its forks
+            process.send_signal(signal.SIGINT)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(5.0)
             process.kill()
 
 
@@ -107,3 +110,9 @@ def asked(socket: ClientConnection, number: int, **request: object) -> dict[str,
 def said(socket: ClientConnection, number: int, line: str) -> dict[str, Any]:
     """The answer to a line of the shell."""
     return asked(socket, number, do="line", line=line)
+
+
+def children(pid: int) -> list[int]:
+    """Processes that any thread of this one has started."""
+    lists = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(word) for path in lists for word in path.read_text().split()]

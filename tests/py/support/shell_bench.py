@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from psabench.bench import Bench, Status
+from psabench.bench import Bench
 from psabench.errors import ControlError
 from psabench.link.control import Reply
 from psabench.shell.commands import Arg, Command, Kind, Vocabulary, from_help, with_kinds
+from psabench.status import Status
 
 ROWS: list[dict[str, Any]] = [
     {"name": "help", "what": "Lists the commands.", "args": []},

@@ -1,7 +1,8 @@
-// Registers, instruments, faults, lines, CAN, overview.
+// Registers, faults, lines, CAN, overview.
 
 import { $, complain, digits, fill, make, options } from "./page.js";
-import { commandForm, input, labelled, lineOf } from "./forms.js";
+import { input, labelled, lineOf } from "./forms.js";
+import { svg } from "./svg.js";
 
 export function registers(hello, say) {
   const banks = Object.keys(hello.registers);
@@ -39,29 +40,6 @@ function fieldInput(field) {
   return make("label", {}, `${field.name} `, box);
 }
 
-const THINGS = ["head", "table", "chamber", "supply", "vehicle", "gyro"];
-
-export function instruments(hello, say) {
-  const list = $("#instrument-list");
-  list.replaceChildren();
-  for (const thing of THINGS) {
-    const commands = Object.entries(hello.commands).filter(([n]) => n.startsWith(`${thing}.`) && !n.endsWith(".read") && !n.endsWith(".log"));
-    if (!commands.length) continue;
-    const forms = commands.map(([n, c]) => commandForm(n, c, say));
-    if (thing === "vehicle" || thing === "gyro") list.append(make("details", {}, make("summary", {}, thing), ...forms));
-    else list.append(make("h3", {}, thing), make("p", { class: "quiet", id: `read-${thing}` }, "-"), ...forms);
-  }
-  const absent = THINGS.filter((t) => hello.absent[t]);
-  if (absent.length) list.append(make("p", { class: "quiet" }, `Not in this scenario: ${absent.join(", ")}.`));
-}
-
-export function readings(state) {
-  for (const [thing, shown] of Object.entries(state.instruments)) {
-    const place = $(`#read-${thing}`);
-    if (place) place.textContent = Object.entries(shown).map(([k, v]) => `${k} ${digits(v)}`).join(", ");
-  }
-}
-
 export function faultForm(hello, say) {
   const form = $("#add-fault"), command = hello.commands["faults.add"];
   $("#faults").hidden = !command;
@@ -94,24 +72,17 @@ export function faultList(state, now, say) {
 }
 
 function timeline(faults, now) {
-  const svg = $("#timeline"), height = faults.length * 14;
-  svg.setAttribute("height", height);
-  if (!height) { svg.replaceChildren(); return; }
+  const strip = $("#timeline"), height = faults.length * 14;
+  strip.setAttribute("height", height);
+  if (!height) { strip.replaceChildren(); return; }
   const begin = Math.min(...faults.map((f) => f.began_s)), span = Math.max(now - begin, 1e-6);
-  const width = svg.clientWidth || 300;
-  svg.replaceChildren(...faults.flatMap((f, i) => {
+  const width = strip.clientWidth || 300;
+  strip.replaceChildren(...faults.flatMap((f, i) => {
     const from = ((f.began_s - begin) / span) * width, to = (((f.ended_s ?? now) - begin) / span) * width;
-    const bar = svgElement("rect", { x: from, y: i * 14 + 2, width: Math.max(2, to - from), height: 9, fill: f.ended_s === undefined ? "var(--bad)" : "var(--quiet)" });
-    bar.append(svgElement("title", {}, `${f.kind} ${f.point}`));
+    const bar = svg("rect", { x: from, y: i * 14 + 2, width: Math.max(2, to - from), height: 9, fill: f.ended_s === undefined ? "var(--bad)" : "var(--quiet)" });
+    bar.append(svg("title", {}, `${f.kind} ${f.point}`));
     return [bar];
   }));
-}
-
-function svgElement(name, attributes, text) {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  if (text) element.textContent = text;
-  return element;
 }
 
 export function board(state) {
@@ -131,7 +102,7 @@ export function overview(state, chosen, say) {
   if (state.overview.length > 1) fill($("#overview tbody"), state.overview.map((u) => [u.name, u.board, u.samples, [u.lost, u.lost ? "bad" : ""],
     [u.torn, u.torn ? "bad" : ""], [u.last.map(([n, v, unit]) => `${n} ${digits(v)} ${unit}`).join(", "), "text"]]));
   const unit = state.overview.find((u) => u.name === chosen);
-  $("#health").textContent = unit ? `${unit.board}: ${unit.samples} samples, lost ${unit.lost}, torn ${unit.torn}` : "";
+  $("#health").textContent = unit ? `${unit.board}: ${unit.samples} samples, lost ${unit.lost}, torn ${unit.torn}${lines(unit)}` : "";
   const names = state.overview.map((u) => u.name);
   const holder = $("#units");
   if (holder.dataset.key !== names.join()) {
@@ -140,6 +111,8 @@ export function overview(state, chosen, say) {
   }
   for (const button of holder.children) button.setAttribute("aria-pressed", button.dataset.unit === chosen);
 }
+
+const lines = ({ lines: [frames, torn] }) => (frames ? `; on the lines ${frames} frames drawn, torn ${torn}` : "");
 
 export function can(message) {
   const trace = $("#trace").checked;

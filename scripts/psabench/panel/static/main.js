@@ -4,7 +4,15 @@ import { Link } from "./link.js";
 import { $, complain, make, options } from "./page.js";
 import * as plots from "./plots.js";
 import * as cards from "./cards.js";
+import * as converter from "./converter.js";
+import * as forks from "./forks.js";
+import * as frame from "./frame.js";
+import * as gyro from "./gyro.js";
+import { instruments, readings, turn } from "./instruments.js";
+import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
+import * as recording from "./recording.js";
+import * as scenario from "./scenario.js";
 import * as statistics from "./statistics.js";
 
 let hello = null, now = 0, playing = false;
@@ -48,16 +56,24 @@ const HANDLERS = {
     if (until) options($("#event"), until.args[0].choices, "INT_FALL");
     options($("#names"), Object.keys(m.commands));
     cards.registers(m, say);
-    cards.instruments(m, say);
+    instruments(m, say);
+    gyro.offer(m, say);
+    frame.offer(m, link, say);
+    converter.offer(m, link);
     cards.faultForm(m, say);
     $("#truth").hidden = !m.truth;
     procedures.offer(m, link);
+    scenario.offer(m, link);
+    forks.offer(m.benches, link);
+    recording.offer(m.recording, link, say, () => now);
+    if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
   },
-  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); options($("#channel"), m.new.names); } },
+  update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
-    cards.readings(m);
+    recording.state(m);
+    readings(m);
     cards.faultList(m, now, say);
     cards.board(m);
     cards.overview(m, hello ? hello.unit : "", say);
@@ -68,8 +84,13 @@ const HANDLERS = {
     options($("#snapshots"), m.names);
   },
   can: cards.can,
+  benches: (m) => forks.offer(m, link),
   procedure: procedures.follow,
-  truth: (m) => { if ($("#truth-switch").checked) $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1); },
+  truth: (m) => {
+    if (!$("#truth-switch").checked) return;
+    $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1);
+    gyro.truth(m.state);
+  },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
 };
 
@@ -81,11 +102,15 @@ function take(message) {
 
 function time(t) {
   now = t.t_s;
+  turn(now);
   playing = t.playing;
+  interrupt.show(t.busy);
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
   $("#play").textContent = playing ? "Pause" : "Run";
   $("#play").setAttribute("aria-pressed", playing);
 }
+
+interrupt.offer(link);
 
 const play = (on) => link.ask({ do: "play", on, speed: Number($("#speed").value) }).then((a) => time(a.time), (e) => complain(e.message));
 const step = async (length) => { if (playing) await play(false); say(`wait ${length}`); };
@@ -99,16 +124,6 @@ $("#restore").onclick = () => link.ask({ do: "restore", file: $("#snapshots").va
 $("#start-stream").onclick = () => say("dut.start");
 $("#stop-stream").onclick = () => say("dut.stop");
 $("#reset-unit").onclick = () => say("dut.reset");
-$("#frame").onclick = async () => {
-  try {
-    const answer = await link.ask({ do: "frame" });
-    const picture = $("#frame-picture");
-    URL.revokeObjectURL(picture.src);
-    picture.src = URL.createObjectURL(new Blob([answer.svg], { type: "image/svg+xml" }));
-    picture.alt = "frame on Int, Data and CLK";
-    picture.hidden = false;
-  } catch (error) { complain(error.message); }
-};
 $("#all-channels").onchange = plots.build;
 $("#compute").onclick = () => link.ask({ do: "statistics", channel: $("#channel").value }).then(statistics.show, (e) => complain(e.message));
 $("#window").onchange = plots.touch;
@@ -124,6 +139,7 @@ $("#line").elements.line.oninput = (event) => {
 };
 $("#truth-switch").onchange = (event) => {
   $("#truth-state").hidden = !event.target.checked;
+  if (!event.target.checked) gyro.truth(null);
   link.sendWatch({ truth: event.target.checked });
 };
 
@@ -147,6 +163,6 @@ document.addEventListener("visibilitychange", () => link.sendWatch({ live: !docu
 new ResizeObserver(plots.resize).observe($("#plots"));
 
 theme(localStorage.getItem("theme") || "");
-(function frame() { plots.draw(); counts.drawn++; requestAnimationFrame(frame); })();
+(function redraw() { plots.draw(); counts.drawn++; requestAnimationFrame(redraw); })();
 
 window.panel = { counts, shown: plots.shown, link }; // for tests

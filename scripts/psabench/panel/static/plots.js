@@ -54,7 +54,8 @@ function settings(name, physical) {
   };
 }
 
-const width = () => Math.max(200, $("#plots").clientWidth);
+export const size = (box) => Math.max(200, box.clientWidth);
+const width = () => size($("#plots"));
 
 export function draw() {
   if (!dirty) return;
