@@ -1,22 +1,64 @@
-"""Progress of long work on stderr: a bar on a terminal, a line a step elsewhere."""
+"""Progress of long work on stderr: a bar on a terminal, a line a step elsewhere; for programs what is known so far."""
 
 from __future__ import annotations
 
+import json
+import math
+import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from shutil import get_terminal_size
 from typing import Protocol, TextIO
 
 BAR = 30  # characters
 REDRAW_S = 0.1
+INTERVALS = "PSABENCH_INTERVALS"  # names a file: a line of JSON each time when more is known
 
 
 class Advance(Protocol):
     """Once per part done; note: what is known by now, in a few words."""
 
     def __call__(self, note: str = "") -> None: ...
+
+
+class Known(Protocol):
+    """An estimate as far as it is known."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def ci_half(self) -> float: ...
+
+
+Estimated = Callable[[int, Sequence[Known]], None]  # number of readings, what they say
+
+
+def interval_log() -> Estimated | None:
+    """Appends to the file that $PSABENCH_INTERVALS names; None: no one asks, and nothing need be computed.
+
+    No instant is in a line: the same readings write the same bytes.
+    """
+    name = os.environ.get(INTERVALS)
+    if not name:
+        return None
+
+    def write(readings: int, known: Sequence[Known]) -> None:
+        rows = [{"name": e.name, "value": e.value, "half": e.ci_half, "unit": e.unit} for e in known if _is_finite(e)]
+        with Path(name).open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"readings": readings, "estimates": rows}, ensure_ascii=False) + "\n")
+
+    return write
+
+
+def _is_finite(e: Known) -> bool:
+    return math.isfinite(e.value) and math.isfinite(e.ci_half)
 
 
 class Bar:

@@ -52,13 +52,15 @@ class CanTrace:
     def view(self, span_s: float) -> dict[str, Any]:
         """For the page; span_s: of the bench's time since the last view."""
         ids = []
+        made: dict[int, dict[str, Any]] = {}  # most of the latest frames are the last of their identifier, too
         for can_id in sorted(self.rows):
             row = self.rows[can_id]
             rate = (row.count - row.shown) / span_s if span_s > 0 else None
             row.shown = row.count
             assert row.last is not None
-            ids.append(self._row(row.last) | {"count": row.count, "per_s": rate})
-        frames = [self._row(m) for m in self.latest]
+            made[id(row.last)] = plain = self._row(row.last)
+            ids.append(plain | {"count": row.count, "per_s": rate})
+        frames = [made.get(id(m)) or self._row(m) for m in self.latest]
         return {"bus": self.bus, "frames": self.frames, "errors": self.errors, "ids": ids, "latest": frames}
 
     def _row(self, m: Message) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from psabench.boards.psa2.frames import FrameCounters, Frames
 from psabench.boards.readings import Readings
 from psabench.errors import BenchError, expected
-from psabench.link.signals import Floats
+from psabench.link.signals import Floats, Ints
 from psabench.panel.statistics import channel_statistics
 
 BUCKET_S = 1 / 30  # of the bench's time; a longer span in one update is split
@@ -63,15 +62,19 @@ def split_envelopes(s: Samples) -> list[Envelope]:
     span_s = float(s.t_s[-1] - s.t_s[0])
     parts = int(min(max(1.0, span_s / BUCKET_S), MOST_BUCKETS, n))
     edges = np.linspace(0, n, parts + 1).astype(int)
-    return [_make_bucket(float(s.t_s[b - 1]), s.values[a:b]) for a, b in pairwise(edges)]
+    bands = _bands(s.values, edges[:-1])
+    return [Envelope(round(t_s, 6), row) for t_s, row in zip(s.t_s[edges[1:] - 1].tolist(), bands, strict=True)]
 
 
-def _make_bucket(t_s: float, values: Floats) -> Envelope:
-    bands = []
-    for column in values.T:
-        here = column[np.isfinite(column)]
-        bands.append((float(here.min()), float(here.max()), float(here.mean())) if here.size else None)
-    return Envelope(round(t_s, 6), tuple(bands))
+def _bands(values: Floats, starts: Ints) -> list[tuple[tuple[float, float, float] | None, ...]]:
+    """The bands of all channels, (n, channels), in buckets that begin at these rows; all at once for fleets."""
+    there = np.isfinite(values)
+    count = np.add.reduceat(there, starts, axis=0, dtype=np.int64)
+    low = np.minimum.reduceat(np.where(there, values, np.inf), starts, axis=0).tolist()
+    high = np.maximum.reduceat(np.where(there, values, -np.inf), starts, axis=0).tolist()
+    mean = (np.add.reduceat(np.where(there, values, 0.0), starts, axis=0) / np.maximum(count, 1)).tolist()
+    rows = zip(count.tolist(), low, high, mean, strict=True)
+    return [tuple((a, b, c) if k else None for k, a, b, c in zip(*row, strict=True)) for row in rows]
 
 
 @dataclass(slots=True)

@@ -20,7 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from psabench.errors import BenchError, expected
+from psabench.panel.intervals import Intervals
 from psabench.procedures.command_line import offered
+from psabench.progress import INTERVALS
 
 OFFERED: Mapping[str, str] = {
     **offered.ON_THE_HEAD,
@@ -67,6 +69,7 @@ class Runs:
     def __init__(self, out: Path, changed: Callable[[], None]) -> None:
         self.out = out
         self.progress = Progress()
+        self.intervals = Intervals(out / "intervals.jsonl")
         self._changed = changed
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
@@ -80,6 +83,7 @@ class Runs:
         folder = self.out / name
         folder.mkdir(parents=True, exist_ok=True)
         (folder / REPORT).unlink(missing_ok=True)
+        self.intervals.forget()
         self.progress, self._stopped = Progress(name=name, state="running"), False
         ours, theirs = pty.openpty()
         command = [sys.executable, "-m", "psabench.cli", "run", name, "--out", str(folder), *AGAIN.get(name, ())]
@@ -89,7 +93,7 @@ class Runs:
                 stdin=subprocess.DEVNULL,
                 stdout=theirs,
                 stderr=theirs,
-                env=os.environ | {"COLUMNS": "200"},
+                env=os.environ | {"COLUMNS": "200", INTERVALS: str(self.intervals.path.resolve())},
                 start_new_session=True,
             )
         finally:
@@ -118,8 +122,10 @@ class Runs:
             *whole, rest = re.split(rb"[\r\n]+", rest + more)
             for part in whole:
                 progress.take(part.decode(errors="replace"))
+            self.intervals.follow()
             self._changed()
         os.close(ours)
+        self.intervals.follow()
         status = process.wait()
         known = {0: "done", 1: "out of limits"}
         progress.state = "stopped" if self._stopped else known.get(status, f"failed, status {status}")
@@ -138,6 +144,7 @@ class Runs:
             "total": p.total,
             "note": p.note,
             "lines": list(p.lines),
+            "intervals": self.intervals.message(),
             "report": report if p.state != "running" else "",
         }
 

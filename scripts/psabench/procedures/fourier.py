@@ -57,7 +57,12 @@ def fourier(bench: HeadBench, p: FourierParams, watch: Watch | None = None) -> P
     Raises ValueError when the readings do not suffice, and lets through what the bench raises and
     KeyboardInterrupt: the readings taken until then have gone to `watch.record`.
     """
-    readings = measure_face(bench, p, Face.DIRECT, watch or Watch())
+    watch = watch or Watch()
+
+    def look(readings: Sequence[Reading]) -> None:
+        watch.estimate(readings, lambda: fit_fourier(readings, p, bench.g_mps2).estimates[: len(ONE_FACE)])
+
+    readings = measure_face(bench, p, Face.DIRECT, watch, look)
     return estimate_fourier(readings, p, bench.g_mps2)
 
 

@@ -8,8 +8,8 @@ board's divider.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.estimate.face import Face
-from psabench.progress import Advance
+from psabench.progress import Advance, Estimated, Known
 
 
 class HeadBench(Protocol):
@@ -90,3 +90,10 @@ class Watch:
 
     progress: Progress = field(default_factory=Silent)
     record: Callable[[Reading], None] = _drop
+    estimated: Estimated | None = None  # gets what is known so far
+
+    def estimate(self, readings: Sequence[Reading], fit: Callable[[], Sequence[Known]]) -> None:
+        """Say what the readings tell by now; nothing while they do not suffice."""
+        if self.estimated is not None:
+            with suppress(ValueError):
+                self.estimated(len(readings), fit())

@@ -69,8 +69,16 @@ class ReversalResult(ProcedureResult):
 def reversal(bench: HeadBench, p: ReversalParams, watch: Watch | None = None) -> ReversalResult:
     """Measure the faces one after the other and estimate. Errors and Ctrl-C as in `fourier`."""
     readings: list[Reading] = []
+    before: tuple[Reading, ...] = ()
+    watch = watch or Watch()
+
+    def look(new: Sequence[Reading]) -> None:
+        both = [*before, *new]
+        watch.estimate(both, lambda: fit_reversal(both, p, bench.g_mps2).estimates)
+
     for face in (*_UPRIGHT, *(_SIDE if p.side else ())):
-        readings += measure_face(bench, p, face, watch or Watch())
+        before = tuple(readings)
+        readings += measure_face(bench, p, face, watch, look)
     return estimate_reversal(readings, p, bench.g_mps2)
 
 

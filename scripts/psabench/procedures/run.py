@@ -30,6 +30,7 @@ from psabench.procedures.recording import CsvRecorder
 from psabench.procedures.registry import PROCEDURES, Procedure
 from psabench.procedures.result import fields_of, made_params
 from psabench.procedures.wire_bench import WireBench
+from psabench.progress import interval_log
 from psabench.report import calibration as report
 from psabench.report.grading import Section
 from psabench.report.nominal import Nominal, nominal_dict, nominal_of_dict, nominal_of_scenario, read_passport
@@ -139,7 +140,7 @@ def measure_on(bench: Bench, head: HeadBench, m: Measurement, progress: Progress
     with CsvRecorder(m.csv) as recorder:
         zero = ZeroWatch(recorder, lambda: bench.time_s, lambda: _zero_moved_v(bench, m.params.axis))
         watched = zero if bench.truth_path else recorder
-        result = m.procedure.run(head, m.params, Watch(progress=progress, record=watched))
+        result = m.procedure.run(head, m.params, Watch(progress=progress, record=watched, estimated=interval_log()))
     truth = axis_truth(next(iter(bench.truth()["units"].values())), m.params.axis) if bench.truth_path else None
     moved_v = zero.moved_v(result.readings) if truth else ()
     result = expand_result(result, m.procedure, m.params, m.accuracy, _step_v(m.average))
@@ -172,7 +173,7 @@ def _replay_run(
     procedure, label = PROCEDURES[name], str(head.setup.get("condition", ""))
     params = made_params(procedure.params, name, options.params or {})
     with CsvRecorder(options.out / f"{'-'.join(x for x in (name, label) if x)}.csv") as recorder:
-        result = procedure.run(head, params, Watch(progress=progress, record=recorder))
+        result = procedure.run(head, params, Watch(progress=progress, record=recorder, estimated=interval_log()))
     accuracy = accuracy_of(dict(head.setup.get("accuracy", {})), options)
     result = expand_result(result, procedure, params, accuracy, _step_v(int(head.setup["average"])))
     section = Section(label=label, result=result, truth=None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -20,6 +20,7 @@ from psabench.procedures.result import DEG, Array, FaceSeries, option
 
 LACK_OF_FIT_P = 1e-3  # below this the report warns
 WANDER_P = 1e-3  # below this the zero wanders
+LOOKS = 8  # in a realisation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +99,15 @@ def read_position(
     return taken
 
 
-def measure_face(bench: HeadBench, p: SeriesParams, face: Face, watch: Watch) -> list[Reading]:
-    """All realisations on one face, eq. (16)."""
+def measure_face(
+    bench: HeadBench,
+    p: SeriesParams,
+    face: Face,
+    watch: Watch,
+    look: Callable[[list[Reading]], None] = lambda _: None,
+) -> list[Reading]:
+    """All realisations on one face, eq. (16). look: gets what this face has, LOOKS times in each."""
+    every = max(1, p.positions // LOOKS)
     bench.mount(face)
     taken: list[Reading] = []
     with watch.progress.step(f"series, face {face.value}", p.realisations * p.positions) as done:
@@ -108,6 +116,8 @@ def measure_face(bench: HeadBench, p: SeriesParams, face: Face, watch: Watch) ->
                 set_deg = j * p.step_deg
                 taken += read_position(bench, watch, face, set_deg, p.axis, p.readings, p.dwell_s, realisation)
                 done()
+                if (j + 1) % every == 0 or j + 1 == p.positions:
+                    look(taken)
     return taken
 
 

@@ -88,6 +88,10 @@ def turns(bench: HeadBench, p: TurnsParams, watch: Watch | None = None) -> Proce
     """Measure the six positions p.realisations times and estimate. Errors and Ctrl-C as in `fourier`."""
     watch = watch or Watch()
     readings: list[Reading] = []
+
+    def fit() -> Sequence[Estimate]:
+        return fit_turns(readings, p, bench.g_mps2).estimates
+
     for face in (Face.DIRECT, Face.SIDE):
         angles = [a for pair in PAIRS if pair.face is face for a in _angles(pair, p.search_deg)]
         bench.mount(face)
@@ -96,6 +100,7 @@ def turns(bench: HeadBench, p: TurnsParams, watch: Watch | None = None) -> Proce
                 for set_deg in angles:
                     readings += read_position(bench, watch, face, set_deg, p.axis, p.readings, p.dwell_s, realisation)
                     done()
+                watch.estimate(readings, fit)
     return estimate_turns(readings, p, bench.g_mps2)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import math
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -113,6 +114,24 @@ def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:
     assert found[-1].t_s == pytest.approx(0.999)
     long = Samples(t_s=t_s * 1000.0, values=s.values, names=s.names, units=s.units)
     assert len(split_envelopes(long)) == MOST_BUCKETS
+
+
+def test_bands_are_those_of_the_values_that_are_there() -> None:
+    t_s: Floats = np.arange(100, dtype=np.float64) / 1000.0
+    values = np.random.default_rng(1).normal(2.5, 0.1, (100, 3))
+    values[np.random.default_rng(2).random((100, 3)) < 0.3] = np.nan
+    values[:34, 1] = np.inf  # nothing there in the first third
+    found = split_envelopes(Samples(t_s=t_s * 1.02, values=values, names=("x",) * 3, units=()))
+    assert len(found) == 3
+    for bucket, rows in zip(found, (range(33), range(33, 66), range(66, 100)), strict=True):
+        for k, band in enumerate(bucket.bands):
+            there = [v for v in values[rows, k].tolist() if math.isfinite(v)]
+            if not there:
+                assert band is None
+                continue
+            assert band is not None
+            assert band[:2] == (min(there), max(there))
+            assert band[2] == pytest.approx(math.fsum(there) / len(there), rel=1e-12)
 
 
 def test_channels_start_again_when_time_goes_back() -> None:

@@ -1,5 +1,6 @@
 // A procedure that was started here: its progress, what it says, its report.
 
+import * as intervals from "./intervals.js";
 import { $, complain, options } from "./page.js";
 
 export function offer(hello, link) {
@@ -13,6 +14,7 @@ export function offer(hello, link) {
 }
 
 export function follow(m) {
+  intervals.follow(m.intervals);
   $("#progress").max = Math.max(1, m.total);
   $("#progress").value = m.done;
   $("#procedure-step").textContent = m.name ? `${m.name}: ${m.state}${m.step ? `, ${m.step} ${m.done}/${m.total}` : ""}${m.note ? `; ${m.note}` : ""}` : "";
