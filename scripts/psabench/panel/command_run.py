@@ -59,9 +59,8 @@ def _source(args: argparse.Namespace, out: Path) -> view.Source:
         if args.board is not None:
             raise BadInput(expected("--recording with it", args.board, "--board"))
         return Source(of_fields(Opening, args, scpi=addresses(args.scpi)), out, args.truth)
-    names = ("scenario", "pace", "connect", "truth", "seed", "can")
-    refuse_beside("--recording", {f"--{n}": getattr(args, n) for n in names}, "panel")
-    refuse_beside("--recording", {"--scpi": args.scpi or None}, "panel")
+    options = {f"--{n}": getattr(args, n) for n in ("pace", "connect", "truth", "seed", "can")}
+    refuse_beside("--recording", {"scenario": args.scenario, "--scpi": args.scpi or None} | options, "panel")
     return RecordingSource(args.recording, args.board or "psa2", args.node)
 
 

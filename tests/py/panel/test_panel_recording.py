@@ -128,7 +128,7 @@ def test_a_node_without_samples_is_bad_input(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        (["calibrate", "--recording", "x.log"], "panel: expected no --scenario beside --recording, got calibrate"),
+        (["calibrate", "--recording", "x.log"], "panel: expected no scenario beside --recording, got calibrate"),
         (["--pace", "wall", "--recording", "x.log"], "panel: expected no --pace beside --recording, got wall"),
         (["--seed", "1", "--recording", "x.log"], "panel: expected no --seed beside --recording, got 1"),
         (["--board", "psa2"], "--board: expected --recording with it, got psa2"),
