@@ -16,6 +16,7 @@ from psabench.bench import Bench
 from psabench.errors import LinkError
 from psabench.options import of_fields
 from psabench.panel.bench_view import BenchView
+from psabench.panel.frames import BoundedSocket
 from psabench.panel.guard import Door, Log
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
@@ -82,9 +83,8 @@ async def _serve(listener: socket.socket, hub: ThreadedHub, worker: Worker, repo
         server_header=False,
         lifespan="off",
         http="h11",
-        ws="websockets-sansio",
+        ws=BoundedSocket,
         ws_max_size=MESSAGE_BYTES,
-        ws_max_queue=8,
         ws_per_message_deflate=False,  # loopback: it would cost more than it saves
         limit_concurrency=100,
         timeout_graceful_shutdown=1,
