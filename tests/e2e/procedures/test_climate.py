@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from psabench import cli
 
+pytestmark = pytest.mark.host
+
 
 def test_turns_in_a_chamber_find_the_coefficients(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "turns", "--climate", "--realisations", "3", "--out", str(tmp_path)]) == 0
