@@ -144,7 +144,7 @@ check: $(TESTS:%=$(BUILD)/tests/%) ## the C unit tests (one: make check T=test_s
 	@python3 tools/run_c_tests.py $^
 PYTESTS = $(if $(T),$(foreach t,$(T),$(or $(shell find tests -name '$(t).py'),$(error no file $(t).py in tests))),tests/py tests/conform tests/golden)
 pytest: $(if $(T),all,bench-bin) ## the Python tests, golden traces included (a file: make pytest T=test_frames)
-	$(PY) -m pytest --tier $(TIER) $(PYTESTS)
+	$(PY) -m pytest --tier $(TIER) $(PYTESTS) $(if $(T),,-m "not soak")
 e2e: all ## the end-to-end tests over the transports of the host (socketcand, slcan on a pty)
 	$(PY) -m pytest --tier $(TIER) tests/e2e -m "host and not soak"
 e2e-san: ## end-to-end tests of bad input and broken peers, the emulator under AddressSanitizer and UBSan
@@ -155,8 +155,9 @@ e2e-vcan: all
 	tests/uml/native tests/uml/job_e2e.sh --tier $(TIER)
 e2e-slc0: all
 	tests/uml/slc0 --tier $(TIER)
-soak: all ## the end-to-end tests that take a minute or more of real time, on the host and on vcan0
+soak: all ## the tests that take a minute or more of real time: end to end on the host and on vcan0, pages of the panel
 	$(PY) -m pytest tests/e2e -m "host and soak"
+	$(PY) -m pytest tests/py -m soak
 	tests/uml/native --timeout 1200 tests/uml/job_e2e.sh -m "vcan and soak"
 builds: ## the emulator and its libraries by clang, at -O0 and -O3, and under sanitizers: tests compare their results
 	+@tools/builds

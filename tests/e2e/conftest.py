@@ -22,12 +22,21 @@ from rig import ADAPTERS, BENCH, HOST, ROOT, SLC, SLC0, TIMEOUT_S, VCAN, MakeRig
 logging.getLogger("can").setLevel(logging.ERROR)  # a warning for every message that a read has cut in two
 
 BOOT_UP = 0x705, b"\0"
+HERE = Path(__file__).parent
+PLACES = {"host", "vcan", "slc0"}  # make e2e, e2e-vcan and e2e-slc0 choose by these marks
 TRANSPORTS = [
     pytest.param("socketcand", marks=HOST),
     pytest.param("slcan", marks=HOST),
     pytest.param("vcan", marks=VCAN),
     pytest.param("slc0", marks=SLC),
 ]
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m leaves tests out
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Refuses a test that no step of make test-all would choose."""
+    if left := [i.nodeid for i in items if HERE in i.path.parents and not PLACES & {m.name for m in i.iter_markers()}]:
+        raise pytest.UsageError(f"{left[0]}: expected a mark of {', '.join(sorted(PLACES))}, got none")
 
 
 @pytest.fixture(params=TRANSPORTS)
@@ -46,6 +55,18 @@ def main_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.Compl
     out = tmp_path_factory.mktemp("main") / "run"
     shutil.copytree(ROOT / "build/run", out)  # other commands of a page write there, too
     return done, out
+
+
+@pytest.fixture(scope="session")
+def chamber_job(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """All converters at five temperatures, once for the page that shows it and for the tests of its result."""
+    out = Path("build/run/converters-chamber")
+    line = f".venv/bin/psabench run compare-converters --chamber --verbose --out {out} 2> /dev/null"
+    shutil.rmtree(ROOT / out, ignore_errors=True)
+    done = subprocess.run(line, shell=True, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=550)
+    kept = tmp_path_factory.mktemp("chamber") / "run"
+    shutil.copytree(ROOT / out, kept)
+    return done, kept
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@ from psabench.errors import BadInput, BenchError, LinkError, expected, port_in_u
 from psabench.options import of_fields, refuse_beside
 from psabench.output import show_event
 from psabench.panel import view
+from psabench.panel.frames import BoundedSocket
 from psabench.panel.guard import Door, Log
 from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
@@ -93,9 +94,8 @@ async def _serve(
         server_header=False,
         lifespan="off",
         http="h11",
-        ws="websockets-sansio",
+        ws=BoundedSocket,
         ws_max_size=MESSAGE_BYTES,
-        ws_max_queue=8,
         ws_per_message_deflate=False,  # loopback: it would cost more than it saves
         limit_concurrency=100,
         timeout_graceful_shutdown=1,

@@ -18,13 +18,20 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from psabench.errors import expected
+from psabench.panel.frames import FRAGMENTS
 from psabench.panel.guard import Allowance, Door, Guard, Log
 from psabench.panel.hub import Client, Hub
 from psabench.panel.procedures import OFFERED, REPORT
 
 MESSAGE_BYTES = 4096  # of a request; a line of the shell is shorter
 PAGES = 32  # at the same time
-POLICY, TOO_LONG, TOO_MANY = 1008, 1009, 1013  # RFC 6455, 7.4.1, and its registry
+POLICY, TOO_MANY = 1008, 1013  # RFC 6455, 7.4.1, and its registry
+WRONG_FRAMES = {  # by the code with which frames.py and its library close
+    1002: expected("frames of RFC 6455", "others", "page"),
+    1007: expected("UTF-8", "other bytes", "page"),
+    1008: expected(f"up to {Allowance().per_s:g} messages a second", "more", "page"),
+    1009: expected(f"messages of up to {MESSAGE_BYTES} bytes in up to {FRAGMENTS} frames", "more", "page"),
+}
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css", "LICENSE": "text/plain"}
 
@@ -120,21 +127,16 @@ class Pages:
 
     async def _requests(self, socket: WebSocket) -> AsyncIterator[dict[str, Any]]:
         """Until the page goes, or does what ours never does: then it is closed and one line is logged."""
-        allowance = Allowance()
         while True:
             message = await socket.receive()
             if message["type"] == "websocket.disconnect":
-                if message.get("code") == TOO_LONG:
-                    why = expected(f"messages of up to {MESSAGE_BYTES} bytes", "more", "page")
+                why = WRONG_FRAMES.get(message.get("code", 0))
+                if why:
                     self._log.once(f"closed a page: {why}")
                 return
             request = parse_request(message.get("text") or "")
-            why = (
-                expected("requests, JSON objects with a text do", "another message", "page") if request is None else ""
-            )
-            if not allowance.take():
-                why = expected(f"up to {allowance.per_s:g} messages a second", "more", "page")
-            if why or request is None:
+            if request is None:
+                why = expected("requests, JSON objects with a text do", "another message", "page")
                 self._log.once(f"closed a page: {why}")
                 with suppress(RuntimeError):
                     await socket.close(POLICY, why)

@@ -20,6 +20,8 @@ TEXTS = [ROOT / "README.md", ROOT / "examples/README.md", *ROOT.glob("docs/**/*.
 PAGES = sorted(p for p in TEXTS if "```console" in p.read_text())
 BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^>]*) -->\n)?```console\n(?P<body>.*?)```", re.DOTALL)
 DONE = "-- done "
+# Lines of a minute and more, which other tests need, too: the start of each, and the fixture that runs it once.
+SHARED = {"make run": "main_job", ".venv/bin/psabench run compare-converters --chamber": "chamber_job"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +89,10 @@ def shell() -> Iterator[Shell]:
             process.wait(30)
 
 
+def shared(command: Command) -> str | None:
+    return next((fixture for start, fixture in SHARED.items() if command.text.startswith(start)), None)
+
+
 def matches(shown: tuple[str, ...], printed: list[str]) -> bool:
     pattern = "".join(r"(?:.*\n)*?" if s == "..." else re.escape(s.rstrip()) + r"\s*\n" for s in shown)
     return re.fullmatch(pattern, "".join(f"{p}\n" for p in printed)) is not None
@@ -98,8 +104,9 @@ def matches(shown: tuple[str, ...], printed: list[str]) -> bool:
 def test_a_page_prints_what_it_shows(page: Path, request: pytest.FixtureRequest) -> None:
     with shell() as sh:
         for command in commands(page.read_text()):
-            if command.text == "make run":  # a minute, which tests of the calibration need, too
-                done, _ = request.getfixturevalue("main_job")
+            if fixture := shared(command):
+                done, _ = request.getfixturevalue(fixture)
+                assert command.text in (done.args, " ".join(done.args)), done.args
                 printed, status = done.stdout.splitlines(), done.returncode
             else:
                 printed, status = sh.run(command)

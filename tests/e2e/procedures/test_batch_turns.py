@@ -11,6 +11,8 @@ from psabench.lcm.event_log import read_events
 from psabench.lcm.progress import RESULT
 from psabench.passport.store import PassportStore
 
+pytestmark = pytest.mark.host
+
 
 def test_a_batch_in_one_pass(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "lcm.log"

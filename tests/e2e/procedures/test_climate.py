@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from psabench import cli
 
+pytestmark = pytest.mark.host
+
 
 @pytest.mark.parametrize(
     ("procedure", "slopes", "scale_name"), [("turns", 6, "kx_sum_v_per_g"), ("fourier", 10, "kx_eff_v_per_g")]

@@ -14,6 +14,8 @@ from psabench.logs.call_log import calls_path
 from psabench.procedures.comparison import truth_path
 from psabench.report.diff import report_without_provenance
 
+pytestmark = pytest.mark.host
+
 ROOT = Path(__file__).resolve().parents[3]
 PULSES = {"pik": 60e-3, "pik5": 60e-3, "pik6": 5e-3, "pmka": 2.4e-5}  # m/s, as the article prints them
 
