@@ -156,7 +156,7 @@ class Rule:
 RULES = {
     "import-circles": Rule(import_circles, 0, 0),
     "folders-over-30-files": Rule(large_folders, 0, 0),
-    "loose-modules": Rule(loose_modules, 12, 12),
+    "loose-modules": Rule(loose_modules, 14, 14),
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
     "one-word-functions-python": Rule(one_word_functions, 984, 984),
@@ -167,9 +167,10 @@ RULES = {
     # 63,900, 63,500 and 2,130 before flights over the wire, seasons, fleets and the articles' index.
     # 64,140, 68,580 and 2,211 before the articles' last devices: modes of heading, MEMS gyros, pairs, climates.
     # 65,350, 72,772 and 2,302 before the panel, viewers, packages, notebooks, site and reports in Russian.
-    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_414, 65_414),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 74_878, 74_878),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_392, 2_392),
+    # 65,414, 74,878 and 2,392 before JSON of every command, the panel's forks, scenarios, recordings and drawn views.
+    "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_738, 65_738),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 76_852, 76_852),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_449, 2_449),
 }
 
 

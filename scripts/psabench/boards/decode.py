@@ -72,7 +72,7 @@ def decode_can(
     reader, ids = reader_of(board, node), set[int]()
     chunks = _chunks(path, reader, ids)
     if not _write(table(out), (_of_frames(f, more) if isinstance(f, Frames) else _of_readings(f) for f in chunks)):
-        raise BadInput(expected(f"frames of node {node}", _no_frame(node, senders(ids, board)), path))
+        raise BadInput(expected(f"frames of node {node}", _no_frame(node, senders_of(ids, board)), path))
     return reader
 
 
@@ -82,7 +82,7 @@ def _no_frame(node: int, senders: set[int]) -> str:
     return f"{what} with frames: {others}"
 
 
-def senders(ids: set[int], board: str) -> set[int]:
+def senders_of(ids: set[int], board: str) -> set[int]:
     """Nodes whose samples these identifiers announce, if they are such boards'."""
     names = SAMPLE_MESSAGES if of_board(board) is Psa2 else of_board(board).layout.messages
     bases = [int(message(name).frame_id) - dbc_node(of_board(board).board) for name in names]

@@ -23,7 +23,7 @@ from psabench.report.page import (
     bullets,
     figure,
     html_table,
-    quoted,
+    quoted_html,
     section,
     verdict_html,
     whole_page,
@@ -127,14 +127,14 @@ def told(o: Outcome) -> Iterator[str]:
 
 def summary(run: Run) -> str:
     """One line: what it came to, how many requirements were judged, and what became of the others."""
-    return _summary(run, _tested(run))
+    return _summary_line(run, _tested_text(run))
 
 
-def _tested(run: Run) -> str:
+def _tested_text(run: Run) -> str:
     return f"{run.subject} ({run.selection})" if run.selection else run.subject
 
 
-def _summary(run: Run, what: str) -> str:
+def _summary_line(run: Run, what: str) -> str:
     c = run.coverage()
     verb = c.result in (Result.CONFORMS, Result.VIOLATED)
     said = f"{what} {c.result.value}:" if verb else f"{what}: {c.result.value},"
@@ -271,7 +271,7 @@ def html_page(run: Run, folder: Path) -> str:
 def _verdict(run: Run) -> str:
     why = [f"{count} not observable: {escape(reason)}" for reason, count in unseen(run).items()]
     colour = {Result.CONFORMS: True, Result.VIOLATED: False}.get(run.coverage().result)
-    return verdict_html(_summary(run, quoted(_tested(run))), colour) + bullets(why, "small")
+    return verdict_html(_summary_line(run, quoted_html(_tested_text(run))), colour) + bullets(why, "small")
 
 
 def _failure(o: Outcome, folder: Path) -> str:
@@ -284,7 +284,7 @@ def _failure(o: Outcome, folder: Path) -> str:
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)
     return section(
         o.title,
-        f"{due}<p>Saw <b>{quoted(o.saw)}</b>{at}; due {quoted(o.due)}.</p>",
+        f"{due}<p>Saw <b>{quoted_html(o.saw)}</b>{at}; due {quoted_html(o.due)}.</p>",
         *pictures,
         f"<p class=small>{files}</p>" if files else "",
         lang=SUITE_LANGUAGE,

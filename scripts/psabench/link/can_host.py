@@ -40,7 +40,7 @@ Message = can.Message
 Listener = Callable[[Message], None]
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Between two slices of a wait, where no program wants to look."""
 
 
@@ -63,7 +63,7 @@ class WallClock:
 
     def __init__(self, others: Sequence[CanHost] = ()) -> None:
         self._others = others
-        self.between: Callable[[], None] = _nothing
+        self.between: Callable[[], None] = _do_nothing
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -96,7 +96,7 @@ class StepClock:
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
         self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
         self.deadline_s = math.inf  # no time passes after it
-        self.between: Callable[[], None] = _nothing
+        self.between: Callable[[], None] = _do_nothing
 
     def now_s(self) -> float:
         return self._t_ns * 1e-9

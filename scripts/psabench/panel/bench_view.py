@@ -21,7 +21,7 @@ from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import NOT_HERE, describe_bench
-from psabench.panel.frame_view import drawn_frame, tears
+from psabench.panel.frame_view import drawn_frame, tears_of
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
@@ -147,7 +147,7 @@ class BenchView:
         """The whole state of the page, for one that opens or has missed something."""
         kept = {"history": self._history(), "snapshots": self.snapshots(), "tables": self.tables}
         add = self.session.vocabulary.commands.get("faults.add")
-        torn = tears(add, self.session.dut_name, self.session.dut) if self.bench.units else []
+        torn = tears_of(add, self.session.dut_name, self.session.dut) if self.bench.units else []
         return {"kind": "hello", **describe_bench(self.session), **kept, "tears": torn}
 
     def _history(self) -> dict[str, Any]:

@@ -62,11 +62,11 @@ def split_envelopes(s: Samples) -> list[Envelope]:
     span_s = float(s.t_s[-1] - s.t_s[0])
     parts = int(min(max(1.0, span_s / BUCKET_S), MOST_BUCKETS, n))
     edges = np.linspace(0, n, parts + 1).astype(int)
-    bands = _bands(s.values, edges[:-1])
+    bands = _bands_of(s.values, edges[:-1])
     return [Envelope(round(t_s, 6), row) for t_s, row in zip(s.t_s[edges[1:] - 1].tolist(), bands, strict=True)]
 
 
-def _bands(values: Floats, starts: Ints) -> list[tuple[tuple[float, float, float] | None, ...]]:
+def _bands_of(values: Floats, starts: Ints) -> list[tuple[tuple[float, float, float] | None, ...]]:
     """The bands of all channels, (n, channels), in buckets that begin at these rows; all at once for fleets."""
     there = np.isfinite(values)
     count = np.add.reduceat(there, starts, axis=0, dtype=np.int64)

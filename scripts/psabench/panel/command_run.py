@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     hub = ThreadedHub(Hub())
 
     out = args.out.resolve()
-    source = _source(args, out)
+    source = _source_of(args, out)
 
     def ready(address: str) -> None:
         show_event(args, {"event": "ready", "address": address}, f"ready {address}")
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _source(args: argparse.Namespace, out: Path) -> view.Source:
+def _source_of(args: argparse.Namespace, out: Path) -> view.Source:
     """A recording, or a bench. Raises BadInput where options do not go together."""
     if args.recording is None:
         if args.board is not None:

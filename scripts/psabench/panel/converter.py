@@ -49,7 +49,7 @@ class Converter:
         return self.rows[-1]
 
 
-def _spi(count: int) -> Callable[[Part, float], int]:
+def _spi_read(count: int) -> Callable[[Part, float], int]:
     def take(adc: Part, sclk_hz: float) -> int:
         adc.spi_clock(round(sclk_hz))
         return int.from_bytes(adc.spi(bytes(count)), "big")
@@ -64,7 +64,7 @@ def _read_continuously(adc: Part) -> None:
     adc.spi(b"\x03")
 
 
-def _frame(adc: Part, select: str, sclk_hz: float, out: list[int]) -> int:
+def _serial_frame(adc: Part, select: str, sclk_hz: float, out: list[int]) -> int:
     """Pulses of SCLK in a frame of RFS or TFS; returns what SDATA said at the rises."""
     half_s, word = 0.5 / sclk_hz, 0
     adc.pins[select].set(0)
@@ -84,7 +84,7 @@ def _frame(adc: Part, select: str, sclk_hz: float, out: list[int]) -> int:
 def _calibrate_ad7712(adc: Part) -> None:
     """Control 228146h as in examples/ad7712_read.c: self-calibration, AIN2, 24 bits, 60 Hz."""
     adc.pins["A0"].set(0)
-    _frame(adc, "TFS", 1e6, [0x228146 >> k & 1 for k in range(23, -1, -1)])
+    _serial_frame(adc, "TFS", 1e6, [0x228146 >> k & 1 for k in range(23, -1, -1)])
     adc.run_until_level("DRDY", 1)
     adc.run_until_level("DRDY", 0)
     adc.pins["A0"].set(1)
@@ -95,7 +95,7 @@ def _byte_by_byte(adc: Part, sclk_hz: float) -> int:
     word = 0
     for k in range(3):
         adc.bench.run_for(PAUSE_S if k else 0.0)
-        word = word << 8 | _frame(adc, "RFS", sclk_hz, [0] * 8)
+        word = word << 8 | _serial_frame(adc, "RFS", sclk_hz, [0] * 8)
     return word
 
 
@@ -104,14 +104,14 @@ def _in_first_pause(_: float, sclk_hz: float) -> float:
 
 
 _ADS128X = Converter(
-    bits=32, input=0, amplitude_v=1.0, sclk_hz=1e6, rows=("DRDY", "SCLK", "DOUT"), edge=0, take=_spi(4),
+    bits=32, input=0, amplitude_v=1.0, sclk_hz=1e6, rows=("DRDY", "SCLK", "DOUT"), edge=0, take=_spi_read(4),
     whole_bits=1, hint="reads on in the word that replaces its own",
 )  # fmt: skip
 CONVERTERS: Mapping[str, Converter] = {
     "ads1281": _ADS128X,
     "ads1282": _ADS128X,
     "ads1256": Converter(
-        bits=24, input=0, amplitude_v=1.0, sclk_hz=1.92e6, rows=("DRDY", "SCLK", "DOUT"), edge=0, take=_spi(3),
+        bits=24, input=0, amplitude_v=1.0, sclk_hz=1.92e6, rows=("DRDY", "SCLK", "DOUT"), edge=0, take=_spi_read(3),
         begin=_read_continuously, hint="RDATAC: the bytes that are left are those of the next word",
     ),
     "ad7712": Converter(
@@ -142,31 +142,31 @@ def read_converter(request: Mapping[str, Any]) -> dict[str, Any]:
     if name not in CONVERTERS:
         raise BenchError(expected(", ".join(CONVERTERS), repr(name[:40]), "part"))
     c = CONVERTERS[name]
-    sclk_hz = _number(request, "sclk_hz", *SCLK_HZ)
+    sclk_hz = _number_within(request, "sclk_hz", *SCLK_HZ)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "read.vcd"
-        in_time, _ = _reads(name, c, sclk_hz, 0, 2)
+        in_time, _ = _read_words(name, c, sclk_hz, 0, 2)
         period_ns = in_time[1].ready_ns - in_time[0].ready_ns
-        late_ns = round(1e3 * _number(request, "late_us", 0.0, LATE_US))
+        late_ns = round(1e3 * _number_within(request, "late_us", 0.0, LATE_US))
         if request.get("across") is True:
             late_ns = max(0, period_ns - round(1e9 * c.tear(in_time[0].took_ns / 1e9, sclk_hz)))
-        (late,), counted = _reads(name, c, sclk_hz, late_ns, 1, path)
+        (late,), counted = _read_words(name, c, sclk_hz, late_ns, 1, path)
         torn = counted.get("torn_reads", 0)
-        svg = _picture(name, c, read_vcd(path), late.ready_ns + period_ns, torn)
+        svg = _read_picture(name, c, read_vcd(path), late.ready_ns + period_ns, torn)
     words = {"read": late.word, "in_time": in_time[0].word, "next": in_time[1].word}
     shown = {key: f"{word:0{c.bits // 4}X}h" for key, word in words.items()}
     return {"svg": svg, **shown, "torn": torn, "counters": counted, "late_us": late_ns / 1e3,
             "period_us": period_ns / 1e3, "took_us": in_time[0].took_ns / 1e3}  # fmt: skip
 
 
-def _number(request: Mapping[str, Any], key: str, low: float, high: float) -> float:
+def _number_within(request: Mapping[str, Any], key: str, low: float, high: float) -> float:
     value = request.get(key, low)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise BenchError(expected(f"{low:g} to {high:g}", repr(value)[:40], key))
     return float(value)
 
 
-def _reads(
+def _read_words(
     name: str, c: Converter, sclk_hz: float, late_ns: int, count: int, path: Path | None = None
 ) -> tuple[list[_Read], dict[str, int]]:
     """Words, each begun so late, and what the chip has counted of violations meanwhile. The same bench each time."""
@@ -207,7 +207,7 @@ def _period_ns(adc: Part, c: Converter, sclk_hz: float) -> int:
     return _next_word(adc) - first
 
 
-def _picture(name: str, c: Converter, vcd: Vcd, next_ns: int, torn: int) -> str:
+def _read_picture(name: str, c: Converter, vcd: Vcd, next_ns: int, torn: int) -> str:
     """The edges of the late read; where the next word comes its bits are another word's."""
     at = vcd.wires["SCLK"].edges_ns(c.edge)
     half = int(np.median(np.diff(at))) // 2

@@ -6,14 +6,14 @@ from typing import Any
 
 from psabench.errors import BenchError, expected
 from psabench.panel.bench_view import BenchView
-from psabench.panel.source import Source, bench_view, forked, own_source
+from psabench.panel.source import Source, bench_view, forked_view, own_source
 from psabench.panel.view import View
 from psabench.panel.worker import Worker, text_of
 
 MOST = 4  # benches that rest: each is a process with a whole bench
 
 
-def fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
+def show_fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
     """A fork of the present state, or from a snapshot, is shown; its noise is that of another seed where one is given.
 
     Raises BenchError, and the bench that is shown goes on.
@@ -23,7 +23,7 @@ def fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
         raise BenchError(expected("step pace", view.pace, "fork"))
     if len(w.resting) >= MOST:
         raise BenchError(expected(f"up to {MOST} benches beside the one that is shown", "more", "fork"))
-    new = _from_snapshot(source, view, file) if file else forked(view)
+    new = _from_snapshot(source, view, file) if file else forked_view(view)
     try:
         if seed is not None:
             new.line(f"reseed {seed}")
@@ -47,21 +47,21 @@ def _free_name(w: Worker) -> str:
     return next(name for k in range(1, MOST + 2) if (name := f"fork {k}") not in taken)
 
 
-def show(w: Worker, name: str) -> dict[str, Any]:
+def show_resting(w: Worker, name: str) -> dict[str, Any]:
     """A bench that rests goes on, and ours rests."""
     assert w.view is not None  # raises while it is lost, and the other one goes on resting
-    w.show(name, _taken(w, name), name)
+    w.show(name, _take_resting(w, name), name)
     return {"time": w.time()}
 
 
-def drop(w: Worker, name: str) -> dict[str, Any]:
+def end_fork(w: Worker, name: str) -> dict[str, Any]:
     """End a bench that rests."""
-    _taken(w, name).close()
+    _take_resting(w, name).close()
     w.outlet.publish(text_of(w.benches()))
     return {}
 
 
-def _taken(w: Worker, name: str) -> View:
+def _take_resting(w: Worker, name: str) -> View:
     if name not in w.resting:
         known = ", ".join(w.resting) or "a bench that rests: there is none"
         raise BenchError(expected(known, repr(name[:40]), "bench"))

@@ -63,14 +63,14 @@ def _torn_picture(vcd: Vcd, frame: Seen) -> str:
     words = frame_words(vcd, frame.fall_ns, frame.rise_ns, WORD_BITS) if rises.size > 2 else []
     panels = [Panel(ROWS, (whole,), words)]
     if rises.size > 2:
-        at_ns, period_ns = _irregular(rises)
+        at_ns, period_ns = _irregular_rise(rises)
         near = Section(at_ns - 7 * period_ns, at_ns + 9 * period_ns, frame.fall_ns, "where the pulses are irregular")
         panels.append(Panel(ROWS, (near,)))
     title = f"Torn frame at t = {frame.fall_ns / 1e6:.3f} ms: {frame.bits} bits, not {WORDS * WORD_BITS}"
     return render(vcd, panels, title)
 
 
-def _irregular(rises: Ints) -> tuple[int, int]:
+def _irregular_rise(rises: Ints) -> tuple[int, int]:
     """The first pulse that is neither a period nor the pause between words before the next, or the last; the period."""
     steps = np.diff(rises)
     period_ns = int(np.median(steps))
@@ -84,27 +84,27 @@ def _irregular(rises: Ints) -> tuple[int, int]:
 # ---- what tears one
 
 
-def tears(add: Command | None, name: str, unit: Unit) -> list[dict[str, str]]:
+def tears_of(add: Command | None, name: str, unit: Unit) -> list[dict[str, str]]:
     """Lines of the shell that tear frames of a unit until the fault is ended, where this bench has a point for them."""
     if add is None:
         return []
     found = []
-    if isinstance(unit, Psa2) and f"{name}.line.CLK" in _points(add, "line.missing_pulse"):
+    if isinstance(unit, Psa2) and f"{name}.line.CLK" in _points_of(add, "line.missing_pulse"):
         line = f"faults.add line.missing_pulse {name}.line.CLK pulse={PULSE}"
         found.append({"where": "on the lines", "line": line, "seen": "in the drawn frame: Draw the next frame"})
-    halves = _messages(unit)
-    if len(halves) > 1 and f"{name}.can" in _points(add, "link.drop"):
+    halves = _message_names(unit)
+    if len(halves) > 1 and f"{name}.can" in _points_of(add, "link.drop"):
         can_id = int(message(halves[-1]).frame_id) + unit.node.node_id - dbc_node(unit.board)
         line = f"faults.add link.drop {name}.can can_id={can_id}"
         found.append({"where": "on CAN", "line": line, "seen": "in the counters of the channels"})
     return found
 
 
-def _points(add: Command, kind: str) -> tuple[str, ...]:
+def _points_of(add: Command, kind: str) -> tuple[str, ...]:
     variant = add.variants.get(kind)
     return tuple(variant.args[1].offers) if variant else ()
 
 
-def _messages(unit: Unit) -> tuple[str, ...]:
+def _message_names(unit: Unit) -> tuple[str, ...]:
     """CAN messages that make a sample."""
     return ("PSA2_XY", "PSA2_ZT") if isinstance(unit, Psa2) else unit.layout.messages

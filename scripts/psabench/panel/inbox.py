@@ -23,7 +23,7 @@ class Stopped(BenchError):
     """A page has stopped the line."""
 
 
-def _queue() -> queue.Queue[Asked]:
+def _empty_queue() -> queue.Queue[Asked]:
     return queue.Queue(WAITING)
 
 
@@ -33,8 +33,8 @@ class Inbox:
 
     busy: str = ""  # the line that is being carried out
     _stopped: bool = False
-    _in_order: queue.Queue[Asked] = field(default_factory=_queue)
-    _aside: queue.Queue[Asked] = field(default_factory=_queue)
+    _in_order: queue.Queue[Asked] = field(default_factory=_empty_queue)
+    _aside: queue.Queue[Asked] = field(default_factory=_empty_queue)
     _greetings: dict[int, None] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -61,14 +61,14 @@ class Inbox:
 
     def in_order(self) -> Iterator[Asked]:
         """Requests that have to wait for each other."""
-        return _taken(self._in_order)
+        return _take_all(self._in_order)
 
     def aside(self) -> Iterator[Asked]:
         """The others, with the greetings."""
         with self._lock:
             numbers, self._greetings = list(self._greetings), {}
         yield from ((n, {"do": "hello"}) for n in numbers)
-        yield from _taken(self._aside)
+        yield from _take_all(self._aside)
 
     @contextmanager
     def doing(self, line: str) -> Iterator[None]:
@@ -89,7 +89,7 @@ class Inbox:
             raise Stopped(f"{self.busy}: stopped by a page")
 
 
-def _taken(q: queue.Queue[Asked]) -> Iterator[Asked]:
+def _take_all(q: queue.Queue[Asked]) -> Iterator[Asked]:
     for _ in range(WAITING):
         try:
             yield q.get_nowait()

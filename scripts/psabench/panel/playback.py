@@ -34,7 +34,7 @@ class Scan:
     ids: dict[str, set[int]] = field(default_factory=dict)  # of data frames, by the name of the bus
 
 
-def recordings(path: Path) -> list[Path]:
+def recording_files(path: Path) -> list[Path]:
     """The file, or those of a folder that a log may be. Raises BadInput."""
     if path.exists() and not (path.is_dir() or path.is_file()):  # going back reads it again
         raise BadInput(expected("a file or a folder", "a pipe or a device", path))
@@ -51,18 +51,18 @@ def bus_of(m: Message) -> str:
     return "can" if m.channel in (None, "") else str(m.channel)
 
 
-def scan(path: Path) -> Scan:
+def scan_log(path: Path) -> Scan:
     """Its units and its length, as far as SCANNED frames tell. Raises BadInput where there is no frame at all."""
     found: Scan | None = None
     try:
-        for count, m in enumerate(stamped(path)):
+        for count, m in enumerate(stamped_frames(path)):
             if found is None:
                 found = Scan(begin_s=m.timestamp, length_s=0.0)
             if count >= SCANNED:
                 found.whole = False
                 break
             found.length_s = m.timestamp - found.begin_s
-            _note(found, m)
+            _note_frame(found, m)
     except BadInput as e:
         if found is None:
             raise
@@ -72,7 +72,7 @@ def scan(path: Path) -> Scan:
     return found
 
 
-def _note(found: Scan, m: Message) -> None:
+def _note_frame(found: Scan, m: Message) -> None:
     bus = bus_of(m)
     if bus not in found.ids and len(found.ids) >= CHANNELS:
         return
@@ -81,7 +81,7 @@ def _note(found: Scan, m: Message) -> None:
         ids.add(m.arbitration_id)
 
 
-def stamped(path: Path) -> Iterator[Message]:
+def stamped_frames(path: Path) -> Iterator[Message]:
     """Frames in the order of the file; a stamp that goes back, or is no number, is that of the frame before."""
     last_s = -math.inf
     for m in read_frames(path):
@@ -102,7 +102,7 @@ class Player:
     def rewind(self) -> None:
         self.now_s = 0.0
         self.ended = ""  # why no more frames come: "end", or the damage
-        self._frames = stamped(self._path)
+        self._frames = stamped_frames(self._path)
         self._next: Message | None = None
 
     def run_to(self, t_s: float, real_s: float = math.inf) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from psabench.boards.decode import senders
+from psabench.boards.decode import senders_of
 from psabench.boards.devices import of_board, reader_of
 from psabench.boards.psa2.frames import FrameReader
 from psabench.boards.readings import ReadingReader
@@ -18,7 +18,7 @@ from psabench.link.protocol_files import dbc_node
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import describe_command
-from psabench.panel.playback import Player, Scan, recordings, scan
+from psabench.panel.playback import Player, Scan, recording_files, scan_log
 from psabench.shell.builtins import ROWS
 from psabench.shell.commands import Vocabulary
 from psabench.shell.grammar import Call, parse
@@ -46,8 +46,8 @@ def units_of(found: Scan, board: str, node: int | None) -> dict[tuple[str, str],
     """By bus and name: each board at its node of the DBC, `board` at the others; with a node, `board` there alone."""
     units: dict[tuple[str, str], Recorded] = {}
     for bus, ids in found.ids.items():
-        usual = {dbc_node(b): b for b in BOARDS if dbc_node(b) in senders(ids, b)}
-        at = dict.fromkeys(sorted(senders(ids, board)), board) | usual if node is None else {node: board}
+        usual = {dbc_node(b): b for b in BOARDS if dbc_node(b) in senders_of(ids, b)}
+        at = dict.fromkeys(sorted(senders_of(ids, board)), board) | usual if node is None else {node: board}
         for n in sorted(at)[: UNITS - len(units)]:
             name = f"node{n}" if len(found.ids) == 1 else f"{bus}.node{n}"
             units[bus, name] = Recorded(at[n], n, reader_of(at[n], n))
@@ -61,9 +61,9 @@ class RecordingView:
 
     def __init__(self, path: Path, files: Mapping[str, Path], board: str, node: int | None) -> None:
         self._path, self._files = path, files
-        self.scan = scan(path)
+        self.scan = scan_log(path)
         self._given = board, node
-        if node is not None and not any(node in senders(ids, board) for ids in self.scan.ids.values()):
+        if node is not None and not any(node in senders_of(ids, board) for ids in self.scan.ids.values()):
             raise BadInput(expected(f"samples of a {board} at node {node}", "none", path))
         self._player = Player(path, self.scan.begin_s, self._on_message)
         rows = {row.command.name: row.command for row in ROWS if row.command.name in LINES}
@@ -226,7 +226,7 @@ class RecordingSource:
 
     def open(self) -> RecordingView:
         """Raises BadInput."""
-        files = {p.name: p for p in recordings(self.path)}
+        files = {p.name: p for p in recording_files(self.path)}
         name = self.chosen or next(iter(files))
         if name not in files:
             raise BadInput(expected(", ".join(files), repr(name[:40]), "recording"))

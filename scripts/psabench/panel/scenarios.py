@@ -24,7 +24,7 @@ class Named:
     what: str
 
 
-def shipped() -> list[Named]:
+def shipped_scenarios() -> list[Named]:
     """As the emulator lists them. Raises BenchError."""
     done = _ask_emulator("--list-scenarios")
     if done.returncode:
@@ -35,7 +35,7 @@ def shipped() -> list[Named]:
 
 def text_of(scenario: str) -> str:
     """Of a shipped one by name, or of a file. Raises BenchError."""
-    names = [s.name for s in shipped()]
+    names = [s.name for s in shipped_scenarios()]
     path = proto_file(f"scenarios/{scenario}.yaml") if scenario in names else Path(scenario)
     try:
         return path.read_text(encoding="utf-8")

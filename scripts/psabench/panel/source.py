@@ -77,7 +77,7 @@ def bench_view(shown: view.View) -> BenchView:
     return shown
 
 
-def forked(origin: BenchView) -> BenchView:
+def forked_view(origin: BenchView) -> BenchView:
     """A second bench that goes on from this instant, with the script that leads there. Raises BenchError."""
     new = bench_of(origin.bench.fork, lambda b: BenchView(b, origin.out, origin.start))
     new.histories = origin.histories

@@ -124,7 +124,7 @@ class Worker:
             while not self._stop.is_set():
                 self._turn()
         except BaseException as e:
-            self.died = f"panel: an error of its own has ended it: {e!r} at {_place(e)}"
+            self.died = f"panel: an error of its own has ended it: {e!r} at {_place_of(e)}"
             self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
             self.on_death()
         finally:
@@ -326,7 +326,7 @@ def _close_bench(view: View) -> None:
         view.close()
 
 
-def _place(e: BaseException) -> str:
+def _place_of(e: BaseException) -> str:
     """The line of ours that raised it."""
     last = traceback.extract_tb(e.__traceback__)[-1]
     return f"{Path(last.filename).name}:{last.lineno}"

@@ -99,7 +99,7 @@ def verdict_html(text: str, good: bool | None) -> str:
     return f"<p class='verdict {kind}'>{text}</p>"
 
 
-def quoted(text: str) -> str:
+def quoted_html(text: str) -> str:
     """A text that stays as it is in a report of another language."""
     return f"<span lang=en>{escape(text)}</span>"
 

@@ -31,7 +31,7 @@ def localise_texts(figure: Figure) -> None:
         if text not in listed and _is_outside(figure, text):
             text.set_text(in_two_lines(text.get_text()))
     for legend in legends:
-        _shrink(figure, legend)
+        _shrink_legend(figure, legend)
 
 
 def _localised_ticks(ticks: Formatter) -> Formatter:
@@ -57,9 +57,9 @@ def in_two_lines(text: str) -> str:
     return f"{text[:at]}\n{text[at + 1 :]}"
 
 
-def _shrink(figure: Figure, legend: Legend) -> None:
+def _shrink_legend(figure: Figure, legend: Legend) -> None:
     texts = legend.get_texts()
-    while texts and _is_outside(figure, legend) and (size := texts[0].get_fontsize() * SMALLER) >= LEAST_PT:
+    while texts and _is_outside(figure, legend) and (size := float(texts[0].get_fontsize()) * SMALLER) >= LEAST_PT:
         for text in texts:
             text.set_fontsize(size)
         figure.draw_without_rendering()

@@ -9,8 +9,7 @@ import functools
 import re
 
 import pytest
-from psabench.report import page as page_module
-from psabench.report.language import Language, load_language
+from psabench.report.language import Language, load_language, localised_page
 
 NO_REPORTS = {"A page", "p"}  # of tests of the frame around a report
 TITLE = re.compile(r"<title>(.*?)</title>")
@@ -39,13 +38,11 @@ def untranslated(page: str) -> list[str]:
 @pytest.fixture(autouse=True)
 def reports_have_russian_texts(monkeypatch: pytest.MonkeyPatch) -> None:
     """A test that writes a report with an English text fails."""
-    as_written = page_module.localised_page
-
     def checked(page: str) -> str:
         title = TITLE.search(page)
         if title is None or title[1] not in NO_REPORTS:
             left = untranslated(page)
             assert not left, f"English in {title and title[1]}:\n" + "\n".join(left)
-        return as_written(page)
+        return localised_page(page)
 
-    monkeypatch.setattr(page_module, "localised_page", checked)
+    monkeypatch.setattr("psabench.report.page.localised_page", checked)
