@@ -13,7 +13,6 @@ from pathlib import Path
 import hypothesis
 import pytest
 import tiers
-from russian_pages import reports_have_russian_texts  # noqa: F401, a fixture of all tests
 
 PLACES = {"host", "vcan", "slc0", "soak"}  # a sample is taken of the cases of each place
 

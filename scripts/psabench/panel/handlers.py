@@ -48,7 +48,7 @@ def _known_names(source: Source) -> list[str]:
 
 
 def _begin_scenario(w: Worker, request: Request) -> dict[str, Any]:
-    """A scenario as it stands in the page takes the place of the one that runs."""
+    """The scenario with the text of the page takes the place of the one that runs."""
     source = own_source(w.source, "start")
     text, name, seed = _text_of(request, "text"), _text_of(request, "name"), _seed_of(request)
     unchanged = name in _known_names(source) and scenarios.text_of(name) == text

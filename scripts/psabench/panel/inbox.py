@@ -43,7 +43,7 @@ class Inbox:
         (self._aside if request["do"] in ASIDE else self._in_order).put_nowait((number, request))
 
     def greet(self, number: int) -> None:
-        """A page needs the whole state. One that waits already stands for both, so there is always room."""
+        """A page needs the whole state. One greeting per page is enough, so there is always room."""
         with self._lock:
             self._greetings[number] = None
 

@@ -41,6 +41,7 @@ _QUANTITY = re.compile(r"\{\} [A-Za-z]")  # 5 m/s: a value that is no name
 # What has no words: tags, indices, functions, units, symbols and names of data that are the same in each language.
 _SYMBOLS = re.compile(
     r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
+    r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
 _GAP = re.compile(r"[;:,] |(?<=[.!?]) ")

@@ -12,7 +12,7 @@ from matplotlib.ticker import FixedFormatter, Formatter, FuncFormatter
 
 from psabench.report.language import is_localised, localised_label
 
-SMALLER, LEAST_PT = 0.96, 6.0  # by which a legend shrinks at a time; below, nobody reads it
+SMALLER, LEAST_PT = 0.96, 6.0  # by which a legend shrinks at a time, and the size of text that can still be read
 
 
 def localise_texts(figure: Figure) -> None:

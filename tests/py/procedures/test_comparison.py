@@ -200,7 +200,7 @@ def test_it_takes_no_addresses_and_no_parameters_of_others(
     assert cli.main(["run", "compare-converters", *option]) == 2
     assert (
         "compare-converters: expected --chamber, --scenario, --seed, --record, --replay, --out, --verbose, "
-        f"got {option[0]}" in capsys.readouterr().err
+        f"--json, got {option[0]}" in capsys.readouterr().err
     )
 
 

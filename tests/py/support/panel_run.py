@@ -12,6 +12,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
+from socket import SO_RCVBUF, SOL_SOCKET
+from socket import socket as TcpSocket
 from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
@@ -50,17 +52,29 @@ class Running:
         connection.endheaders()
         return connection.getresponse()
 
+    def sleeping_socket(self) -> ClientConnection:
+        """Of a page that does not read: as little as possible waits on its side."""
+        end = TcpSocket()
+        end.setsockopt(SOL_SOCKET, SO_RCVBUF, 4096)
+        end.connect(("127.0.0.1", self.port))
+        return self._opened({}, sock=end, max_queue=1)
+
     def socket(self, **headers: str) -> ClientConnection:
         """A WebSocket as the page opens it, unless headers say otherwise."""
+        return self._opened(headers)
+
+    def _opened(self, headers: dict[str, str], **how: Any) -> ClientConnection:
         own = {"Cookie": self.cookie, "Origin": f"http://127.0.0.1:{self.port}"} | headers
-        return connect(
+        opened: ClientConnection = connect(
             f"ws://127.0.0.1:{self.port}/ws",
             additional_headers={k: v for k, v in own.items() if v},
             open_timeout=WAIT_S,
             close_timeout=0.2,  # a client that does not read never sees the answer to its close
             max_size=None,
             proxy=None,
+            **how,
         )
+        return opened
 
     def end(self) -> str:
         """Ctrl-C; returns standard error."""

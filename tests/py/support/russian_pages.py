@@ -1,6 +1,6 @@
 """Each report that a test of ours writes has a Russian text for each of its texts.
 
-Registered by tests/conftest.py. Reports of commands that tests start as processes say it themselves: --lang ru.
+Registered by tests/py/conftest.py. Reports of other tests and of users say it themselves: --lang ru.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ def untranslated(page: str) -> list[str]:
 @pytest.fixture(autouse=True)
 def reports_have_russian_texts(monkeypatch: pytest.MonkeyPatch) -> None:
     """A test that writes a report with an English text fails."""
+
     def checked(page: str) -> str:
         title = TITLE.search(page)
         if title is None or title[1] not in NO_REPORTS:
