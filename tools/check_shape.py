@@ -170,7 +170,7 @@ RULES = {
     # 65,414, 74,878 and 2,392 before JSON of every command, the panel's forks, scenarios, recordings and drawn views.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_738, 65_738),
     "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 76_853, 76_853),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_450, 2_450),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_451, 2_451),
 }
 
 
