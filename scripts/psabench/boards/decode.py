@@ -11,7 +11,7 @@ import numpy as np
 
 from psabench.boards.devices import of_board, reader_of
 from psabench.boards.psa2.device import Psa2
-from psabench.boards.psa2.frames import FrameReader, Frames
+from psabench.boards.psa2.frames import SAMPLE_MESSAGES, FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
 from psabench.errors import BadInput, expected
 from psabench.link import lineport
@@ -23,7 +23,6 @@ from psabench.output import json_line
 TEMP_DECIMALS = 3  # a code is 15 mK
 CHUNK = 4096  # samples decoded at once
 
-SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", "PSA2_FAST", "PSA2_FRAME", "PSA2_BLOCK")
 COUNTED = ("", "LSB", "counts", "pulses")  # units of columns that are whole numbers
 
 Table = Mapping[str, np.ndarray[Any, np.dtype[Any]]]  # columns by what the CSV calls them

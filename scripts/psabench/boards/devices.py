@@ -50,11 +50,9 @@ def reader_of(board: str, node_id: int) -> FrameReader | ReadingReader:
 
 def identify(host: CanHost, node_id: int) -> type[Unit]:
     """The class of the unit at a node, from its name (object 1008h); PSA-2 where no one answers, or the name is new."""
-    listeners = list(host.listeners)
     try:
-        title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), timeout_s=NAME_S).read(NAME))
+        with host.listeners.restored():
+            title = str(CanopenNode(host, node_id, proto_file("psa2.eds"), timeout_s=NAME_S).read(NAME))
     except LinkError:
         return Psa2
-    finally:
-        host.listeners[:] = listeners
     return next((kind for kind in all_devices().values() if kind.title == title), Psa2)

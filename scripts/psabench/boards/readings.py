@@ -1,17 +1,18 @@
 """Readings of a board from CAN as columns in the units of the DBC: any board whose readings are one or more messages.
 
 `ReadingReader` listens to a `CanHost`, keeps the bytes of its node's messages and counts what is wrong with them;
-`take` turns what has arrived into one `Readings`. (PSA-2 has forms, pairs and blocks: `frames`.)
+`take` turns what has arrived into one `Readings`. What counts as lost: `boards.stream`. (PSA-2 has forms, pairs and
+blocks: `frames`.)
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.boards.psa2.frames import FrameCounters
+from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing
 from psabench.errors import expected
 from psabench.link import signals
 from psabench.link.can_host import Message
@@ -80,28 +81,55 @@ def _columns(messages: tuple[str, ...]) -> list[dict[str, signals.Signal]]:
     return out
 
 
+def concat(parts: Sequence[Readings]) -> Readings:
+    """One `Readings` of one or more with the same columns."""
+    if len(parts) == 1:
+        return parts[0]
+    return Readings(
+        t_rx_s=np.concatenate([p.t_rx_s for p in parts]),
+        t_sample_s=np.concatenate([p.t_sample_s for p in parts]),
+        columns={name: np.concatenate([p.columns[name] for p in parts]) for name in parts[0].columns},
+        units=parts[0].units,
+    )
+
+
 class ReadingReader:
-    """Collects the readings of one node; append `reader.on_message` to the listeners of a CanHost."""
+    """Collects the readings of one node: `host.listeners.append(reader.on_message, reader.ids)`.
+
+    A gap in the counter is a loss within a stretch of the stream only: `boards.stream` says where one begins.
+    """
 
     def __init__(self, layout: ReadingLayout, node_id: int) -> None:
         self.layout = layout
         self.counters = FrameCounters()
+        self._state = NodeState(node_id)
         shift = node_id - dbc_node(layout.board)
         self._place = {int(message(name).frame_id) + shift: k for k, name in enumerate(layout.messages)}
+        self.ids = frozenset([*self._place, *self._state.ids])
         self._at = _columns(layout.messages)
         self._lengths = [int(message(name).length) for name in layout.messages]
         self._begun: list[bytes] = []  # messages of the reading under way
         self._seen = False
         self._kept: list[list[bytes]] = []
         self._t_s: list[float] = []
-        self._count: int | None = None
+        self._marks: list[int] = []  # places in them where a stretch begins
+        self._count: int | None = None  # of the stretch's last reading
         self._stamp = 0
+        self._stretch_is_new = True
 
     def on_message(self, m: Message) -> None:
         """Take one CAN frame; those of other nodes and services are let by."""
         k = self._place.get(m.arbitration_id)
-        if k is None or m.is_error_frame or m.is_remote_frame:
+        if m.is_error_frame or m.is_remote_frame:
             return
+        if k is not None:
+            self._on_part(k, m)
+        elif m.arbitration_id in self._state.ids and self._state.begins(m):
+            self._begun = []  # a stop may come in the middle of a reading: that is no fault
+            self._marks.append(len(self._kept))
+
+    def _on_part(self, k: int, m: Message) -> None:
+        """The message of a reading that is at this place in it."""
         whole = len(m.data) == self._lengths[k]
         if k != len(self._begun) or not whole:
             # a reading that was under way when we came is no fault
@@ -124,17 +152,27 @@ class ReadingReader:
         return (count - len(self)) * len(self.layout.messages) - len(self._begun)
 
     def forget(self) -> None:
-        """Drop what has arrived and is not taken; the counting starts again."""
-        self._begun, self._kept, self._t_s, self._count, self._seen = [], [], [], None, False
+        """Drop what has arrived and is not taken; the next reading begins a stretch."""
+        self._begun, self._kept, self._t_s, self._marks, self._seen = [], [], [], [], False
+        self._begin()
 
-    def forget_half(self) -> None:
-        """A stop may come in the middle of a reading: that is no fault."""
-        self._begun, self._seen = [], False
+    def _begin(self) -> None:
+        self._count, self._stretch_is_new = None, True
 
     def take(self) -> Readings:
         """Everything since the last call, decoded."""
-        kept, t_s = self._kept, self._t_s
-        self._kept, self._t_s = [], []
+        kept, t_s, marks = self._kept, self._t_s, self._marks
+        self._kept, self._t_s, self._marks = [], [], []
+        parts = []
+        for begins, span in by_stretch(len(kept), marks):
+            if begins:
+                self._begin()
+            parts.append(self._decode(kept[span], t_s[span]))
+        self.counters.frames += len(kept)
+        return concat(parts)
+
+    def _decode(self, kept: list[list[bytes]], t_s: list[float]) -> Readings:
+        """Of one stretch."""
         columns: dict[str, Floats] = {}
         units: dict[str, str] = {}
         t_sample_s = np.full(len(kept), np.nan)
@@ -149,13 +187,13 @@ class ReadingReader:
                     unwrapped = signals.unwrap(signals.raw(bits, at), at.bits, self._stamp)
                     self._stamp = int(unwrapped[-1])
                     t_sample_s = unwrapped.astype(np.float64) * at.scale
-        self.counters.frames += len(kept)
+        if kept:
+            self.counters.stretches += self._stretch_is_new
+            self._stretch_is_new = False
         if self.layout.overrun in columns:
             self.counters.overruns += int(columns[self.layout.overrun].sum())
         return Readings(t_rx_s=np.array(t_s), t_sample_s=t_sample_s, columns=columns, units=units)
 
     def _count_gaps(self, counter: signals.Ints, bits: int) -> None:
-        before = counter[:1] - 1 if self._count is None else np.array([self._count])
-        steps = np.diff(np.concatenate([before, counter])) % (1 << bits)
-        self.counters.lost += int(((steps - 1) % (1 << bits)).sum())
+        self.counters.lost += missing(counter, bits, self._count)
         self._count = int(counter[-1])

@@ -52,7 +52,7 @@ class Unit:
         self.node = CanopenNode(host, node_id, proto_file(f"{self.board}.eds"))
         self.frames: FrameReader | ReadingReader = self._reader(node_id)
         self.banks = {name: index for name, index in BANKS.items() if self.node.has(index)}
-        host.listeners.append(self.frames.on_message)
+        host.listeners.append(self.frames.on_message, self.frames.ids)
 
     def _reader(self, node_id: int) -> FrameReader | ReadingReader:
         return ReadingReader(self.layout, node_id)
@@ -150,7 +150,6 @@ class Unit:
         """Readings stop; SDO still answers (NMT pre-operational). What was on its way has arrived afterwards."""
         self.node.nmt(NMT_PREOP)
         self.node.read(ERROR_REGISTER)  # readings go before SDO answers on the bus: this comes after the last of them
-        self.frames.forget_half()
 
     def reset(self) -> None:
         """A pulse on the board's reset: everything falls back to its defaults and is set up again."""
@@ -204,7 +203,7 @@ class BusUnit(Unit):
         self.host.listeners.remove(self.frames.on_message)
         in_order = tuple(name for name in tpdos if name in wanted)
         self.frames = ReadingReader(replace(self.frames.layout, messages=in_order), self.node.node_id)
-        self.host.listeners.append(self.frames.on_message)
+        self.host.listeners.append(self.frames.on_message, self.frames.ids)
 
     def stream(self, count: int, timeout_s: float = 5.0) -> Readings:
         """The next `count` readings; the stream runs only meanwhile. Raises LinkError when fewer come in timeout_s."""

@@ -12,7 +12,7 @@ import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from itertools import islice
 from operator import length_hint
 from typing import Any, Protocol
@@ -24,6 +24,7 @@ from can.interfaces.socketcan import SocketcanBus
 from psabench.errors import BadInput, LinkError, TimeOut, expected
 from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
+from psabench.link.listeners import Listeners
 from psabench.link.socketcand_bus import SocketcandBus
 from psabench.link.udp_bus import LocalUdpBus, group_of
 
@@ -36,8 +37,9 @@ BULK_QUANTA = 1000  # at most in one command, so that Ctrl-C is heard
 NS = 1_000_000_000
 SO_RCVBUFFORCE, RCVBUF = 33, 4 << 20  # asm-generic/socket.h; bytes
 
+NMT = 0x000  # identifier of the commands of network management (CiA 301, 7.2.8)
+
 Message = can.Message
-Listener = Callable[[Message], None]
 
 
 def _do_nothing() -> None:
@@ -193,7 +195,10 @@ def _receive_all(host: CanHost, sent: int) -> None:
 
 
 class CanHost(AbstractContextManager["CanHost"]):
-    """A python-can bus with a clock. `sent` and `received` count frames; listeners get each received one, in order.
+    """A python-can bus with a clock. `sent` and `received` count frames; listeners get the received ones, in order.
+
+    Those who have named NMT among their identifiers get the commands that this program sends, too: a stream that it
+    stops is stopped as by any other master.
 
     shared: frames of other programs may come that have not passed through the emulator (an interface of the kernel).
     """
@@ -205,7 +210,7 @@ class CanHost(AbstractContextManager["CanHost"]):
         self.counted = isinstance(bus, SocketcandBus)  # what it delivers are the emulator's frames, and TCP holds many
         self.joins_later = isinstance(bus, slcanBus)  # its opening is bytes on their way
         self.received = self.sent = 0
-        self.listeners: list[Listener] = []
+        self.listeners = Listeners()
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -240,19 +245,9 @@ class CanHost(AbstractContextManager["CanHost"]):
                 raise LinkError(f"CAN: {missing} frames sent by the emulator did not arrive within {BARRIER_S:g} s")
             self.receive_taken(count - self.received)
 
-    @contextmanager
-    def only_to(self, *listeners: Listener) -> Iterator[None]:
-        """Frames go to these alone while the block runs: a long stream costs each listener its time."""
-        others, self.listeners = self.listeners, list(listeners)
-        try:
-            yield
-        finally:
-            self.listeners = others
-
     def _hand_on(self, message: Message) -> None:
         self.received += not message.is_error_frame  # socketcand reports a rejection as one; it was on no bus
-        for listener in self.listeners:
-            listener(message)
+        self.listeners.hand_on(message)
 
     def _wait(self, left_s: float) -> Message | None:
         """A frame within left_s, after a look at the link and one each LOOK_S."""
@@ -289,6 +284,12 @@ class CanHost(AbstractContextManager["CanHost"]):
         except (can.CanError, OSError) as e:
             raise LinkError(f"CAN: cannot send {can_id:03X}h: {_reason(e)}") from e
         self.sent += 1
+        self.echo_nmt(can_id, data)
+
+    def echo_nmt(self, can_id: int, data: bytes) -> None:
+        """What this program has sent, to those of its own who have named NMT."""
+        if can_id == NMT:
+            self.listeners.hand_on_named(can.Message(arbitration_id=NMT, data=data, is_extended_id=False, is_rx=False))
 
     def advance(self, dwell_s: float) -> None:
         self.clock.advance(self, dwell_s)

@@ -34,11 +34,9 @@ class _Network(canopen.Network):
     def __init__(self, host: CanHost) -> None:
         super().__init__()
         self.host = host
-        host.listeners.append(self._on_message)
 
-    def _on_message(self, m: can.Message) -> None:
-        if m.arbitration_id in self.subscribers:  # asked here: of a stream, hardly any frame is for this program
-            self.notify(m.arbitration_id, m.data, m.timestamp)
+    def on_message(self, m: can.Message) -> None:
+        self.notify(m.arbitration_id, m.data, m.timestamp)
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         if remote:
@@ -142,7 +140,9 @@ class CanopenNode:
         self._od = remote.object_dictionary
         self._sdo = _Sdo(node_id, self._od, host, timeout_s)
         self._sdo.network = network
-        network.subscribe(0x580 + node_id, self._sdo.on_response)
+        answers = 0x580 + node_id
+        network.subscribe(answers, self._sdo.on_response)
+        host.listeners.append(network.on_message, (answers,))
 
     def has(self, index: int) -> bool:
         """Whether the EDS has the object."""

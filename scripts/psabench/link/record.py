@@ -12,7 +12,7 @@ from pathlib import Path
 import can
 
 from psabench.boards.devices import reader_of
-from psabench.boards.psa2.frames import FrameCounters
+from psabench.boards.stream import FrameCounters
 from psabench.errors import BenchError, LinkError
 from psabench.link.can_host import CanHost, Message, WallClock
 from psabench.link.log_file import LogFile

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from psabench.boards.psa2.frames import FrameCounters, Frames
+from psabench.boards.psa2.frames import Frames
 from psabench.boards.readings import Readings
+from psabench.boards.stream import FrameCounters
 from psabench.errors import BenchError, expected
 from psabench.link.signals import Floats, Ints
 from psabench.panel.statistics import channel_statistics

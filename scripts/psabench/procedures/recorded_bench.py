@@ -20,7 +20,8 @@ from psabench.bench import Bench
 from psabench.boards.devices import of_board
 from psabench.boards.unit import Unit
 from psabench.errors import BadInput, BenchError, expected
-from psabench.link.can_host import CanHost, Listener
+from psabench.link.can_host import CanHost
+from psabench.link.listeners import Listeners
 from psabench.logs.call_log import END, SETUP, Calls, CallWriter, check_ending
 from psabench.logs.formats import KEEPS, read_frames
 from psabench.report.provenance import noted_scenarios
@@ -47,7 +48,7 @@ class _Host(CanHost):
     def __init__(self, teller: _Teller, bus: int, inner: CanHost | None) -> None:  # no link: the base's is not made
         self._teller, self._number, self._inner = teller, bus, inner
         self.clock = self  # type: ignore[assignment]
-        self.listeners: list[Listener] = []
+        self.listeners = Listeners()
 
     def now_s(self) -> float:
         """As of the last call."""
@@ -57,6 +58,7 @@ class _Host(CanHost):
         how = {name: True for name, on in (("fd", fd), ("remote", remote)) if on}
         frame = " ".join([f"{can_id:03X}#{bytes(data).hex().upper()}", *how])
         self._teller.send_frame(self._number, frame, self._inner, (can_id, data), how)
+        self.echo_nmt(can_id, data)
 
     def receive(self, timeout_s: float) -> bool:
         return self._teller.receive_frame(self._number, self._inner, timeout_s)
@@ -66,8 +68,7 @@ class _Host(CanHost):
 
     def pass_on(self, message: can.Message) -> None:
         """A frame has come."""
-        for listener in self.listeners:
-            listener(message)
+        self.listeners.hand_on(message)
 
     def close(self) -> None:
         """The bench closes its own."""
@@ -97,7 +98,8 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
         self.units = {name: of_board(u.board)(self._hosts[u.host], u.node.node_id) for name, u in bench.units.items()}
         self._calls = CallWriter(path)
         for k, (inner, host) in enumerate(self._hosts.items()):
-            inner.listeners[:] = [_Keeper(self, k, host)]
+            inner.listeners = Listeners()
+            inner.listeners.append(_Keeper(self, k, host))
         buses = list(bench.hosts.values())
         units = [[n, u.board, u.node.node_id, buses.index(u.host)] for n, u in bench.units.items()]
         self._store_call(
@@ -148,7 +150,7 @@ class BenchRecorder(_Units, AbstractContextManager["BenchRecorder"]):
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
         for inner in self._hosts:
-            inner.listeners.clear()
+            inner.listeners = Listeners()
         self._calls.__exit__(kind, *rest)
 
 

@@ -192,9 +192,6 @@ class _Stream:
         """Drop what has come up to now."""
         self._taken_s = self._units.bench.now_s
 
-    def forget_half(self) -> None:
-        """A reading is whole or not there."""
-
     def _new(self, t_s: Floats) -> slice:
         """Which of these instants have not been taken."""
         span = slice(int(np.searchsorted(t_s, self._taken_s)), int(np.searchsorted(t_s, self._units.bench.now_s)))

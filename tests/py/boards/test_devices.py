@@ -85,7 +85,7 @@ def at_node(kind: type[Unit], node_id: int, values: Mapping[tuple[int, int], int
 def test_a_unit_says_itself_what_it_is(kind: type[Unit]) -> None:
     host = CanHost(Node(33, {(0x1008, 0): kind.title}), WallClock())
     assert identify(host, 33) is kind
-    assert host.listeners == [], "who only asked for a name listens no more"
+    assert len(host.listeners) == 0, "who only asked for a name listens no more"
 
 
 def test_where_nobody_answers_it_is_a_psa_2_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:

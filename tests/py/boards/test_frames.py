@@ -43,6 +43,14 @@ def pair(code: tuple[int, int, int], seq: int, stamp: int = 0, node: int = 5, **
     ]
 
 
+def nmt(command: int, node: int) -> can.Message:
+    return can.Message(arbitration_id=0x000, data=[command, node], is_extended_id=False)
+
+
+def boot_up(node: int, state: int = 0) -> can.Message:
+    return can.Message(arbitration_id=0x700 + node, data=[state], is_extended_id=False)
+
+
 def feed(reader: FrameReader, messages: list[can.Message]) -> None:
     for m in messages:
         reader.on_message(m)

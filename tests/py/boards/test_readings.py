@@ -13,7 +13,7 @@ from psabench.boards.psa2.device import Psa2
 from psabench.boards.readings import ReadingLayout, ReadingReader
 from psabench.link.protocol_files import dbc_node, message
 
-from tests.py.boards.test_frames import seed
+from tests.py.boards.test_frames import nmt, seed
 
 LAYOUTS = [kind.layout for kind in all_devices().values() if kind is not Psa2]
 TWO = ReadingLayout(board="pmka", messages=("PMKA_CODES", "PMKA_STATE"), counter="SEQ")
@@ -146,8 +146,7 @@ def test_a_message_of_the_wrong_length_is_torn() -> None:
 def test_a_stop_in_the_middle_is_no_fault() -> None:
     reader = ReadingReader(TWO, 7)
     reader.on_message(two(1)[0])
-    reader.forget_half()
-    for m in two(2):
+    for m in (nmt(0x80, 7), nmt(0x01, 7), *two(2)):
         reader.on_message(m)
     assert (len(reader), reader.counters.torn) == (1, 0)
 

@@ -111,7 +111,7 @@ def test_a_step_ahead_gives_each_step_its_own_frames() -> None:
             clock, came, counts = bench.step_clock, list[can.Message](), list[int]()
             assert clock is not None
             bench.unit.start()
-            with bench.host.only_to(came.append):
+            with bench.host.listeners.only(came.append):
                 for pair in zip(steps_s[::2], steps_s[1::2], strict=True):
                     due = []
                     for step_s in pair if ahead else ():

@@ -99,7 +99,7 @@ class Bins(BusUnit):
             self._switch(name, on=True)
         layout = ReadingLayout(board=self.board, messages=NAV_MESSAGES, counter="NSEQ", stamp="NTIME")
         outputs = ReadingReader(layout, self.node.node_id)
-        self.host.listeners.append(outputs.on_message)
+        self.host.listeners.append(outputs.on_message, outputs.ids)
         return outputs
 
     def navigation(self) -> NavState:

@@ -1,20 +1,21 @@
 """PSA-2 frames from CAN: pairs, fast form, FD frames and FD blocks, as arrays in SI.
 
 Raw integers end here. `FrameReader` listens to a `CanHost`, keeps the bytes of its node's frames and counts what is
-wrong with them; `take` turns what has arrived into one `Frames`.
+wrong with them; `take` turns what has arrived into one `Frames`. What counts as lost: `boards.stream`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import numpy.typing as npt
 
 from psabench.boards.registry import DBC_NODE
+from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing
 from psabench.link import signals
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message
@@ -30,6 +31,8 @@ class Form(IntEnum):
     BLOCK = 3  # five samples in an FD frame
 
 
+WHOLE = (Form.FAST, Form.FRAME, Form.BLOCK)  # a sample, or a block of them, is one message
+SAMPLE_MESSAGES = ("PSA2_XY", "PSA2_ZT", *(f"PSA2_{form.name}" for form in WHOLE))
 TEMP_CODES_PER_K = 65.536  # 1 uA/K on 10 kohm, 16 bits of +-5 V (PSA2-TEMP-04)
 KELVIN_DEGC = -273.15  # of 0 K
 
@@ -80,14 +83,13 @@ class Frames:
         return self.u_v[:, "xyz".index(name)]
 
 
-@dataclass(slots=True, kw_only=True)
-class FrameCounters:
-    """What was wrong with the stream since it was opened."""
-
-    frames: int = 0
-    lost: int = 0  # gaps in the sequence (or, in the fast form, toggles that did not toggle)
-    torn: int = 0  # half a pair, or a frame of the wrong length; the gap that it leaves in the sequence is `lost`, too
-    overruns: int = 0  # the board says that it lost a conversion
+def concat(parts: Sequence[Frames]) -> Frames:
+    """One `Frames` of many, or none."""
+    if len(parts) == 1:
+        return parts[0]
+    none = np.zeros(0)
+    all_of = [Frames.of(none, none, np.zeros((0, 3)), {}), *parts]
+    return Frames(**{f.name: np.concatenate([getattr(p, f.name) for p in all_of]) for f in fields(Frames)})
 
 
 @dataclass(slots=True)
@@ -101,29 +103,36 @@ class _Kept:
         self.data.append(bytes(m.data))
         self.t_s.append(m.timestamp)
 
+    def part(self, span: slice) -> _Kept:
+        return _Kept(self.data[span], self.t_s[span])
+
 
 class FrameReader:
-    """Collects the frames of one node; append `reader.on_message` to the listeners of a CanHost."""
+    """Collects the frames of one node: `host.listeners.append(reader.on_message, reader.ids)`.
+
+    A gap in the counter is a loss within a stretch of the stream only: `boards.stream` says where one begins.
+    """
 
     def __init__(self, node_id: int = DBC_NODE) -> None:
         self.counters = FrameCounters()
-        self._shift = node_id - DBC_NODE
+        self._state = NodeState(node_id)
         self._xy: Message | None = None
         self._first, self._second = _Kept(), _Kept()  # pairs: XY and ZT; other forms use _first alone
+        self._marks: list[int] = []  # places in them where a stretch begins
         self._begun = False  # a half of a pair has been seen
         self._form: Form | None = None
-        self._seq: int | None = None
-        self._stamp: int | None = None
+        self._before: int | None = None  # of the stretch's last sample: SEQ, TOG or TSTAMP, by the form
+        self._stamp = 0  # unwrapped, of the last sample
+        self._steps_s, self._step_s = np.zeros(0), np.nan  # forms without a counter: spacing of frames not judged yet
+        self._bytes = {name: int(message(name).length) for name in SAMPLE_MESSAGES}
+        ids = {name: int(message(name).frame_id) + node_id - DBC_NODE for name in SAMPLE_MESSAGES}
         self._handlers: dict[int, Callable[[Message], None]] = {
-            self._id("PSA2_XY"): self._on_xy,
-            self._id("PSA2_ZT"): self._on_zt,
-            self._id("PSA2_FAST"): lambda m: self._on_whole(Form.FAST, m),
-            self._id("PSA2_FRAME"): lambda m: self._on_whole(Form.FRAME, m),
-            self._id("PSA2_BLOCK"): lambda m: self._on_whole(Form.BLOCK, m),
+            ids["PSA2_XY"]: self._on_xy,
+            ids["PSA2_ZT"]: self._on_zt,
+            **{ids[f"PSA2_{form.name}"]: partial(self._on_whole, form) for form in WHOLE},
         }
-
-    def _id(self, name: str) -> int:
-        return int(message(name).frame_id) + self._shift
+        self._handlers |= dict.fromkeys(self._state.ids, self._on_state)
+        self.ids = frozenset(self._handlers)
 
     def on_message(self, m: Message) -> None:
         """Take one CAN frame; those of other nodes and services are let by."""
@@ -139,30 +148,55 @@ class FrameReader:
         """CAN frames that must come yet before `len` can be count; 1 until the first sample tells the form."""
         if not self._first.data:
             return 1
-        missing = count - len(self)
+        missing_yet = count - len(self)
         if self._form is Form.PAIR:
-            return 2 * missing - (self._xy is not None)
-        return -(-missing // 5) if self._form is Form.BLOCK else missing
+            return 2 * missing_yet - (self._xy is not None)
+        return -(-missing_yet // 5) if self._form is Form.BLOCK else missing_yet
 
     def forget(self) -> None:
-        """Drop what has arrived and is not taken; the sequence starts again."""
-        self._first, self._second, self._xy, self._seq, self._stamp = _Kept(), _Kept(), None, None, None
+        """Drop what has arrived and is not taken; the next sample begins a stretch."""
+        self._drop()
+        self._begun = False
 
     def forget_half(self) -> None:
-        """A stop may come between the two halves of a pair: that is no fault."""
+        """What has come of a pair is no fault if the rest does not come."""
         self._xy = None
 
     def take(self) -> Frames:
         """Everything since the last call, decoded."""
-        first, second, form = self._first, self._second, self._form
-        self._first, self._second = _Kept(), _Kept()
-        if not first.data or form is None:
-            none = np.zeros(0)
-            return self._samples("PSA2_XY", none, none, dict.fromkeys("XYZ", none.astype(np.int64)))
-        frames = {Form.PAIR: self._pairs, Form.FAST: self._fast, Form.FRAME: self._fd, Form.BLOCK: self._blocks}
-        taken = frames[form](first, second)
+        first, second, marks = self._first, self._second, self._marks
+        self._first, self._second, self._marks = _Kept(), _Kept(), []
+        parts = []
+        for begins, span in by_stretch(len(first.data), marks):
+            if begins:
+                self._begin()
+            if span.start < span.stop:
+                self.counters.stretches += self._before is None
+                parts.append(self._decode(first.part(span), second.part(span)))
+        taken = concat(parts)
         self.counters.frames += len(taken)
         return taken
+
+    def _decode(self, first: _Kept, second: _Kept) -> Frames:
+        """Of one stretch."""
+        assert self._form is not None
+        frames = {Form.PAIR: self._pairs, Form.FAST: self._fast, Form.FRAME: self._fd, Form.BLOCK: self._blocks}
+        return frames[self._form](first, second)
+
+    def _drop(self) -> None:
+        self._first, self._second, self._xy, self._marks = _Kept(), _Kept(), None, []
+        self._stamp = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """The next sample is the first of a stretch, in which frames may come at another rate."""
+        self._before = None
+        self._steps_s, self._step_s = np.zeros(0), np.nan
+
+    def _on_state(self, m: Message) -> None:
+        if self._state.begins(m):
+            self.forget_half()
+            self._marks.append(len(self._first.data))
 
     def _on_xy(self, m: Message) -> None:
         self._begun = True
@@ -189,25 +223,23 @@ class FrameReader:
         self._first.add(m)
 
     def _whole(self, name: str, m: Message) -> bool:
-        right = bool(len(m.data) == message(name).length)
+        right = len(m.data) == self._bytes[name]
         self.counters.torn += not right
         return right
 
     def _change(self, form: Form) -> None:
         if form is not self._form:
-            self.forget()
+            self._drop()
             self._form = form
 
     def _count_gaps(self, counter: Ints, bits: int) -> None:
         """Adds the gaps of a wrapping counter that should rise by one."""
-        before = counter[:1] - 1 if self._seq is None else np.array([self._seq])
-        steps = np.diff(np.concatenate([before, counter])) % (1 << bits)
-        self.counters.lost += int((steps - 1).clip(min=0).sum()) if bits > 1 else int((steps == 0).sum())
-        self._seq = int(counter[-1])
+        self.counters.lost += missing(counter, bits, self._before)
+        self._before = int(counter[-1])
 
     def _times(self, stamp: Ints, bits: int, unit_s: float) -> Floats:
-        """Unwrapped time stamps, continued from the last call."""
-        unwrapped = signals.unwrap(stamp, bits, self._stamp or 0)
+        """Unwrapped time stamps, continued from the last call; across stretches whole wraps may be missing."""
+        unwrapped = signals.unwrap(stamp, bits, self._stamp)
         self._stamp = int(unwrapped[-1])
         return unwrapped.astype(np.float64) * unit_s
 
@@ -220,7 +252,7 @@ class FrameReader:
     def _pairs(self, xy: _Kept, zt: _Kept) -> Frames:
         columns = _columns("PSA2_XY", xy.data) | _columns("PSA2_ZT", zt.data)
         seq, stamp = _layout("PSA2_XY")["SEQ"], _layout("PSA2_ZT")["TSTAMP"]
-        mixed = _mixed(columns["SEQ"], columns["TSTAMP"], self._seq, self._stamp)
+        mixed = _mixed(columns["SEQ"], columns["TSTAMP"], self._before, self._stamp)
         self.counters.torn += int(mixed.sum())
         columns = {name: column[~mixed] for name, column in columns.items()}
         self._count_gaps(columns["SEQ"], seq.bits)
@@ -229,7 +261,9 @@ class FrameReader:
 
     def _fast(self, kept: _Kept, _: _Kept) -> Frames:
         columns = _columns("PSA2_FAST", kept.data)
-        self._count_gaps(columns["TOG"], 1)
+        tog = columns["TOG"] if self._before is None else np.concatenate([[self._before], columns["TOG"]])
+        self.counters.lost += int((np.diff(tog) == 0).sum())  # two alike in a row
+        self._before = int(tog[-1])
         return self._samples("PSA2_FAST", np.array(kept.t_s), np.full(len(kept.data), np.nan), columns)
 
     def _fd(self, kept: _Kept, _: _Kept) -> Frames:
@@ -252,23 +286,27 @@ class FrameReader:
 
     def _stamped(self, stamp: Ints, s: signals.Signal, each: int = 1) -> Floats:
         """Times of a form that has no sequence number; its gaps are counted in periods of the stream itself."""
-        before = self._stamp
+        before_s = [] if self._before is None else [self._before * s.scale]
         t_s = self._times(stamp, s.bits, s.scale)
-        steps_s = np.diff(t_s if before is None else np.concatenate([[before * s.scale], t_s]))
-        if steps_s.size > 2:
-            periods = np.rint(steps_s / np.median(steps_s))
+        self._before = self._stamp
+        self._steps_s = np.concatenate([self._steps_s, np.diff(np.concatenate([before_s, t_s]))])
+        if self._steps_s.size > 2:
+            self._step_s = float(np.median(self._steps_s))
+        if np.isfinite(self._step_s):
+            periods = np.rint(self._steps_s / self._step_s)
             self.counters.lost += int((periods - 1).clip(min=0).sum()) * each
+            self._steps_s = np.zeros(0)
         return t_s
 
 
-def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int | None) -> npt.NDArray[np.bool_]:
+def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int) -> npt.NDArray[np.bool_]:
     """Which pairs are the first half of one sample and the second half of a later one.
 
     Where both halves between them were lost, TSTAMP alone tells: the pair's instant is whole periods from where its SEQ
     has it, the next pair's is right again, and SEQ has a gap after it. A last pair has no next one and is believed.
+    seq_before, stamp_before: of the sample before, if there is one.
     """
-    known = seq_before is not None and stamp_before is not None
-    before = np.array([[seq_before or 0, stamp_before or 0]] if known else [[seq[0], stamp[0]]])
+    before = np.array([[seq[0], stamp[0]] if seq_before is None else [seq_before, stamp_before]])
     numbers, ticks = np.diff(np.concatenate([before, np.stack([seq, stamp], axis=1)]), axis=0).T % (1 << 16)
     single = ticks[numbers == 1]
     mixed = np.zeros(len(seq), dtype=np.bool_)

@@ -75,7 +75,7 @@ class LiveFlight:
         """Until it has landed, or for_s. Ctrl-C ends it as well; what has come is in the recording."""
         with ExitStack() as stack:
             stack.callback(self._unit.stop)
-            stack.enter_context(self._bench.host.only_to(recorder.on_message, feed.on_message))
+            stack.enter_context(self._bench.host.listeners.only(recorder.on_message, feed.on_message))
             self._port.take()  # what came before belongs to no time
             self._unit.start()
             begin_s, shown_s = self._bench.time_s, 0.0

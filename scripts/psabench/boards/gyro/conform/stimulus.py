@@ -56,11 +56,8 @@ def level_unit(s: Dut, on: bool) -> None:
 @contextmanager
 def level_client(s: Dut) -> Iterator[CanopenNode]:
     """SDOs of the level unit."""
-    listeners = list(s.host.listeners)
-    try:
+    with s.host.listeners.restored():
         yield CanopenNode(s.host, int(s.unit.node.read(OD.LEVEL, 1)), proto_file("psa2.eds"), timeout_s=1.0)
-    finally:
-        s.host.listeners[:] = listeners
 
 
 def settings(s: Dut) -> dict[str, object]:
