@@ -37,7 +37,8 @@ class Listeners:
 
     def hand_on(self, message: can.Message) -> None:
         """To those of its identifier."""
-        for listener in self._by_id.get(message.arbitration_id) or self._find(message.arbitration_id):
+        listeners = self._by_id.get(message.arbitration_id)
+        for listener in self._find(message.arbitration_id) if listeners is None else listeners:
             listener(message)
 
     def hand_on_named(self, message: can.Message) -> None:

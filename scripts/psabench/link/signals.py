@@ -7,7 +7,7 @@ others, and `layout` says so if one appears.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +49,7 @@ def layout(message: Any) -> Mapping[str, Signal]:
     return found
 
 
-def payload(data: list[bytes], size: int) -> npt.NDArray[np.uint8]:
+def payload(data: Sequence[bytes | bytearray], size: int) -> npt.NDArray[np.uint8]:
     """Frames as bits, shape (n, 8 * size), bit 0 of byte 0 first. Every frame must have `size` bytes."""
     joined = np.frombuffer(b"".join(data), dtype=np.uint8).reshape(len(data), size)
     return np.unpackbits(joined, axis=1, bitorder="little")

@@ -15,6 +15,7 @@ from can.interfaces.socketcand import SocketCanDaemonBus
 from can.interfaces.socketcand.socketcand import convert_ascii_message_to_can_message
 
 PIECE = 1 << 16  # bytes asked of the kernel at once
+FRAME = ["<", "frame"]
 LONGEST = 200  # characters of a line, as python-can's: what goes on without an end is dropped
 
 
@@ -46,14 +47,17 @@ class SocketcandBus(SocketCanDaemonBus):
                 return
             *lines, rest = (self._rest + link.recv(PIECE).decode("ascii")).split(">")
             self._rest = rest if len(rest) <= LONGEST else ""
-            self._came.extend(m for line in lines if (m := self._frame(line[max(0, line.find("<")) :])) is not None)
+            self._came.extend(m for line in lines if (m := self._frame(line)) is not None)
         except (OSError, ValueError) as e:
             raise can.CanOperationError(f"socketcand: {e}") from e
 
     def _frame(self, line: str) -> can.Message | None:
         """A line without its end. None, with a warning, for what is no frame."""
         words = line.split()
-        if 4 <= len(words) <= 5 and words[1] == "frame" and words[0] == "<":
+        if words[:2] != FRAME and "<" in line:
+            line = line[line.find("<") :]
+            words = line.split()
+        if words[:2] == FRAME and 4 <= len(words) <= 5:
             data = bytearray.fromhex(words[4]) if len(words) == 5 else bytearray()
             return can.Message(
                 timestamp=float(words[3]),

@@ -15,7 +15,6 @@ import numpy as np
 from psabench.bench import Bench
 from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
-from psabench.link.can_host import CanHost
 from psabench.link.signals import Ints
 from psabench.link.vcd import read_vcd
 from psabench.panel.can_trace import CanTrace
@@ -29,7 +28,7 @@ from psabench.shell.transcript import Transcript
 
 FILE_ARGS = ("path", "file")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")  # no folder, not hidden
-TURN, IDLE_S = 256, 0.005  # frames from a bus before the next one has its turn; a wait when none has any
+IDLE_S = 0.005  # a wait when no bus has a frame
 TABLES = ("table", "table2", "table3")
 SNAPSHOT, SNAPSHOTS = ".psasnap", 20  # ending of the files that are offered, and how many
 FRAME_S, FRAME_MB = 0.005, 10.0  # of recording that holds a whole frame, and its bound
@@ -166,7 +165,7 @@ class BenchView:
         hosts = list(self.bench.hosts.values())
         deadline_s = time.monotonic() + for_s
         while (left_s := deadline_s - time.monotonic()) > 0.0:
-            came = [any_received(host) for host in hosts]
+            came = [host.receive_turn(0.0) for host in hosts]
             if not any(came):
                 time.sleep(min(left_s, IDLE_S))
 
@@ -237,11 +236,3 @@ class BenchView:
         """Time of the bench, s."""
         t_ns = self.session.now_ns()
         return self.bench.time_s if t_ns is None else t_ns / 1e9
-
-
-def any_received(host: CanHost) -> bool:
-    """Take the frames that have come, TURN at most; whether there were any."""
-    if not host.receive(0.0):
-        return False
-    host.receive_taken(TURN)
-    return True

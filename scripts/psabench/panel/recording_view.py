@@ -14,6 +14,7 @@ from psabench.boards.readings import ReadingReader
 from psabench.boards.registry import BOARDS
 from psabench.errors import BadInput, BenchError, expected
 from psabench.link.can_host import Message
+from psabench.link.listeners import Listeners
 from psabench.link.protocol_files import dbc_node
 from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
@@ -77,18 +78,19 @@ class RecordingView:
         units = units_of(self.scan, *self._given)
         self._units = {name: unit for (_, name), unit in units.items()}
         self.channels = {name: Channels() for name in self._units}
-        self._readers = {bus: [u.reader for (b, _), u in units.items() if b == bus] for bus in self.scan.ids}
         boards = {bus: {u.node: u.board for (b, _), u in units.items() if b == bus} for bus in self.scan.ids}
         self.traces = {bus: CanTrace(bus, boards[bus]) for bus in self.scan.ids}
+        self._listeners = {bus: Listeners() for bus in self.scan.ids}
+        for bus, trace in self.traces.items():
+            self._listeners[bus].append(trace.on_message)
+        for (bus, _), unit in units.items():
+            self._listeners[bus].append(unit.reader.on_message, unit.reader.ids)
         self.unit = self.unit if self.unit in self._units else next(iter(self._units), "")
         self._viewed_s = 0.0
 
     def _on_message(self, bus: str, m: Message) -> None:
-        if bus not in self.traces:
-            return
-        self.traces[bus].on_message(m)
-        for reader in self._readers[bus]:
-            reader.on_message(m)
+        if bus in self._listeners:
+            self._listeners[bus].hand_on(m)
 
     # ---- time
 

@@ -67,7 +67,7 @@ def test_a_stretch_begins_where_the_stream_does(
 @pytest.mark.parametrize("takes", [False, True])
 def test_losses_within_a_stretch_count_whatever_was_before(takes: bool) -> None:
     again = [nmt(PREOP, NODE), nmt(START, NODE)]
-    heard = [*samples(1, 3), *again, *samples(100, 104), *again, *samples(90, 91, 93)]
+    heard = [*samples(1, 3), *again, *samples(100), nmt(START, NODE), *samples(104), *again, *samples(90, 91, 93)]
     assert lost_and_stretches(counted(*heard, takes=takes)) == (1 + 3 + 1, 3)
 
 

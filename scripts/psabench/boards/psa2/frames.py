@@ -7,7 +7,7 @@ wrong with them; `take` turns what has arrived into one `Frames`. What counts as
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache, partial
 
@@ -92,21 +92,6 @@ def concat(parts: Sequence[Frames]) -> Frames:
     return Frames(**{f.name: np.concatenate([getattr(p, f.name) for p in all_of]) for f in fields(Frames)})
 
 
-@dataclass(slots=True)
-class _Kept:
-    """Bytes of one kind of CAN frame, with their times of arrival."""
-
-    data: list[bytes] = field(default_factory=list)
-    t_s: list[float] = field(default_factory=list)
-
-    def add(self, m: Message) -> None:
-        self.data.append(bytes(m.data))
-        self.t_s.append(m.timestamp)
-
-    def part(self, span: slice) -> _Kept:
-        return _Kept(self.data[span], self.t_s[span])
-
-
 class FrameReader:
     """Collects the frames of one node: `host.listeners.append(reader.on_message, reader.ids)`.
 
@@ -117,7 +102,9 @@ class FrameReader:
         self.counters = FrameCounters()
         self._state = NodeState(node_id)
         self._xy: Message | None = None
-        self._first, self._second = _Kept(), _Kept()  # pairs: XY and ZT; other forms use _first alone
+        self._first: list[bytearray] = []  # pairs: XY; other forms: all of it
+        self._second: list[bytearray] = []  # ZT
+        self._t_s: list[float] = []  # when the last of each sample arrived
         self._marks: list[int] = []  # places in them where a stretch begins
         self._begun = False  # a half of a pair has been seen
         self._form: Form | None = None
@@ -142,11 +129,11 @@ class FrameReader:
 
     def __len__(self) -> int:
         """Samples that `take` would return; fewer where it finds halves of two samples taken for one."""
-        return len(self._first.data) * (5 if self._form is Form.BLOCK else 1)
+        return len(self._first) * (5 if self._form is Form.BLOCK else 1)
 
     def least(self, count: int) -> int:
         """CAN frames that must come yet before `len` can be count; 1 until the first sample tells the form."""
-        if not self._first.data:
+        if not self._first:
             return 1
         missing_yet = count - len(self)
         if self._form is Form.PAIR:
@@ -164,27 +151,28 @@ class FrameReader:
 
     def take(self) -> Frames:
         """Everything since the last call, decoded."""
-        first, second, marks = self._first, self._second, self._marks
-        self._first, self._second, self._marks = _Kept(), _Kept(), []
+        first, second, t_s, marks = self._first, self._second, self._t_s, self._marks
+        self._first, self._second, self._t_s, self._marks = [], [], [], []
         parts = []
-        for begins, span in by_stretch(len(first.data), marks):
+        for begins, span in by_stretch(len(first), marks):
             if begins:
                 self._begin()
             if span.start < span.stop:
                 self.counters.stretches += self._before is None
-                parts.append(self._decode(first.part(span), second.part(span)))
+                parts.append(self._decode(first[span], second[span], np.array(t_s[span])))
         taken = concat(parts)
         self.counters.frames += len(taken)
         return taken
 
-    def _decode(self, first: _Kept, second: _Kept) -> Frames:
+    def _decode(self, first: list[bytearray], second: list[bytearray], t_rx_s: Floats) -> Frames:
         """Of one stretch."""
         assert self._form is not None
-        frames = {Form.PAIR: self._pairs, Form.FAST: self._fast, Form.FRAME: self._fd, Form.BLOCK: self._blocks}
-        return frames[self._form](first, second)
+        if self._form is Form.PAIR:
+            return self._pairs(first, second, t_rx_s)
+        return {Form.FAST: self._fast, Form.FRAME: self._fd, Form.BLOCK: self._blocks}[self._form](first, t_rx_s)
 
     def _drop(self) -> None:
-        self._first, self._second, self._xy, self._marks = _Kept(), _Kept(), None, []
+        self._first, self._second, self._t_s, self._xy, self._marks = [], [], [], None, []
         self._stamp = 0
         self._begin()
 
@@ -196,7 +184,7 @@ class FrameReader:
     def _on_state(self, m: Message) -> None:
         if self._state.begins(m):
             self.forget_half()
-            self._marks.append(len(self._first.data))
+            self._marks.append(len(self._first))
 
     def _on_xy(self, m: Message) -> None:
         self._begun = True
@@ -213,14 +201,16 @@ class FrameReader:
             self.counters.torn += 1
             return
         self._change(Form.PAIR)
-        self._first.add(xy)
-        self._second.add(m)
+        self._first.append(xy.data)
+        self._second.append(m.data)
+        self._t_s.append(m.timestamp)
 
     def _on_whole(self, form: Form, m: Message) -> None:
         if not self._whole(f"PSA2_{form.name}", m):
             return
         self._change(form)
-        self._first.add(m)
+        self._first.append(m.data)
+        self._t_s.append(m.timestamp)
 
     def _whole(self, name: str, m: Message) -> bool:
         right = len(m.data) == self._bytes[name]
@@ -249,30 +239,30 @@ class FrameReader:
         scale = next(s.scale for s in _layout(name).values() if s.unit == "V")
         return Frames.of(t_rx_s, t_sample_s, np.stack([columns[axis] * scale for axis in "XYZ"], axis=1), columns)
 
-    def _pairs(self, xy: _Kept, zt: _Kept) -> Frames:
-        columns = _columns("PSA2_XY", xy.data) | _columns("PSA2_ZT", zt.data)
+    def _pairs(self, xy: list[bytearray], zt: list[bytearray], t_rx_s: Floats) -> Frames:
+        columns = _columns("PSA2_XY", xy) | _columns("PSA2_ZT", zt)
         seq, stamp = _layout("PSA2_XY")["SEQ"], _layout("PSA2_ZT")["TSTAMP"]
         mixed = _mixed(columns["SEQ"], columns["TSTAMP"], self._before, self._stamp)
         self.counters.torn += int(mixed.sum())
         columns = {name: column[~mixed] for name, column in columns.items()}
         self._count_gaps(columns["SEQ"], seq.bits)
         t_sample_s = self._times(columns["TSTAMP"], stamp.bits, stamp.scale)
-        return self._samples("PSA2_XY", np.array(zt.t_s)[~mixed], t_sample_s, columns)
+        return self._samples("PSA2_XY", t_rx_s[~mixed], t_sample_s, columns)
 
-    def _fast(self, kept: _Kept, _: _Kept) -> Frames:
-        columns = _columns("PSA2_FAST", kept.data)
+    def _fast(self, kept: list[bytearray], t_rx_s: Floats) -> Frames:
+        columns = _columns("PSA2_FAST", kept)
         tog = columns["TOG"] if self._before is None else np.concatenate([[self._before], columns["TOG"]])
         self.counters.lost += int((np.diff(tog) == 0).sum())  # two alike in a row
         self._before = int(tog[-1])
-        return self._samples("PSA2_FAST", np.array(kept.t_s), np.full(len(kept.data), np.nan), columns)
+        return self._samples("PSA2_FAST", t_rx_s, np.full(len(kept), np.nan), columns)
 
-    def _fd(self, kept: _Kept, _: _Kept) -> Frames:
-        columns = _columns("PSA2_FRAME", kept.data)
+    def _fd(self, kept: list[bytearray], t_rx_s: Floats) -> Frames:
+        columns = _columns("PSA2_FRAME", kept)
         t_sample_s = self._stamped(columns["TSTAMP"], _layout("PSA2_FRAME")["TSTAMP"])
-        return self._samples("PSA2_FRAME", np.array(kept.t_s), t_sample_s, columns)
+        return self._samples("PSA2_FRAME", t_rx_s, t_sample_s, columns)
 
-    def _blocks(self, kept: _Kept, _: _Kept) -> Frames:
-        raw, at = _columns("PSA2_BLOCK", kept.data), _layout("PSA2_BLOCK")
+    def _blocks(self, kept: list[bytearray], t_rx_s: Floats) -> Frames:
+        raw, at = _columns("PSA2_BLOCK", kept), _layout("PSA2_BLOCK")
         count = sum(name.startswith("STATUS") for name in at)
         names = ("X", "Y", "Z", "T", "STATUS")
         columns = {s: np.stack([raw[f"{s}{k}"] for k in range(count)], axis=1).reshape(-1) for s in names}
@@ -282,7 +272,7 @@ class FrameReader:
         t0_s = self._stamped(raw["TSTAMP"], at["TSTAMP"], count)
         period_s = np.median(np.diff(t0_s)) / count if len(t0_s) > 1 else np.nan
         t_sample_s = (t0_s[:, None] + np.arange(count) * period_s).reshape(-1)
-        return self._samples("PSA2_BLOCK", np.repeat(np.array(kept.t_s), count), t_sample_s, columns)
+        return self._samples("PSA2_BLOCK", np.repeat(t_rx_s, count), t_sample_s, columns)
 
     def _stamped(self, stamp: Ints, s: signals.Signal, each: int = 1) -> Floats:
         """Times of a form that has no sequence number; its gaps are counted in periods of the stream itself."""
@@ -317,7 +307,7 @@ def _mixed(seq: Ints, stamp: Ints, seq_before: int | None, stamp_before: int) ->
     return mixed
 
 
-def _columns(name: str, data: list[bytes]) -> dict[str, Ints]:
+def _columns(name: str, data: list[bytearray]) -> dict[str, Ints]:
     """Raw integers (n,) of each signal of frames that all are this message."""
     bits = signals.payload(data, int(message(name).length))
     return {signal: signals.raw(bits, at) for signal, at in _layout(name).items()}
