@@ -17,6 +17,8 @@ from psabench.output import without_nan
 from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.procedures import OFFERED, Runs
+from psabench.panel.recorded.opening import Opening
+from psabench.panel.recorded.source import RecordingSource
 from psabench.panel.view import Source, View
 
 UPDATE_S = 1 / 30
@@ -79,10 +81,12 @@ class Worker:
     name: str = FIRST  # of the bench that is shown
     resting: dict[str, View] = field(default_factory=dict)  # the others, whose time stands still
     _view: View | None = None
+    _opening: Opening | None = None  # a recording that is being read
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
     _states: Due = field(default_factory=lambda: Due(STATE_S))
     _cans: Due = field(default_factory=lambda: Due(CAN_S))
+    _openings: Due = field(default_factory=lambda: Due(CAN_S))
     _overviews: Due = field(default_factory=lambda: Due(OVERVIEW_S))
     _thread: threading.Thread | None = None
     _moved_s: float = 0.0
@@ -90,7 +94,7 @@ class Worker:
     # ---- from the server's thread
 
     def start(self) -> None:
-        """Returns when the bench is up. Raises its BenchError."""
+        """Returns when the bench is up, or the first part of a recording is read. Raises its BenchError."""
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
         self.ready.wait()
@@ -116,24 +120,53 @@ class Worker:
         try:
             self._view = self._open()
         except BenchError as e:
-            self.failed = e
+            if not self._stop.is_set():
+                self.failed = e
+                self.outlet.publish(text_of({"kind": "lost", "why": str(e)}))
+                self.on_death()
+            return
+        except Exception as e:
+            self._die(e)
             return
         finally:
             self.ready.set()
+        self.outlet.publish(text_of(self.hello()))
         try:
             while not self._stop.is_set():
                 self._turn()
         except BaseException as e:
-            self.died = f"panel: an error of its own has ended it: {e!r} at {_place_of(e)}"
-            self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
-            self.on_death()
+            self._die(e)
         finally:
             self._close()
             for view in self.resting.values():
                 _close_bench(view)
 
+    def _die(self, e: BaseException) -> None:
+        self.died = f"panel: an error of its own has ended it: {e!r} at {_place_of(e)}"
+        self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
+        self.on_death()
+
     def _open(self) -> View:
-        return self._prepared(self.source.open())
+        source = self.source
+        return self._prepared(self.opened(source) if isinstance(source, RecordingSource) else source.open())
+
+    def opened(self, source: RecordingSource) -> View:
+        """A recording, read in a thread while pages are served. Raises BenchError."""
+        self._opening = Opening(source)
+        try:
+            with self.inbox.doing(f"opening {source.name}"):
+                return self._opening.follow(self._while_opening)
+        finally:
+            self._opening = None
+            self.outlet.publish(text_of({"kind": "opening", "name": source.name, "done": None}))
+
+    def _while_opening(self) -> None:
+        assert self._opening is not None
+        if self._opening.done >= 0.0:
+            self.ready.set()  # so much can be read
+        if self._openings():
+            self.outlet.publish(text_of(self._opening.message()))
+        self._between()
 
     def _prepared(self, view: View) -> View:
         view.look_between(self._between)
@@ -179,7 +212,7 @@ class Worker:
 
     def hello(self) -> dict[str, Any]:
         if self._view is None:
-            return {"kind": "lost", "why": self.lost}
+            return self._opening.message() if self._opening else {"kind": "lost", "why": self.lost}
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
         return (
             self._view.describe()
