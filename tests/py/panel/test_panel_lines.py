@@ -52,7 +52,8 @@ def windowed(view: LinesView, **request: Any) -> dict[str, Any]:
 
 def frames_at(view: LinesView, what: str) -> list[int]:
     """Places of all frames of a kind, found one after the other."""
-    at_ns, found = view.about()["start_ns"], []
+    found: list[int] = []
+    at_ns = view.about()["start_ns"]
     while True:
         try:
             frame = view.next_frame({"at_ns": at_ns, "what": what})

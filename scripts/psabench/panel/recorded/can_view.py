@@ -1,4 +1,4 @@
-"""A recording of the bus as the panel shows it: channels, statistics, units and CAN of its frames; the page moves its time."""
+"""A recording of the bus as the panel shows it: channels, units and CAN of its frames; the page moves its time."""
 
 from __future__ import annotations
 

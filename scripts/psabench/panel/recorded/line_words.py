@@ -82,8 +82,8 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
     for k in range(0, len(fall), PIECE):
         mine = slice(k, k + PIECE)
         clocks = slice(int(first[k]), int(last[mine][-1]))
-        at = [t // vcd.unit_ns for t in (fall[mine], rise[mine], clk[clocks])]
-        parts.append(decoder.feed_edges(*at, bit[clocks]))
+        begin, end, at = (t // vcd.unit_ns for t in (fall[mine], rise[mine], clk[clocks]))
+        parts.append(decoder.feed_edges(begin, end, at, bit[clocks]))
         look()
     whole = concat(parts)
     is_whole = np.isin(fall // vcd.unit_ns, whole.fall)
