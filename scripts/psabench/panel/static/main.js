@@ -110,6 +110,7 @@ function time(t) {
   now = t.t_s;
   turn(now);
   lines.time(now, t.playing);
+  procedures.hold(t.lent);
   playing = t.playing;
   interrupt.show(t.busy);
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
