@@ -8,6 +8,7 @@ from pathlib import Path
 
 import panel_run as run
 import pytest
+from page_picture import looks_as
 from panel_page import needs_browser, opened, said, until
 from playwright.sync_api import Browser, Page, expect
 from recorded_lines import record_psa2
@@ -93,6 +94,18 @@ def test_values_are_plotted_as_time_goes_and_a_bad_file_is_a_line(page: Page) ->
     expect(page.locator("#message")).to_contain_text("b.vcd: expected a VCD file")
     expect(page.locator("#recording-file")).to_have_value("a.vcd")
     expect(page.locator("#link")).to_have_text("connected")
+
+
+def test_a_torn_frame_looks_as_in_its_picture(browser: Browser, panel: run.Running, tmp_path: Path) -> None:
+    """PSABENCH_PICTURES=1 draws docs/img/panel_lines.png."""
+    with opened(browser, panel, viewport={"width": 1280, "height": 900}, color_scheme="light") as page:
+        until(page, "panel.lines().seen > 0")
+        page.click("#torn-on")
+        expect(page.locator("#lines-picture")).to_contain_text("torn: 127 bits, not 128")
+        page.evaluate("document.activeElement.blur()")
+        page.mouse.move(0, 0)
+        page.locator("#recorded-lines").screenshot(path=tmp_path / "lines.png")
+    looks_as(tmp_path / "lines.png", "panel_lines.png")
 
 
 def test_a_recording_says_how_much_of_it_is_read(browser: Browser, tmp_path: Path) -> None:
