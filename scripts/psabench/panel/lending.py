@@ -1,4 +1,4 @@
-"""The bench that is shown, lent to a procedure: which procedures fit it, how they find it, and what is held meanwhile."""
+"""The bench that is shown, lent to a procedure: which ones fit it, how they find it, what is held meanwhile."""
 
 from __future__ import annotations
 
