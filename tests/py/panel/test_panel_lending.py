@@ -47,7 +47,7 @@ def test_options_lead_to_the_bench_and_its_chosen_unit(tmp_path: Path) -> None:
         assert words[words.index("--control") + 1] == str(bench.control.path)
         assert words[words.index("--node") + 1] == str(bench.units[second].node.node_id)
         assert words[words.index("--truth") + 1] == str(bench.truth_path)
-        with pytest.raises(BenchError, match="expected .*turns.*, got 'gyrocompass'"):
+        with pytest.raises(BenchError, match=r"expected .*turns.*, got 'gyrocompass'"):
             options_of("gyrocompass", view)
 
 
@@ -124,7 +124,8 @@ def test_the_same_bench_gives_the_same_result_as_the_command(panel: run.Running,
 NOTES_HEAD = """() => {
   const box = document.querySelector("#read-head");
   window.readings = new Set();
-  new MutationObserver(() => readings.add(box.textContent)).observe(box, { childList: true, characterData: true, subtree: true });
+  const observer = new MutationObserver(() => readings.add(box.textContent));
+  observer.observe(box, { childList: true, characterData: true, subtree: true });
 }"""
 
 

@@ -282,15 +282,8 @@ def _on_the_head() -> Iterator[Command]:
     for name, summary in (*ON_THE_HEAD.items(), (ALL, every)):
         load = _of_all if name == ALL else partial(_of_the_head, name)
         own = {} if name == ALL else {**IN_A_CLIMATE, **(OF_A_BATCH if name == "turns" else {})}
-        how: dict[str, Any] = {
-            "own": own,
-            "load": load,
-            "notes": NOTES_HEAD,
-            "kept": KEPT,
-            "board": "psa2",
-            "on": "head",
-        }
-        yield _command((name, summary), handlers.run_on_head, _HEAD, **how)
+        how: dict[str, Any] = {"own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
+        yield _command((name, summary), handlers.run_on_head, _HEAD, board="psa2", on="head", **how)
 
 
 def _on_the_platform() -> Iterator[Command]:
