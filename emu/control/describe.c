@@ -133,6 +133,7 @@ enum control_outcome describe_units(const struct control_call *call)
         add_count(j, "node", u->cfg.node);
         add_bus_name(b, b->node[i], j);
         cJSON_AddStringToObject(j, "profile", u->profile);
+        cJSON_AddStringToObject(j, "on", unit_mounts[u->cfg.mounting.on]);
         cJSON_AddBoolToObject(j, "ready", u->type->ready(u->board));
         const char *why = unit_why_eager(b->unit[i], call->t_ns);
         cJSON_AddItemToObject(j, "eager", why ? cJSON_CreateString(why) : cJSON_CreateNull());

@@ -127,9 +127,6 @@ static const struct field axes_rows[] = {
 };
 static const struct fields axes_fields = FIELDS(axes_rows);
 
-static const char *const mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
-                                     [LAB_PLATFORM] = "platform", [LAB_FLIGHT] = "flight", NULL};
-
 static const char *const chains[] = {
     [ADS1282_CHAIN_EXACT] = "exact", [ADS1282_CHAIN_MODULATOR] = "modulator", [ADS1282_CHAIN_DIRECT] = "direct", NULL};
 
@@ -147,7 +144,7 @@ static const struct field unit_rows[] = {
     {.key = "spread", .type = FIELD_BOOL, .offset = UNIT(spread), .what = "draw parameters from the scenario's `spread`"},
     {.key = "axes",   .type = FIELD_SECTION, .sub = &axes_fields, .what = "the channels `x`, `y`, `z`"},
     {.key = "level",  .type = FIELD_TEXT, .offset = UNIT(level), .max = 32, .what = "gyro unit: name of the PSA-2 that reads its level sensors"},
-    {.key = "on",     .type = FIELD_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = mounts, .what = "mounting place"},
+    {.key = "on",     .type = FIELD_CHOICE, .offset = UNIT(cfg.mounting.on), .choices = unit_mounts, .what = "mounting place"},
     {.key = "lever_arm_m", .type = FIELD_REALS, .offset = UNIT(cfg.mounting.lever_m), .count = 3, .min = -10, .max = 10, .what = "from the instrument's centre to the unit, mount's x, y, z"},
     {.key = "misalignment_arcsec", .type = FIELD_REALS, .offset = UNIT(misalignment_arcsec), .count = 3, .min = -36000, .max = 36000, .what = "misalignment of the case in the mount, about x, y, z"},
     {.key = "tau_case_s", .type = FIELD_REAL, .offset = UNIT(cfg.tau_case_s), .max = 1e5, .what = "time constant in the chamber; 0: the chamber's"},

@@ -76,6 +76,9 @@ struct unit {
     union board_can_store can_store;
 };
 
+/* Names of enum lab_mount, NULL behind the last. */
+extern const char *const unit_mounts[];
+
 /* A PSA-2 of profile "article" at 25 degC with nominal chains, no sensor, no noise but the converters'. */
 struct unit_cfg unit_default(const char *name);
 

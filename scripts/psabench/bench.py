@@ -353,6 +353,11 @@ class Bench(AbstractContextManager["Bench"]):
         if isinstance(self._clock, StepClock):
             self._clock.command(None, "run", for_s=0)
 
+    def resync(self) -> None:
+        """After another program has used this emulator: its time is where that program has brought it."""
+        if isinstance(self._clock, StepClock):
+            self._clock.resync()
+
     def step(self, count: int = 1) -> float:
         """To the count-th next whole millisecond of simulated time: the beat of a control loop; returns time_s."""
         period_ns = round(QUANTUM_S * NS)

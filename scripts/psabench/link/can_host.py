@@ -92,9 +92,7 @@ class StepClock:
         self._control = control
         self._hosts = list(hosts)
         first = _frames_of_all(control, self._hosts)
-        self._t_ns = first.t_ns
-        clients = [*first.result["clients"], first.result["gone"]]
-        self._base_tx = sum(int(c["taken"]) for c in clients)
+        self._t_ns, self._base_tx = first.t_ns, _taken(first)
         self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
         self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
@@ -137,6 +135,12 @@ class StepClock:
         self.between()
         return reply
 
+    def resync(self) -> None:
+        """Another program has moved time, or has sent frames: both are counted from here on."""
+        reply = self._control.call("frames")
+        self._t_ns = reply.t_ns
+        self._base_tx = _taken(reply) - sum(h.sent for h in self._hosts)
+
     def start_run(self, dwell_s: float) -> None:
         """Let time pass while this program does something else, which sends nothing; `finish_run` waits for its end."""
         self._control.send("run", **self._run_args(self._hosts, {"for_s": dwell_s}))
@@ -169,6 +173,11 @@ class StepClock:
     def _delivered(self, reply: Reply) -> list[int]:
         """Frames handed to each of our hosts so far."""
         return [reply.rx.get(client, 0) for client in self._mine] or [reply.can_rx]
+
+
+def _taken(frames: Reply) -> int:
+    """How many frames the emulator has taken from all that have been on its buses."""
+    return sum(int(c["taken"]) for c in [*frames.result["clients"], frames.result["gone"]])
 
 
 def _frames_of_all(control: Control, hosts: Sequence[CanHost]) -> Reply:

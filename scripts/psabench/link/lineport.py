@@ -61,6 +61,16 @@ class LineFormat:
     def bits(self) -> int:
         return WORDS * self.word_bits
 
+    def timing(self, spacing: Ints) -> tuple[Ints, NDArray[np.float64]]:
+        """Of spacings (n,) of INT falls, in samples: periods that each is, s by which it is off; 0 within the limit."""
+        if self.period_s is None:
+            return np.ones(len(spacing), np.int64), np.zeros(len(spacing))
+        spacing_s = spacing / self.sample_hz
+        steps = np.maximum(np.rint(spacing_s / self.period_s), 1)
+        off_s = spacing_s - steps * self.period_s
+        slack_s = self.tolerance_s + 1 / self.sample_hz
+        return steps.astype(np.int64), np.where(np.abs(off_s) > slack_s, off_s, 0.0)
+
 
 @dataclass(slots=True)
 class Counts:
@@ -130,6 +140,10 @@ class LineDecoder:
         """Frames completed by these samples."""
         x = np.frombuffer(data, np.uint8)
         return concat([self._block(x[i : i + BLOCK]) for i in range(0, len(x), BLOCK)])
+
+    def feed_edges(self, fall: Ints, rise: Ints, clk: Ints, bit: NDArray[np.bool_]) -> Frames:
+        """As `feed` where edges are known, as in a recording: INT falls and rises, CLK rises with DATA, in samples."""
+        return self._frames(fall, rise, clk, bit, np.empty(0, np.int64))
 
     def _block(self, x: Samples) -> Frames:
         base = self.counts.samples
@@ -212,13 +226,10 @@ class LineDecoder:
         if self.fmt.period_s is None or len(fall) < 2:
             return
         known = np.searchsorted(gaps, fall[:-1], "right") == np.searchsorted(gaps, fall[1:], "right")
-        spacing_s = np.diff(fall)[known] / self.fmt.sample_hz
-        steps = np.maximum(np.rint(spacing_s / self.fmt.period_s), 1)
-        off_s = spacing_s - steps * self.fmt.period_s
-        slack_s = self.fmt.tolerance_s + 1 / self.fmt.sample_hz
+        steps, off_s = self.fmt.timing(np.diff(fall)[known])
         self.counts.lost += int((steps - 1).sum())
-        self.counts.late += int((off_s > slack_s).sum())
-        self.counts.early += int((off_s < -slack_s).sum())
+        self.counts.late += int((off_s > 0).sum())
+        self.counts.early += int((off_s < 0).sum())
 
 
 def _busy(x: Samples, before: int) -> tuple[Samples, Ints]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -23,11 +23,11 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Bits = NDArray[np.uint8]
 
-BLOCK = 1 << 22  # bytes read together
+BLOCK = 1 << 18  # bytes read together: 40 ms of work
 MOST_EDGES = 40_000_000  # of one recording of lines: 0.4 GB
 MOST_NS = 1 << 60  # of a time: 36 years
 _MOST_HEAD = 1 << 22  # bytes before $enddefinitions
-_MOST_REST = 4 * BLOCK  # bytes without a time
+_MOST_REST = 1 << 24  # bytes without a time
 _MOST_WIRES = 1024
 _MOST_CODE = 8  # characters of a wire's code, in one 64-bit number
 _MOST_DIGITS = 18  # of a time: what 64 bits hold
@@ -56,6 +56,12 @@ class Wire:
         t_ns: Ints = self.t_ns[1:][self.level[1:] == level]
         return t_ns
 
+    def part(self, begin_ns: int, end_ns: int) -> Wire:
+        """Its level at the begin, then its edges up to the end."""
+        k = max(0, int(np.searchsorted(self.t_ns, begin_ns, "right")) - 1)
+        n = int(np.searchsorted(self.t_ns, end_ns, "right"))
+        return Wire(np.concatenate(([np.int64(begin_ns)], self.t_ns[k + 1 : n])), self.level[k : max(n, k + 1)])
+
 
 @dataclass(frozen=True, slots=True)
 class Vcd:
@@ -65,6 +71,10 @@ class Vcd:
     start_ns: int
     end_ns: int
     wires: dict[str, Wire]
+
+    def part(self, names: Sequence[str], begin_ns: int, end_ns: int) -> Vcd:
+        """Some wires between two instants."""
+        return Vcd(self.unit_ns, begin_ns, end_ns, {name: self.wires[name].part(begin_ns, end_ns) for name in names})
 
     def edges(self, names: Sequence[str], start_ns: int, end_ns: int) -> list[tuple[int, str, int]]:
         """(t_ns, name, level) of every change in start_ns < t <= end_ns, in order of time, then of names."""
@@ -142,10 +152,22 @@ def _whole(file: BinaryIO, name: str) -> Vcd:
     return Vcd(unit_ns, part.start_ns, part.end_ns, part.wires)
 
 
-def read_vcd_part(file: BinaryIO, name: str, max_ns: float = MOST_NS, levels: bytes = b"01xXzZ") -> VcdPart:
-    """Reads block by block, to max_ns after the first time. Raises ValueError where the head is not that of a VCD."""
+def read_vcd_part(
+    file: BinaryIO,
+    name: str,
+    max_ns: float = MOST_NS,
+    levels: bytes = b"01xXzZ",
+    *,
+    most_edges: int = MOST_EDGES,
+    look: Callable[[], None] = lambda: None,
+) -> VcdPart:
+    """Reads block by block, to max_ns after the first time or to most_edges. Calls `look` after each block.
+
+    Raises ValueError where the head is not that of a VCD, and what `look` raises.
+    """
     head, rest = _head(name, file)
     r = _declared(name, head, min(max_ns, MOST_NS), np.frombuffer(levels, np.uint8))
+    r.most_edges = most_edges
     while not r.note:
         data = file.read(BLOCK)
         rest += data
@@ -154,6 +176,7 @@ def read_vcd_part(file: BinaryIO, name: str, max_ns: float = MOST_NS, levels: by
         rest = rest[cut:]
         if len(rest) > _MOST_REST:
             r.note = r.note or f"no time in {_MOST_REST} bytes"
+        look()
         if not data:
             break
     return VcdPart(
@@ -178,6 +201,7 @@ class _Reader:
     now: int = -1  # in units; -1: no time was given yet
     start_ns: int = -1
     edges: int = 0
+    most_edges: int = MOST_EDGES
     note: str = ""
     comment: bool = False
     at: dict[str, list[Ints]] = field(default_factory=dict)
@@ -360,8 +384,8 @@ def _keep(r: _Reader, codes: list[str], w: _Words, end: int) -> None:
         stamps = stamps[r.ns(stamps) <= r.start_ns + r.max_ns]
     r.now = int(stamps[-1])
     r.edges += int(known.sum())
-    if r.edges > MOST_EDGES:
-        r.note = r.note or f"judged to its {MOST_EDGES} edges"
+    if r.edges > r.most_edges:
+        r.note = r.note or f"read to its {r.edges} edges"
     for i in np.unique(wire[known]).tolist():
         mine = known & (wire == i)
         r.at.setdefault(codes[i], []).append(at_ns[mine])

@@ -14,7 +14,7 @@ from psabench.errors import BadInput, BenchError, expected
 from psabench.logs.viewers import shipped_folder, write_sessions
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # of X11 and Wayland
-CAN_LOG = "psabench decode {file} prints its values"
+CAN_LOG = "psabench decode {file} prints its values, psabench panel --recording {file} plays it in a browser"
 # What opens the files of psabench that are no waveforms, by ending.
 OPENED_BY: Mapping[str, str] = {
     **dict.fromkeys((".asc", ".blf", ".csv", ".db", ".log", ".mf4", ".trc"), CAN_LOG),
@@ -50,12 +50,12 @@ def view_file(file: Path, program: str | None) -> None:
     """Opens FILE. Raises BadInput, BenchError."""
     start = start_of(file, program)
     program = start.words[0]
+    panel = f"psabench panel --recording {shlex.quote(str(file))} shows it in a browser"
     if not shutil.which(program):
-        raise BadInput(expected(f"{program} (apt-get install {program})", "none", "view"))
+        raise BadInput(expected(f"{program} (apt-get install {program})", f"none; {panel}", "view"))
     if not any(os.environ.get(name) for name in DISPLAYS):
-        raise BadInput(
-            expected(" or ".join(f"${name}" for name in DISPLAYS), "none; --print shows the command", "view")
-        )
+        known = " or ".join(f"${name}" for name in DISPLAYS)
+        raise BadInput(expected(known, f"none; --print shows the command, {panel}", "view"))
     done = subprocess.run(start.words, env={**os.environ, **start.environment}, check=False)
     if done.returncode:
         raise BenchError(expected("exit status 0", str(done.returncode), program))

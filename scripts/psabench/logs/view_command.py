@@ -25,6 +25,7 @@ examples:
   psabench view --can socketcand:127.0.0.1:29536          then open ws://127.0.0.1:8765 in Foxglove
   psabench view --can slcan:/dev/ttyACM0 --board psd1 --port 9000
 
+In a browser, without a viewer: psabench panel --recording FILE.
 With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there. Without: serves
 until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
 """

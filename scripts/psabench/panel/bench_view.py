@@ -47,7 +47,9 @@ class BenchView:
     histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot, by its name
     lines: dict[str, Ints] = field(init=False)  # of a unit: frames drawn from its lines, torn ones
     tables: tuple[str, ...] = ()  # axes of the rate table: names of their readings
+    mounts: dict[str, str] = field(default_factory=dict)  # where each unit is: head, table ...
     _viewed_s: float = 0.0
+    _before: dict[str, tuple[int, int]] = field(default_factory=dict)  # lost and torn, when the bench was lent
 
     def __post_init__(self) -> None:
         self.session = Session(self.bench, self.start)
@@ -56,6 +58,9 @@ class BenchView:
         self.lines = {name: np.zeros(2, dtype=np.int64) for name in self.bench.units}
         self.traces = [self._trace(bus) for bus in self.bench.hosts]
         self.tables = tuple(n for k, n in enumerate(TABLES, 1) if self._maybe("table.read", {"axis": k}))
+
+        told = self._maybe("units", {}).get("units", ())
+        self.mounts = {str(u["name"]): str(u.get("on", "")) for u in told}
 
     @property
     def pace(self) -> str:
@@ -169,6 +174,25 @@ class BenchView:
             if not any(came):
                 time.sleep(min(left_s, IDLE_S))
 
+    def lend(self) -> None:
+        """To another program, which starts and stops streams: gaps are no losses meanwhile."""
+        units = self.bench.units.items()
+        self._before = {n: (u.frames.counters.lost, u.frames.counters.torn) for n, u in units}
+
+    def follow(self) -> None:
+        """Time is where the other program has brought it."""
+        self.bench.resync()
+
+    def take_back(self, why: str) -> None:
+        """Ours again, with what has come until now; the script of this session does not lead here."""
+        self.follow()
+        self.bench.catch_up()
+        self.take(every_unit=True)
+        for unit in self.bench.units.values():
+            unit.frames.forget()
+        self._before = {}
+        self.session.transcript.add(f"# {why}", self.session.now_ns())
+
     def take(self, every_unit: bool) -> dict[str, Any]:
         """New buckets of the chosen unit; of the others, which are kept for the overview, when every_unit."""
         found: dict[str, Any] = {}
@@ -176,6 +200,8 @@ class BenchView:
             if name != self.session.dut_name and not every_unit:
                 continue
             buckets = self.channels[name].add(samples_of(unit.frames.take()))
+            if name in self._before:
+                unit.frames.counters.lost, unit.frames.counters.torn = self._before[name]
             if name == self.session.dut_name and buckets:
                 found = unit_message(name, self.channels[name], buckets)
         return found

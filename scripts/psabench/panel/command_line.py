@@ -15,7 +15,7 @@ examples:
   psabench panel                            an emulator with the scenario calibrate, its time driven by the page
   psabench panel stream --pace wall         in real time
   psabench panel --connect /tmp/psa.ctl     a running emulator; its bus and instruments are found
-  psabench panel --recording run.log        what was recorded
+  psabench panel --recording run.log        a recording of the bus, or of lines: run.vcd
 
 Open the printed address in a browser of this machine. Ctrl-C ends the panel, and the emulator that it has started.
 """
@@ -40,7 +40,10 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     panel.add_argument("--node", type=node_id, help="CANopen node of the unit (the emulator's, else 5)")
     add_json(panel, STREAM)
     panel.add_argument(
-        "--recording", type=Path, metavar="PATH", help="instead of a bench: a CAN log, or a folder of them"
+        "--recording",
+        type=Path,
+        metavar="PATH",
+        help="instead of a bench: a CAN log, lines as VCD, or a folder of them",
     )
     panel.add_argument("--board", type=board_name, help="with --recording: board of the nodes (psa2)")
     return panel.parse_args(words)

@@ -22,7 +22,7 @@ from psabench.panel.guard import Door, Log
 from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
-from psabench.panel.recording_view import RecordingSource
+from psabench.panel.recorded.source import RecordingSource
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
 from psabench.panel.source import Source
 from psabench.panel.worker import Worker, text_of
@@ -49,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
         finally:
             runs.close()
             worker.stop()
+    if worker.failed is not None:  # a recording that could not be read to its end
+        raise worker.failed
     if worker.died:
         raise BenchError(worker.died)
     return 0
@@ -106,7 +108,7 @@ async def _serve(
         loop.call_soon_threadsafe(setattr, server, "should_exit", True)
 
     worker.on_death = end
-    if worker.died:
+    if worker.died or worker.failed is not None:
         return
     ready(door.address)
     await server.serve(sockets=[listener])

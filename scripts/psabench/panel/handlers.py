@@ -8,7 +8,8 @@ from typing import Any
 from psabench.errors import BenchError, expected
 from psabench.panel import forks, scenarios
 from psabench.panel.converter import read_converter
-from psabench.panel.recording_view import RecordingSource
+from psabench.panel.recorded.lines_view import LinesView
+from psabench.panel.recorded.source import RecordingSource
 from psabench.panel.source import Source, bench_view, own_source
 from psabench.panel.worker import Worker
 from psabench.shell.lexer import Wrong
@@ -19,7 +20,12 @@ SEEDS = 2**53  # of psa-emu, whose numbers are those of JSON
 
 
 def _run_procedure(w: Worker, request: Request) -> dict[str, Any]:
-    w.runs.start(_text_of(request, "name"))
+    """On the bench that is shown, or on one of its own."""
+    name = _text_of(request, "name")
+    if request.get("here") is True:
+        w.lend(name)
+        return {"time": w.time()}
+    w.runs.start(name)
     return {}
 
 
@@ -74,10 +80,17 @@ def _choose_recording(w: Worker, request: Request) -> dict[str, Any]:
     if not isinstance(w.source, RecordingSource):
         raise BenchError(expected("a recording", "a bench", "panel"))
     source = w.source.choose(name)
-    new = source.open()
+    new = w.opened(source)
     w.source = source
     w.exchange(new, f"recording {name}", playing=False)
     return {"time": w.time()}
+
+
+def _recorded_lines(w: Worker) -> LinesView:
+    """Raises BenchError."""
+    if not isinstance(w.view, LinesView):
+        raise BenchError(expected("a recording of lines", "another bench or recording", "panel"))
+    return w.view
 
 
 def _text_of(request: Request, name: str) -> str:
@@ -109,6 +122,8 @@ HANDLERS: Mapping[str, Handler] = {
     "show": lambda w, request: forks.show_resting(w, _text_of(request, "name")),
     "drop": lambda w, request: forks.end_fork(w, _text_of(request, "name")),
     "recording": _choose_recording,
+    "window": lambda w, request: _recorded_lines(w).window(request),
+    "next": lambda w, request: _recorded_lines(w).next_frame(request),
     "run": _run_procedure,
     "stop": _stop_procedure,
 }

@@ -14,7 +14,7 @@ from psabench.errors import BenchError
 WAITING = 64  # requests; a page that asks for more is refused
 SHOWN = 200  # characters of a line
 # Answered while a line goes on, too: they neither move time nor say anything to the bench.
-ASIDE = ("hello", "statistics", "converter", "scenarios", "scenario", "run", "stop")
+ASIDE = ("hello", "statistics", "converter", "scenarios", "scenario", "run", "stop", "window", "next")
 
 Asked = tuple[int, dict[str, Any]]
 

@@ -1,4 +1,4 @@
-"""A procedure that a page has started: `psabench run NAME` as a process of its own, on an emulator of its own.
+"""A procedure that a page has started: `psabench run NAME` as a process of its own, on an emulator of its own or ours.
 
 It believes to be at a terminal, so it draws its bar; the bar's parts are what a page shows.
 """
@@ -74,11 +74,15 @@ class Runs:
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
 
-    def start(self, name: str) -> None:
-        """Raises BenchError."""
+    @property
+    def is_running(self) -> bool:
+        return self._process is not None and self._process.poll() is None
+
+    def start(self, name: str, more: Sequence[str] = ()) -> None:
+        """more: further options. Raises BenchError."""
         if name not in OFFERED:
             raise BenchError(expected(", ".join(OFFERED), repr(name[:40]), "procedure"))
-        if self._process is not None and self._process.poll() is None:
+        if self.is_running:
             raise BenchError(f"procedure: {self.progress.name} is running; stop it first")
         folder = self.out / name
         folder.mkdir(parents=True, exist_ok=True)
@@ -87,6 +91,7 @@ class Runs:
         self.progress, self._stopped = Progress(name=name, state="running"), False
         ours, theirs = pty.openpty()
         command = [sys.executable, "-m", "psabench.cli", "run", name, "--out", str(folder), *AGAIN.get(name, ())]
+        command += more
         try:
             self._process = subprocess.Popen(
                 command,
@@ -102,7 +107,7 @@ class Runs:
 
     def stop(self) -> None:
         """Ctrl-C, if one is running."""
-        if self._process is not None and self._process.poll() is None:
+        if self._process is not None and self.is_running:
             self._stopped = True
             _signal_group(self._process.pid, signal.SIGINT)
 

@@ -1,4 +1,4 @@
-"""What the worker needs of what it shows: an open bench (`bench_view`) or a recording (`recording_view`)."""
+"""What the worker needs of what it shows: an open bench (`bench_view`) or a recording (`recorded`)."""
 
 from __future__ import annotations
 

@@ -14,9 +14,14 @@ from typing import Any, Protocol
 
 from psabench.errors import BenchError, LinkError, expected
 from psabench.output import without_nan
+from psabench.panel.bench_view import BenchView
 from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
+from psabench.panel.lending import check_free, fitting, options_of
 from psabench.panel.procedures import OFFERED, Runs
+from psabench.panel.recorded.opening import Opening
+from psabench.panel.recorded.source import RecordingSource
+from psabench.panel.source import bench_view
 from psabench.panel.view import Source, View
 
 UPDATE_S = 1 / 30
@@ -77,12 +82,15 @@ class Worker:
     on_death: Callable[[], None] = lambda: None
     lost: str = ""
     name: str = FIRST  # of the bench that is shown
+    lent: str = ""  # the procedure that has it
     resting: dict[str, View] = field(default_factory=dict)  # the others, whose time stands still
     _view: View | None = None
+    _opening: Opening | None = None  # a recording that is being read
     _stop: threading.Event = field(default_factory=threading.Event)
     _updates: Due = field(default_factory=lambda: Due(UPDATE_S))
     _states: Due = field(default_factory=lambda: Due(STATE_S))
     _cans: Due = field(default_factory=lambda: Due(CAN_S))
+    _openings: Due = field(default_factory=lambda: Due(CAN_S))
     _overviews: Due = field(default_factory=lambda: Due(OVERVIEW_S))
     _thread: threading.Thread | None = None
     _moved_s: float = 0.0
@@ -90,7 +98,7 @@ class Worker:
     # ---- from the server's thread
 
     def start(self) -> None:
-        """Returns when the bench is up. Raises its BenchError."""
+        """Returns when the bench is up, or the first part of a recording is read. Raises its BenchError."""
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
         self._thread.start()
         self.ready.wait()
@@ -116,24 +124,53 @@ class Worker:
         try:
             self._view = self._open()
         except BenchError as e:
-            self.failed = e
+            if not self._stop.is_set():
+                self.failed = e
+                self.outlet.publish(text_of({"kind": "lost", "why": str(e)}))
+                self.on_death()
+            return
+        except Exception as e:
+            self._die(e)
             return
         finally:
             self.ready.set()
+        self.outlet.publish(text_of(self.hello()))
         try:
             while not self._stop.is_set():
                 self._turn()
         except BaseException as e:
-            self.died = f"panel: an error of its own has ended it: {e!r} at {_place_of(e)}"
-            self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
-            self.on_death()
+            self._die(e)
         finally:
             self._close()
             for view in self.resting.values():
                 _close_bench(view)
 
+    def _die(self, e: BaseException) -> None:
+        self.died = f"panel: an error of its own has ended it: {e!r} at {_place_of(e)}"
+        self.outlet.publish(text_of({"kind": "lost", "why": self.died}))
+        self.on_death()
+
     def _open(self) -> View:
-        return self._prepared(self.source.open())
+        source = self.source
+        return self._prepared(self.opened(source) if isinstance(source, RecordingSource) else source.open())
+
+    def opened(self, source: RecordingSource) -> View:
+        """A recording, read in a thread while pages are served. Raises BenchError."""
+        self._opening = Opening(source)
+        try:
+            with self.inbox.doing(f"opening {source.name}"):
+                return self._opening.follow(self._while_opening)
+        finally:
+            self._opening = None
+            self.outlet.publish(text_of({"kind": "opening", "name": source.name, "done": None}))
+
+    def _while_opening(self) -> None:
+        assert self._opening is not None
+        if self._opening.done >= 0.0:
+            self.ready.set()  # so much can be read
+        if self._openings():
+            self.outlet.publish(text_of(self._opening.message()))
+        self._between()
 
     def _prepared(self, view: View) -> View:
         view.look_between(self._between)
@@ -149,6 +186,8 @@ class Worker:
         try:
             if self._view is None:
                 self._come_back()
+            if self.lent and not self.runs.is_running:
+                self._take_back()
             self._answer(self.inbox.aside())
             self._answer(self.inbox.in_order())
             if self._view is not None:
@@ -159,7 +198,24 @@ class Worker:
         except BenchError as e:
             self._lose(f"the bench does not go on: {e}")
 
+    def lend(self, name: str) -> None:
+        """The bench that is shown goes to a procedure until that ends; time is the procedure's. Raises BenchError."""
+        view = bench_view(self.view)
+        if self.inbox.busy:
+            raise BenchError(f"bench: {self.inbox.busy} is being carried out; stop it first")
+        self.runs.start(name, options_of(name, view))
+        view.lend()
+        self.lent, self.playing = name, False
+
+    def _take_back(self) -> None:
+        why, self.lent = f"the procedure {self.lent} had this bench until here; this script does not repeat it", ""
+        bench_view(self.view).take_back(why)
+        self.outlet.publish(text_of(self.hello()))
+
     def _lose(self, why: str) -> None:
+        if self.lent:
+            self.runs.stop()
+            self.lent = ""
         self.lost = why
         self._close()
         self.outlet.publish(text_of({"kind": "lost", "why": why}))
@@ -179,12 +235,14 @@ class Worker:
 
     def hello(self) -> dict[str, Any]:
         if self._view is None:
-            return {"kind": "lost", "why": self.lost}
+            return self._opening.message() if self._opening else {"kind": "lost", "why": self.lost}
+        fits = fitting(self._view) if isinstance(self._view, BenchView) else []
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
         return (
             self._view.describe()
             | {"time": self.time(), "benches": self.benches(), "converters": describe_converters()}
             | procedures
+            | {"fits": fits}
         )
 
     def benches(self) -> dict[str, Any]:
@@ -194,8 +252,10 @@ class Worker:
 
     def _move(self, view: View) -> None:
         """Let time pass, an update's length; a real bench and one in wall pace receive meanwhile."""
-        if view.pace != "step":
+        if view.pace != "step" or self.lent:
             view.receive(self._updates.left_s)
+            if self.lent:
+                bench_view(view).follow()
             return
         now_s = time.monotonic()
         if not self.playing:
@@ -249,9 +309,10 @@ class Worker:
         assert self._view is not None
         return {
             "t_s": round(self._view.now_s(), 9),
-            "playing": self.playing or self._view.pace != "step",
+            "playing": self.playing or self._view.pace != "step" or bool(self.lent),
             "speed": self.speed,
             "busy": self.inbox.busy,
+            "lent": self.lent,
         }
 
     # ---- requests
@@ -275,6 +336,7 @@ class Worker:
     def _result(self, request: dict[str, Any]) -> dict[str, Any]:
         """Raises BenchError for what cannot be done."""
         what = str(request.get("do"))
+        check_free(what, self.lent)
         handler = self.handlers.get(what)
         if handler is None:
             raise BenchError(expected(", ".join(self.handlers), repr(what[:40]), "do"))

@@ -84,10 +84,15 @@ def test_a_viewer_that_fails_is_an_error_of_the_bench(vcd: Path, capsys: pytest.
 
 def test_what_to_install_is_one_line(vcd: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["view", str(vcd)]) == 2
-    assert "expected pulseview (apt-get install pulseview), got none\n" in capsys.readouterr().err
+    assert (
+        "expected pulseview (apt-get install pulseview), got none; psabench panel --recording "
+        in capsys.readouterr().err
+    )
     installed(vcd.parent, "pulseview")
     assert cli.main(["view", str(vcd), "--with", "gtkwave"]) == 2
-    assert "expected gtkwave (apt-get install gtkwave), got none\n" in capsys.readouterr().err
+    assert (
+        "expected gtkwave (apt-get install gtkwave), got none; psabench panel --recording " in capsys.readouterr().err
+    )
 
 
 def test_without_a_display_nothing_is_started(

@@ -16,7 +16,8 @@ import pytest
 from psabench.boards.decode import decode_can
 from psabench.errors import BadInput
 from psabench.panel.command_line import parse
-from psabench.panel.recording_view import RecordingSource, RecordingView
+from psabench.panel.recorded.can_view import CanView
+from psabench.panel.recorded.source import RecordingSource
 from psabench.places import find_emulator
 from psabench.shell.lexer import Wrong
 
@@ -33,8 +34,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return here
 
 
-def opened(path: Path, **given: Any) -> RecordingView:
-    return RecordingSource(path, **given).open()
+def opened(path: Path, **given: Any) -> CanView:
+    view = RecordingSource(path, **given).open()
+    assert isinstance(view, CanView)
+    return view
 
 
 def decoded(path: Path) -> list[dict[str, str]]:
@@ -43,7 +46,7 @@ def decoded(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(out.getvalue())))
 
 
-def seen(view: RecordingView) -> Any:
+def seen(view: CanView) -> Any:
     """What a page that opens now gets."""
     view.take(every_unit=True)
     return view.describe()["history"], view.state(lines=False)["overview"], view.can(view.now_s())["buses"]

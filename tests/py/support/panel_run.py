@@ -104,6 +104,11 @@ def running(*options: str | Path) -> Iterator[Running]:
             process.kill()
 
 
+def command(*words: str) -> int:
+    """Exit status of psabench with these words."""
+    return subprocess.run([sys.executable, "-m", "psabench.cli", *words], capture_output=True, check=False).returncode
+
+
 def received(socket: ClientConnection, kind: str) -> dict[str, Any]:
     """The next message of a kind."""
     while True:

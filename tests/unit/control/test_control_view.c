@@ -64,8 +64,8 @@ static void counters_frames_and_units_tell_what_they_promise(void **state)
     assert_says("{\"cmd\":\"counters\"}", "\"pace\":{\"name\":\"step\",\"turns\":9");
     assert_says("{\"cmd\":\"counters\"}", "\"bitrate_hz\":1000000");
     assert_says("{\"cmd\":\"units\"}",
-                "{\"name\":\"a\",\"board\":\"psa2\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"ready\":false,"
-                "\"eager\":\"the controller has not set it up yet\"}");
+                "{\"name\":\"a\",\"board\":\"psa2\",\"serial\":17,\"node\":5,\"profile\":\"article\",\"on\":\"head\","
+                "\"ready\":false,\"eager\":\"the controller has not set it up yet\"}");
     assert_says("{\"cmd\":\"quit\"}", "\"ok\":true");
     assert_int_equal(asked.quits, 1);
 }

@@ -152,15 +152,8 @@ class LineLog:
         ends = np.concatenate(([self.start_ns], self.gaps_ns, [self.end_ns + 1]))
         k = int(np.argmax(np.diff(ends)))
         begin, end = int(ends[k]), int(ends[k + 1]) - 1
-        wires = {name: _part(w, begin, end) for name, w in self.recording.wires.items()}
-        return LineLog(recording=Vcd(self.recording.unit_ns, begin, end, wires), resolution_ns=self.resolution_ns)
-
-
-def _part(w: Wire, begin_ns: int, end_ns: int) -> Wire:
-    """Its level at the begin, then its edges up to the end."""
-    k = max(0, int(np.searchsorted(w.t_ns, begin_ns, "right")) - 1)
-    n = int(np.searchsorted(w.t_ns, end_ns, "right"))
-    return Wire(np.concatenate(([np.int64(begin_ns)], w.t_ns[k + 1 : n])), w.level[k:n])
+        recording = self.recording.part(list(self.recording.wires), begin, end)
+        return LineLog(recording=recording, resolution_ns=self.resolution_ns)
 
 
 @dataclass(frozen=True, kw_only=True)

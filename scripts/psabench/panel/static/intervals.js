@@ -28,11 +28,23 @@ function build(intervals, key) {
 // As many digits as the interval has with two of its own.
 const rounded = (value, half) => (half > 0 ? value.toFixed(Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(half))))) : digits(value));
 
+// The scale is the latest interval's: an early one, of few readings, is wider than the plot and would hide how it tightens.
+const HALVES = 4;
+export function range(values, halves) {
+  const half = halves.at(-1) * HALVES, value = values.at(-1);
+  return half > 0 ? [value - half, value + half] : null;
+}
+
+const scale = (chart, low, high) => {
+  const [, lows, , values] = chart.data;
+  return (values.length && range(values, values.map((v, i) => v - lows[i]))) || uPlot.rangeNum(low, high, 0.1, true);
+};
+
 function settings(box) {
   const axis = { stroke: css("--quiet"), grid: { stroke: css("--grid") }, ticks: { stroke: css("--grid") } };
   const edge = { stroke: css("--band"), width: 1, points: { show: false } };
   return {
-    width: size(box), height: 120, pxAlign: false, legend: { show: false }, scales: { x: { time: false } },
+    width: size(box), height: 120, pxAlign: false, legend: { show: false }, scales: { x: { time: false }, y: { range: scale } },
     axes: [{ ...axis, size: 28 }, { ...axis, size: 80, values: (_, v) => v.map((x) => +x.toPrecision(7)) }],
     series: [{}, edge, edge, { stroke: css("--mark"), width: 1, points: { show: true, size: 4 } }],
     bands: [{ series: [2, 1], fill: css("--band") }],

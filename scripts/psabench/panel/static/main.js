@@ -9,6 +9,7 @@ import * as forks from "./forks.js";
 import * as frame from "./frame.js";
 import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
+import * as lines from "./lines.js";
 import * as interrupt from "./interrupt.js";
 import * as procedures from "./procedures.js";
 import * as recording from "./recording.js";
@@ -66,6 +67,7 @@ const HANDLERS = {
     scenario.offer(m, link);
     forks.offer(m.benches, link);
     recording.offer(m.recording, link, say, () => now);
+    lines.offer(m.recording, link);
     if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
@@ -91,6 +93,10 @@ const HANDLERS = {
     $("#truth-state").textContent = m.error || JSON.stringify(m.state, null, 1);
     gyro.truth(m.state);
   },
+  opening: (m) => {
+    $("#link").textContent = m.done === null ? "connected" : `opening ${m.name}: ${Math.round(100 * m.done)} %`;
+    $("#link").className = m.done === null ? "good" : "";
+  },
   lost: (m) => { $("#link").textContent = `no bench: ${m.why}; waiting for it`; $("#link").className = "bad"; },
 };
 
@@ -103,6 +109,8 @@ function take(message) {
 function time(t) {
   now = t.t_s;
   turn(now);
+  lines.time(now, t.playing);
+  procedures.hold(t.lent);
   playing = t.playing;
   interrupt.show(t.busy);
   $("#time").textContent = `${t.t_s.toFixed(3)} s`;
@@ -165,4 +173,4 @@ new ResizeObserver(plots.resize).observe($("#plots"));
 theme(localStorage.getItem("theme") || "");
 (function redraw() { plots.draw(); counts.drawn++; requestAnimationFrame(redraw); })();
 
-window.panel = { counts, shown: plots.shown, link }; // for tests
+window.panel = { counts, shown: plots.shown, lines: lines.state, link }; // for tests

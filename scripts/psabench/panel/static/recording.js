@@ -9,7 +9,8 @@ export function offer(about, link, say, now) {
   options($("#recording-file"), about.files, about.file);
   $("#recording-file").value = about.file;
   const length = `${about.whole ? "" : "more than "}${about.length_s.toFixed(3)} s`;
-  $("#recording-about").textContent = `${length}, bus ${about.buses.join(", ")}${about.damage ? `; ${about.damage}` : ""}`;
+  const what = about.kind === "lines" ? `${about.board}: ${about.lines.length} lines` : `bus ${about.buses.join(", ")}`;
+  $("#recording-about").textContent = `${length}, ${what}${about.damage ? `; ${about.damage}` : ""}`;
   $("#recording-file").onchange = (event) => link.ask({ do: "recording", name: event.target.value })
     .then(() => complain(""), (e) => { complain(e.message); event.target.value = about.file; });
   for (const button of document.querySelectorAll("[data-back]"))

@@ -35,6 +35,8 @@ from psabench.procedures.command_line.offered import (
     THERMAL,
 )
 
+INSTRUMENTS = ("head", "table", "chamber", "supply")  # options of this name take the address of one
+
 NOTES_HEAD = """
 Without --head or --control an emulator is started for each condition. Ctrl-C ends a run; the readings so far stay
 in OUT/PROCEDURE-CONDITION.csv. Exit status 1: a result is off by more than its limits.
@@ -88,6 +90,19 @@ class Command:
     examples: str
     notes: str = ""
     kept: str = ""  # when it is interrupted
+    board: str = ""  # that a bench must have which is there already; "": it needs none, or starts its own
+    on: str = ""  # where the board is mounted, as the emulator calls it; "": wherever it is
+    axes: int = 1  # of the rate table, where it takes one
+
+    @property
+    def takes_bench(self) -> bool:
+        """Whether it runs on an emulator that runs already."""
+        return bool(self.board) and "--control" in self.common
+
+    @property
+    def instruments(self) -> tuple[str, ...]:
+        """That such a bench must have."""
+        return tuple(name for name in INSTRUMENTS if f"--{name}" in self.common)
 
     @cached_property
     def parameters(self) -> Parameters:
@@ -268,13 +283,14 @@ def _on_the_head() -> Iterator[Command]:
         load = _of_all if name == ALL else partial(_of_the_head, name)
         own = {} if name == ALL else {**IN_A_CLIMATE, **(OF_A_BATCH if name == "turns" else {})}
         how: dict[str, Any] = {"own": own, "load": load, "notes": NOTES_HEAD, "kept": KEPT}
-        yield _command((name, summary), handlers.run_on_head, _HEAD, **how)
+        yield _command((name, summary), handlers.run_on_head, _HEAD, board="psa2", on="head", **how)
 
 
 def _on_the_platform() -> Iterator[Command]:
     for name, summary in ON_THE_PLATFORM.items():
         load = partial(_of_the_platform, name)
-        yield _command((name, summary), handlers.run_on_platform, _PLATFORM, load=load, notes=NOTES_PLATFORM)
+        how: dict[str, Any] = {"load": load, "notes": NOTES_PLATFORM, "board": "gyro"}
+        yield _command((name, summary), handlers.run_on_platform, _PLATFORM, **how)
 
 
 _THERMAL = _command(
@@ -284,6 +300,8 @@ _THERMAL = _command(
     load=_of_the_chamber,
     notes=NOTES_CHAMBER,
     kept=f"{KEPT}; --resume continues the run",
+    board="psa2",
+    on="head",
 )
 _SINS = (
     _command(
@@ -292,6 +310,9 @@ _SINS = (
         common=_TABLE,
         load=_of_the_sins,
         kept="what was measured is in OUT",
+        board="bins",
+        on="table",
+        axes=3,
     ),
     _command(
         MEMS_GYRO,
@@ -300,6 +321,9 @@ _SINS = (
         load=_of_the_gyro,
         notes=NOTES_GYRO,
         kept="what was measured is in OUT/dwells.csv",
+        board="psa2",
+        on="table",
+        axes=3,
     ),
     _command(COVARIANCE, handlers.predict_sins, common=("--out",), load=_of_the_covariance),
     _command(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psabench.conform.capture.intervals import wires_needed, within
-from psabench.conform.capture.log import Capture
+from psabench.conform.capture.log import Capture, LineLog
 from psabench.conform.verdict import Failed, Inconclusive, conclusive
 from psabench.link.signals import Ints
 
@@ -43,8 +43,13 @@ def fl2_level(e: Capture) -> int:
 def transfers(e: Capture) -> list[Transfer]:
     """All words in their order, whole ones. Raises Inconclusive where a line or words are missing."""
     wires_needed(e, *LINES)
-    log = e.wires.unbroken()
-    active = fl2_level(e)
+    found = words_of(e.wires.unbroken(), fl2_level(e))
+    conclusive(len(found) >= 3 * LEAST, f"{len(found)} words were read in the recording; expected {3 * LEAST}")
+    return found
+
+
+def words_of(log: LineLog, active: int) -> list[Transfer]:
+    """All whole words of lines that are there; active: the level of FL2 that says "a word waits"."""
     sets, clears = log["FL2"].edges_ns(active), log["FL2"].edges_ns(1 - active)
     up, down = log.rises("SCLK"), log.falls("SCLK")
     lows, highs = log.pulses("CS", 0)
@@ -77,7 +82,6 @@ def transfers(e: Capture) -> list[Transfer]:
         )
     if found and found[-1].clear < 0:
         found.pop()  # the recording ends in it
-    conclusive(len(found) >= 3 * LEAST, f"{len(found)} words were read in the recording; expected {3 * LEAST}")
     return found
 
 
@@ -114,10 +118,10 @@ def of(words: Sequence[Transfer], name: str) -> Ints:
     return np.array([getattr(t, name) for t in words], np.int64)
 
 
-def serial_words(e: Capture, words: Sequence[Transfer]) -> Ints:
+def serial_words(log: LineLog, words: Sequence[Transfer]) -> Ints:
     """(n,) what stood on SDAT at the rises of SCLK, most significant bit first."""
     at_ns = np.array([t.rises for t in words], np.int64).reshape(-1, BITS)
-    levels = e.wires["SDAT"].at(at_ns).astype(np.int64)
+    levels = log["SDAT"].at(at_ns).astype(np.int64)
     made: Ints = levels @ (np.int64(1) << np.arange(BITS - 1, -1, -1, dtype=np.int64))
     return made
 

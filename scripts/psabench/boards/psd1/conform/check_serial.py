@@ -69,7 +69,7 @@ def the_most_significant_bit_comes_first(e: Capture) -> str:
 @check("stream", "PSD1-SER-02", needs={"line", "can"})
 def words_of_the_line_are_those_on_can(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE among those of SDAT, most significant bit first."""
-    seen, told = serial_words(e, _words(e)).reshape(-1, 3), told_words(e)
+    seen, told = serial_words(e.wires, _words(e)).reshape(-1, 3), told_words(e)
     known = {tuple(w) for w in seen.tolist()}
     both = sum(tuple(w) in known for w in told.tolist())
     if both < min(len(told), len(seen)) // 2:
@@ -80,7 +80,7 @@ def words_of_the_line_are_those_on_can(e: Capture) -> str:
 @check("stream", "PSD1-CAN-01", needs={"line", "can"})
 def each_cycle_is_told_once(e: Capture) -> str:
     """Look for the words of PSD1_CYCLE, in their order and none left out, among those of SDAT."""
-    return _found(serial_words(e, _words(e)).reshape(-1, 3), told_words(e))
+    return _found(serial_words(e.wires, _words(e)).reshape(-1, 3), told_words(e))
 
 
 def told_words(e: Capture) -> np.ndarray:
@@ -309,7 +309,7 @@ def _same_words(e: Capture, words: list[Transfer], what: str) -> str:
     at_ns = of(words, "cs_fall")
     first_bad(at_ns < 0, of(words, "rise"), "no strobe", "a strobe for each word", LINES)
     at_ns = at_ns + round(e.slack_ns(0.0))
-    seen, sent = bus_word(e, "D", len(DATA), at_ns), serial_words(e, words)
+    seen, sent = bus_word(e, "D", len(DATA), at_ns), serial_words(e.wires, words)
     saw = [f"{b:04X}h on D0..D15, {a:04X}h in the {what}" for a, b in zip(sent, seen, strict=True)]
     first_bad(seen != sent, at_ns, saw, "the same word", ("SCLK", "SDAT", "CS"))
     return f"{len(words)} words on D0..D15 as they came on SDAT"

@@ -13,9 +13,8 @@ from pathlib import Path
 
 from psabench.errors import BadInput, expected
 from psabench.link.can_host import Message
-from psabench.logs.formats import READABLE, read_frames
+from psabench.logs.formats import read_frames
 
-FILES = 200  # of a folder that are offered
 SCANNED = 200_000  # frames that are looked at for the units and the length: some seconds
 CHANNELS, IDS = 16, 4096  # buses and identifiers that are noted
 TURN = 512  # frames between two looks at who waits
@@ -34,28 +33,21 @@ class Scan:
     ids: dict[str, set[int]] = field(default_factory=dict)  # of data frames, by the name of the bus
 
 
-def recording_files(path: Path) -> list[Path]:
-    """The file, or those of a folder that a log may be. Raises BadInput."""
-    if path.exists() and not (path.is_dir() or path.is_file()):  # going back reads it again
-        raise BadInput(expected("a file or a folder", "a pipe or a device", path))
-    if not path.is_dir():
-        return [path]
-    found = sorted(p for p in path.iterdir() if p.is_file() and p.suffix.lower() in READABLE)
-    if not found:
-        raise BadInput(expected(f"a file with an ending of {' '.join(READABLE)}", "none", path))
-    return found[:FILES]
-
-
 def bus_of(m: Message) -> str:
     """What the log calls it; "can" where it names none."""
     return "can" if m.channel in (None, "") else str(m.channel)
 
 
-def scan_log(path: Path) -> Scan:
-    """Its units and its length, as far as SCANNED frames tell. Raises BadInput where there is no frame at all."""
+def scan_log(path: Path, look: Callable[[float], None]) -> Scan:
+    """Its units and its length, as far as SCANNED frames tell. Raises BadInput where there is no frame at all.
+
+    look: called each TURN frames with the part of SCANNED that has been read; what it raises ends the reading.
+    """
     found: Scan | None = None
     try:
         for count, m in enumerate(stamped_frames(path)):
+            if count % TURN == TURN - 1:
+                look(count / SCANNED)
             if found is None:
                 found = Scan(begin_s=m.timestamp, length_s=0.0)
             if count >= SCANNED:
