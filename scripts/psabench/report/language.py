@@ -25,14 +25,22 @@ ENGLISH, OPTION = "en", "--lang"
 LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
-_SEPARATOR = re.compile(r"( · |<br>)")
-# What a text is about: quoted words, numbers, names of files.
+_SEPARATOR = re.compile(r"( · |<br>|<p class=orig lang=\w+>.*?</p>)", re.DOTALL)  # the last: quotes of a source
+# What a text is about: quoted words, numbers (hexadecimal ones with their h), names of files.
 _QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
 _NUMBER = re.compile(
     r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf)\b"
-    r"|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    r"|(?<![\w.\-−])[\dA-F]+h\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
     re.DOTALL,
 )
+# The same with names of signals, registers, axes and with lists as Python prints them: a check writes one text of many.
+_UNITS = r"(?:[mµun]V|degC|SPS|kHz)\b"
+_NAME = (
+    rf"{_NUMBER.pattern}|\[[^\]]*\]|(?<![\w.\-−/])(?!{_UNITS})(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
+    r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res)\b(?!')"
+)
+_NAMED = re.compile(_NAME, re.DOTALL)
+_LISTED = re.compile(rf"(?:{_NAME})(?:(?:,| and) (?:{_NAME}))*", re.DOTALL)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
@@ -45,7 +53,7 @@ _SYMBOLS = re.compile(
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
 _GAP = re.compile(r"[;:,] |(?<=[.!?]) ")
-_CLAUSES = ("expected", "got")
+_CLAUSES = ("expected", "got", "saw", "due")
 
 
 @dataclass(slots=True)
@@ -109,7 +117,7 @@ class Language:
         return self._known(text) or self._clause(text) or (None if _has_words(text) else text)
 
     def _clause(self, text: str) -> str | None:
-        """Of psabench.errors.expected: what was expected, what was got."""
+        """What was expected, what was got (psabench.errors.expected); what was seen and what was due."""
         word, _, rest = text.partition(" ")
         if word not in _CLAUSES or word not in self.texts:
             return None
@@ -117,17 +125,29 @@ class Language:
         return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
-        key, numbers = key_of(text), _NUMBER.findall(text)
-        words = self.texts.get(key)
-        if not words or key.count("{}") != len(numbers):  # braces of its own: a schema, a regular expression
-            return None
-        self.found.add(key)
-        return words.format(*numbers)
+        plain = _plain(text)
+        for blanked in (_NUMBER, _NAMED, _LISTED):
+            key, taken = blanked.sub("{}", plain), blanked.findall(plain)
+            words = self.texts.get(key)
+            if words and key.count("{}") == len(taken):  # else braces of its own: a schema, a regular expression
+                self.found.add(key)
+                return words.format(*taken)
+        return None
+
+
+def _plain(text: str) -> str:
+    return text.strip().replace("&#x27;", "'").replace("&quot;", '"')
 
 
 def key_of(text: str) -> str:
     """The msgid of a text."""
-    return _NUMBER.sub("{}", text.strip().replace("&#x27;", "'").replace("&quot;", '"'))
+    return _NUMBER.sub("{}", _plain(text))
+
+
+def keys_of(text: str) -> tuple[str, str, str]:
+    """The msgids that fit a text, the closest first: without its numbers; its names, too; its lists of both as one."""
+    plain = _plain(text)
+    return tuple(blanked.sub("{}", plain) for blanked in (_NUMBER, _NAMED, _LISTED))
 
 
 def _has_words(text: str) -> bool:
