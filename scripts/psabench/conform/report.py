@@ -42,7 +42,7 @@ MARKS = {
     Verdict.NOT_APPLICABLE: "n/a",
 }
 
-PAGES = ("docs/", "proto/")  # sources that are pages and files: their names and headings are the same in each language
+PAGES = ("docs/", "proto/", "CiA ", "ISO ")  # sources that are pages, files, standards: named alike in each language
 CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUSIVE: "v-inconclusive"}
 
 
@@ -265,6 +265,8 @@ def html_page(run: Run, folder: Path) -> str:
         _table(run),
         _signed(run),
     ]
+    if run.suite == "host":  # its subject is a command line
+        return whole_page("Conformance of a host program", {"program": run.subject, **run.facts}, body)
     return whole_page(f"Conformance of {run.subject}", run.facts, body)
 
 
@@ -277,7 +279,7 @@ def _verdict(run: Run) -> str:
 def _failure(o: Outcome, folder: Path) -> str:
     pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.excerpts if name.endswith(".svg")]
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)
-    return section(o.title, _saw_and_due(o), *pictures, f"<p class=small>{files}</p>" if files else "")
+    return section(o.title, _saw_and_due(o), *pictures, f"<p class=small lang=en>{files}</p>" if files else "")
 
 
 def _saw_and_due(o: Outcome) -> str:

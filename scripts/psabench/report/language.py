@@ -26,21 +26,22 @@ LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
 _SEPARATOR = re.compile(r"( · |<br>|<p class=orig lang=\w+>.*?</p>)", re.DOTALL)  # the last: quotes of a source
-# What a text is about: quoted words, numbers (hexadecimal ones with their h), names of files.
+# What a text is about: quoted words, numbers (hexadecimal ones with their h), digests, names of files.
 _QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
 _NUMBER = re.compile(
-    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf)\b"
-    r"|(?<![\w.\-−])[\dA-F]+h\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf|eds)\b"
+    r"|\b[\da-f]{16,64}\b|(?<![\w.\-−])[\dA-F]+h\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
     re.DOTALL,
 )
 # The same with names of signals, registers, axes and with lists as Python prints them: a check writes one text of many.
 _UNITS = r"(?:[mµun]V|degC|SPS|kHz)\b"
 _NAME = (
-    rf"{_NUMBER.pattern}|\[[^\]]*\]|(?<![\w.\-−/])(?!{_UNITS})(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
-    r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res)\b(?!')"
+    rf"\b[\dA-F]{{2}}(?: [\dA-F]{{2}})+(?![.\w])|\bE [a-z]+(?:-[a-z]+)*|{_NUMBER.pattern}|\[[^\]]*\]|(?<![\w.\-−/])(?!{_UNITS})(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
+    r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')"
 )
 _NAMED = re.compile(_NAME, re.DOTALL)
-_LISTED = re.compile(rf"(?:{_NAME})(?:(?:,| and) (?:{_NAME}))*", re.DOTALL)
+_NAMES = re.compile(r"\b(?:Int|Data|Res|CLK|SEQ|DIn|SClk|TFS|tCLK)\b")  # lines and signals that may be a whole text
+_LISTED = re.compile(rf"(?:{_NAME})(?:, (?:{_NAME}))*", re.DOTALL)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
@@ -52,8 +53,8 @@ _SYMBOLS = re.compile(
     r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
-_GAP = re.compile(r"[;:,] |(?<=[.!?]) ")
-_CLAUSES = ("expected", "got", "saw", "due")
+_GAP = re.compile(r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[a-z])")  # the last: "5 ns" of what
+_CLAUSES, _QUOTING = ("expected", "got", "saw", "due", "said"), "said"
 
 
 @dataclass(slots=True)
@@ -117,11 +118,11 @@ class Language:
         return self._known(text) or self._clause(text) or (None if _has_words(text) else text)
 
     def _clause(self, text: str) -> str | None:
-        """What was expected, what was got (psabench.errors.expected); what was seen and what was due."""
+        """What was expected, what was got (psabench.errors.expected); what was seen, due; what a program said."""
         word, _, rest = text.partition(" ")
         if word not in _CLAUSES or word not in self.texts:
             return None
-        found = self._known(rest) or (None if _has_words(rest) else rest)
+        found = rest if word == _QUOTING else self._known(rest) or (None if _has_words(rest) else rest)
         return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
@@ -151,7 +152,7 @@ def keys_of(text: str) -> tuple[str, str, str]:
 
 
 def _has_words(text: str) -> bool:
-    return bool(_WORD.search(_SYMBOLS.sub("", key_of(text))))
+    return bool(_WORD.search(_SYMBOLS.sub("", _NAMES.sub("", key_of(text)))))
 
 
 _current: list[Language] = []  # of this run of a command; none: English
