@@ -26,6 +26,7 @@ LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
 _SEPARATOR = re.compile(r"( · |<br>|<p class=orig lang=\w+>.*?</p>)", re.DOTALL)  # the last: quotes of a source
+_TOOLTIP = re.compile(r"(<\w+\b[^<>]* title=')([^']+)(')")
 # What a text is about: quoted words, numbers (hexadecimal ones with their h), digests, names of files.
 _QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
 _NUMBER = re.compile(
@@ -71,7 +72,10 @@ class Language:
         foot = _FOOT.search(page)
         end = foot.start() if foot else len(page)
         head = page[:end].replace("<html lang=en>", f"<html lang={self.name}>", 1)
-        return _BLOCK.sub(self._block, head) + page[end:]
+        return _TOOLTIP.sub(self._tooltip, _BLOCK.sub(self._block, head)) + page[end:]
+
+    def _tooltip(self, found: re.Match[str]) -> str:
+        return found[1] + self._text(found[2]) + found[3]
 
     def _block(self, found: re.Match[str]) -> str:
         if _QUOTED.fullmatch(found[1]):
