@@ -35,10 +35,16 @@ _NUMBER = re.compile(
     re.DOTALL,
 )
 # The same with names of signals, registers, axes and with lists as Python prints them: a check writes one text of many.
-_UNITS = r"(?:[mµun]V|degC|SPS|kHz)\b"
-_NAME = (
-    rf"\b[\dA-F]{{2}}(?: [\dA-F]{{2}})+(?![.\w])|\bE [a-z]+(?:-[a-z]+)*|{_NUMBER.pattern}|\[[^\]]*\]|(?<![\w.\-−/])(?!{_UNITS})(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
-    r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')"
+_NAME = "|".join(
+    (
+        r"\b[\dA-F]{2}(?: [\dA-F]{2})+(?![.\w])",  # bytes
+        r"\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
+        r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
+        _NUMBER.pattern,
+        r"\[[^\]]*\]|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
+        r"(?<![\w.\-−/])(?!(?:[mµun]V|degC|SPS|kHz)\b)(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
+        r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')",
+    )
 )
 _NAMED = re.compile(_NAME, re.DOTALL)
 _NAMES = re.compile(r"\b(?:Int|Data|Res|CLK|SEQ|DIn|SClk|TFS|tCLK)\b")  # lines and signals that may be a whole text
@@ -54,7 +60,9 @@ _SYMBOLS = re.compile(
     r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
-_GAP = re.compile(r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[a-z])")  # the last: "5 ns" of what
+_GAP = re.compile(
+    r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[A-Za-z])| (?=\(\d+ of \d+\))"
+)  # "5 ns" of what; how many of them
 _CLAUSES, _QUOTING = ("expected", "got", "saw", "due", "said"), "said"
 
 
@@ -126,7 +134,9 @@ class Language:
         word, _, rest = text.partition(" ")
         if word not in _CLAUSES or word not in self.texts:
             return None
-        found = rest if word == _QUOTING else self._known(rest) or (None if _has_words(rest) else rest)
+        if word == _QUOTING:
+            return f"{self._known(word)} <span lang=en>{rest}</span>"
+        found = self._known(rest) or (None if _has_words(rest) else rest)
         return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
@@ -156,6 +166,9 @@ def keys_of(text: str) -> tuple[str, str, str]:
 
 
 def _has_words(text: str) -> bool:
+    named = _NAMED.sub("", _plain(text))
+    if _NUMBER.search(text) and not _WORD.search(named):  # a value of a register: STATUS 41h
+        return False
     return bool(_WORD.search(_SYMBOLS.sub("", _NAMES.sub("", key_of(text)))))
 
 

@@ -31,7 +31,7 @@ def a_form_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     text = fact(e, "form text").value
     if not isinstance(text, str) or not text:
         raise Failed("2031h is empty", "why the form was refused")
-    return f"abort {due:08X}h, EMCY, {text!r}"
+    return f"abort {due:08X}h, EMCY; said {text}"
 
 
 @check("fit", "PSA2-FIT-02")
