@@ -42,7 +42,7 @@ _NAME = "|".join(
         r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
         _NUMBER.pattern,
         r"\[[^\]]*\]|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
-        r"(?<![\w.\-−/])(?!(?:[mµun]V|degC|SPS|kHz)\b)(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+"
+        r"(?<![\w.\-−/])(?!(?:[mµun]V|degC|SPS|kHz)\b)(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+(?:-\d+)?"
         r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')",
     )
 )
@@ -57,7 +57,7 @@ _QUANTITY = re.compile(r"\{\} [A-Za-z]")  # 5 m/s: a value that is no name
 # What has no words: tags, indices, functions, units, symbols and names of data that are the same in each language.
 _SYMBOLS = re.compile(
     r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
-    r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b"
+    r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b|\b[\dA-F]{2}(?: [\dA-F]{2})+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
 _GAP = re.compile(

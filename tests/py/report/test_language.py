@@ -98,7 +98,7 @@ def test_quotes_of_a_source_and_words_of_a_program_stay_and_tooltips_are_transla
         "<td>правило<p class=orig lang=en>As it is.</p></td>"
     )
     assert ru.translate_page("<td>no frame; said no such bus, sorry</td>") == (
-        "<td>нет кадра; сообщение: no such bus, sorry</td>"
+        "<td>нет кадра; сообщение: <span lang=en>no such bus, sorry</span></td>"
     )
     assert ru.translate_page("<th title='a tip'>k</th>") == "<th title='пояснение'>k</th>"
     assert ru.missing == set()
