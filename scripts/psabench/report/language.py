@@ -38,7 +38,7 @@ _NUMBER = re.compile(
 _NAME = "|".join(
     (
         r"\b[\dA-F]{2}(?: [\dA-F]{2})+(?![.\w])",  # bytes
-        r"\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
+        r"\b[EIRW] [^;,]*? t=\d+|\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
         r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
         _NUMBER.pattern,
         r"\[[^\]]*\]|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
