@@ -29,7 +29,7 @@ def as_the_dictionary_says(s: Dut, eds: str, varies: Container[int] = ()) -> str
     beyond = int(requirements()["BUS-SDO-13"].limit("abort_code"))
     objects = [o for o in s.unit.node.objects() if o.index in OWN and o.index != BUS]
     for o in objects:
-        what = f"{o.index:04X}h:{o.sub} {o.name}"
+        what = f"{o.index:04X}h:{o.sub} ({o.name})"
         if o.access == "wo":
             continue
         data = s.unit.node.read_raw(o.index, o.sub)
@@ -38,7 +38,7 @@ def as_the_dictionary_says(s: Dut, eds: str, varies: Container[int] = ()) -> str
         if due is not None and data != due:
             raise Failed(f"{what} is {data.hex(' ')} after Res", due.hex(" "))
     for o in objects:
-        what = f"{o.index:04X}h:{o.sub} {o.name}"
+        what = f"{o.index:04X}h:{o.sub} ({o.name})"
         if o.access in ("ro", "const"):
             same = bytes(o.data_bytes or 1)
             refused(lambda o=o, d=same: s.unit.node.write_raw(o.index, o.sub, d), READ_ONLY, f"a write to {what}")  # type: ignore[misc]

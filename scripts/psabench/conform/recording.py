@@ -330,7 +330,7 @@ def _outcome_of(bench: Bench, proof: SuiteTest, rows: tuple[Requirement, ...], k
         try:
             return proof.test(bench.part(capture, plan))
         except Failed as e:
-            e.saw += f" ({words})" if words else ""
+            e.saw += f"; {words}" if words else ""
             raise
         except (Inconclusive, BenchError) as e:  # what a recording lacks cannot be asked for
             raise Unseen(str(e)) from e

@@ -42,7 +42,7 @@ MARKS = {
     Verdict.NOT_APPLICABLE: "n/a",
 }
 
-SUITE_LANGUAGE = "en"  # of the requirements, their tests and what these saw: quoted in reports of each language
+PAGES = ("docs/", "proto/", "CiA ", "ISO ")  # sources that are pages, files, standards: named alike in each language
 CSS = {Verdict.PASSED: "v-passed", Verdict.FAILED: "v-failed", Verdict.INCONCLUSIVE: "v-inconclusive"}
 
 
@@ -265,6 +265,8 @@ def html_page(run: Run, folder: Path) -> str:
         _table(run),
         _signed(run),
     ]
+    if run.suite == "host":  # its subject is a command line
+        return whole_page("Conformance of a host program", {"program": run.subject, **run.facts}, body)
     return whole_page(f"Conformance of {run.subject}", run.facts, body)
 
 
@@ -275,24 +277,26 @@ def _verdict(run: Run) -> str:
 
 
 def _failure(o: Outcome, folder: Path) -> str:
-    rows = requirements().rows
-    due = "".join(
-        f"<p lang=en><b>{i}</b> {escape(rows[i].text)}</p>{_original(rows[i].original)}" for i in o.requirements
-    )
-    at = "" if o.at_ns is None else f" at {o.at_ns * 1e-6:.6f} ms"
     pictures = [figure((folder / name).read_text(encoding="utf-8")) for name in o.excerpts if name.endswith(".svg")]
     files = ", ".join(f"<a href='{escape(name)}'>{escape(name)}</a>" for name in o.excerpts)
-    return section(
-        o.title,
-        f"{due}<p>Saw <b>{quoted_html(o.saw)}</b>{at}; due {quoted_html(o.due)}.</p>",
-        *pictures,
-        f"<p class=small>{files}</p>" if files else "",
-        lang=SUITE_LANGUAGE,
-    )
+    return section(o.title, _saw_and_due(o), *pictures, f"<p class=small lang=en>{files}</p>" if files else "")
 
 
-def _original(text: str) -> str:
-    return f"<p class=orig>{escape(text)}</p>" if text else ""
+def _saw_and_due(o: Outcome) -> str:
+    """What was required, what was seen and when: a table, so that each text of it is looked up by itself."""
+    rows = [(f"<td class=id>{i}</td>", _required(requirements().rows[i])) for i in o.requirements]
+    at = [] if o.at_ns is None else [("at", f"{o.at_ns * 1e-6:.6f} ms")]
+    rows += [(f"<td>{name}</td>", escape(text)) for name, text in (("saw", o.saw), *at, ("due", o.due))]
+    return html_table("", "".join(f"<tr>{head}<td>{text}</td></tr>" for head, text in rows))
+
+
+def _required(r: Requirement) -> str:
+    """The sentence, and the article's under it, in its language."""
+    return escape(r.text) + (f"<p class=orig lang=ru>{escape(r.original)}</p>" if r.original else "")
+
+
+def _sources(r: Requirement) -> str:
+    return "; ".join(quoted_html(s) if s.startswith(PAGES) else escape(s) for s in r.source)
 
 
 def _table(run: Run) -> str:
@@ -303,9 +307,8 @@ def _table(run: Run) -> str:
     verdicts = run.verdicts()
     rows = "".join(
         f"<tr><td class=id>{r.id}</td><td class={CSS.get(verdicts[r.id], 'v-other')}>{verdicts[r.id].value}</td>"
-        f"<td lang={SUITE_LANGUAGE}>{escape(r.text)}{_original(r.original)}</td>"
-        f"<td lang={SUITE_LANGUAGE}>{escape('; '.join(r.source))}</td><td>{r.grade}</td>"
-        f"<td lang={SUITE_LANGUAGE}>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
+        f"<td>{_required(r)}</td><td>{_sources(r)}</td><td>{r.grade}</td>"
+        f"<td>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
         for r in run.rows
     )
     head = "".join(f"<th>{h}</th>" for h in ("", "verdict", "requirement", "source", "grade", "seen"))
@@ -313,7 +316,7 @@ def _table(run: Run) -> str:
 
 
 def _seen(outcomes: list[Outcome], unobservable: str) -> str:
-    told = [f"{escape(o.title)} {escape(o.saw or o.reason)}" for o in outcomes]
+    told = [f"{escape(o.title)}<br>{escape(o.saw or o.reason)}" for o in outcomes]
     return "<br>".join(told) or escape(unobservable)
 
 

@@ -25,14 +25,30 @@ ENGLISH, OPTION = "en", "--lang"
 LOCALE = Path(__file__).with_name("locale")
 _BLOCK = re.compile(r"(<(h1|h2|p|td|th|li|figcaption|summary|text|title)\b[^>]*>)(.*?)(</\2>)", re.DOTALL)
 _FOOT = re.compile(r"<footer>.*?</footer>", re.DOTALL)  # provenance: names of fields are those of result.json
-_SEPARATOR = re.compile(r"( · |<br>)")
-# What a text is about: quoted words, numbers, names of files.
+_SEPARATOR = re.compile(r"( · |<br>|<p class=orig lang=\w+>.*?</p>)", re.DOTALL)  # the last: quotes of a source
+_TOOLTIP = re.compile(r"(<\w+\b[^<>]* title=')([^']+)(')")
+# What a text is about: quoted words, numbers (hexadecimal ones with their h), digests, names of files.
 _QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
 _NUMBER = re.compile(
-    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf)\b"
-    r"|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
+    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf|eds)\b"
+    r"|\b[\da-f]{16,64}\b|(?<![\w.\-−])[\dA-F]+h\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
     re.DOTALL,
 )
+# The same with names of signals, registers, axes and with lists as Python prints them: a check writes one text of many.
+_NAME = "|".join(
+    (
+        r"\b[\dA-F]{2}(?: [\dA-F]{2})+(?![.\w])",  # bytes
+        r"\b[EIRW] [^;,]*? t=\d+|\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
+        r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
+        _NUMBER.pattern,
+        r"\[[^\]]*\]|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
+        r"(?<![\w.\-−/])(?!(?:[mµun]V|degC|SPS|kHz)\b)(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+(?:-\d+)?"
+        r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')",
+    )
+)
+_NAMED = re.compile(_NAME, re.DOTALL)
+_NAMES = re.compile(r"\b(?:Int|Data|Res|CLK|SEQ|DIn|SClk|TFS|tCLK)\b")  # lines and signals that may be a whole text
+_LISTED = re.compile(rf"(?:{_NAME})(?:, (?:{_NAME}))*", re.DOTALL)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z]{2}")
@@ -41,11 +57,13 @@ _QUANTITY = re.compile(r"\{\} [A-Za-z]")  # 5 m/s: a value that is no name
 # What has no words: tags, indices, functions, units, symbols and names of data that are the same in each language.
 _SYMBOLS = re.compile(
     r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
-    r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b"
+    r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b|\b[\dA-F]{2}(?: [\dA-F]{2})+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
-_GAP = re.compile(r"[;:,] |(?<=[.!?]) ")
-_CLAUSES = ("expected", "got")
+_GAP = re.compile(
+    r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[A-Za-z])| (?=\(\d+ of \d+\))"
+)  # "5 ns" of what; how many of them
+_CLAUSES, _QUOTING = ("expected", "got", "saw", "due", "said"), "said"
 
 
 @dataclass(slots=True)
@@ -62,7 +80,10 @@ class Language:
         foot = _FOOT.search(page)
         end = foot.start() if foot else len(page)
         head = page[:end].replace("<html lang=en>", f"<html lang={self.name}>", 1)
-        return _BLOCK.sub(self._block, head) + page[end:]
+        return _TOOLTIP.sub(self._tooltip, _BLOCK.sub(self._block, head)) + page[end:]
+
+    def _tooltip(self, found: re.Match[str]) -> str:
+        return found[1] + self._text(found[2]) + found[3]
 
     def _block(self, found: re.Match[str]) -> str:
         if _QUOTED.fullmatch(found[1]):
@@ -109,29 +130,46 @@ class Language:
         return self._known(text) or self._clause(text) or (None if _has_words(text) else text)
 
     def _clause(self, text: str) -> str | None:
-        """Of psabench.errors.expected: what was expected, what was got."""
+        """What was expected, what was got (psabench.errors.expected); what was seen, due; what a program said."""
         word, _, rest = text.partition(" ")
         if word not in _CLAUSES or word not in self.texts:
             return None
+        if word == _QUOTING:
+            return f"{self._known(word)} <span lang=en>{rest}</span>"
         found = self._known(rest) or (None if _has_words(rest) else rest)
         return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
-        key, numbers = key_of(text), _NUMBER.findall(text)
-        words = self.texts.get(key)
-        if not words or key.count("{}") != len(numbers):  # braces of its own: a schema, a regular expression
-            return None
-        self.found.add(key)
-        return words.format(*numbers)
+        plain = _plain(text)
+        for blanked in (_NUMBER, _NAMED, _LISTED):
+            key, taken = blanked.sub("{}", plain), blanked.findall(plain)
+            words = self.texts.get(key)
+            if words and key.count("{}") == len(taken):  # else braces of its own: a schema, a regular expression
+                self.found.add(key)
+                return words.format(*taken)
+        return None
+
+
+def _plain(text: str) -> str:
+    return text.strip().replace("&#x27;", "'").replace("&quot;", '"')
 
 
 def key_of(text: str) -> str:
     """The msgid of a text."""
-    return _NUMBER.sub("{}", text.strip().replace("&#x27;", "'").replace("&quot;", '"'))
+    return _NUMBER.sub("{}", _plain(text))
+
+
+def keys_of(text: str) -> tuple[str, str, str]:
+    """The msgids that fit a text, the closest first: without its numbers; its names, too; its lists of both as one."""
+    plain = _plain(text)
+    return tuple(blanked.sub("{}", plain) for blanked in (_NUMBER, _NAMED, _LISTED))
 
 
 def _has_words(text: str) -> bool:
-    return bool(_WORD.search(_SYMBOLS.sub("", key_of(text))))
+    named = _NAMED.sub("", _plain(text))
+    if _NUMBER.search(text) and not _WORD.search(named):  # a value of a register: STATUS 41h
+        return False
+    return bool(_WORD.search(_SYMBOLS.sub("", _NAMES.sub("", key_of(text)))))
 
 
 _current: list[Language] = []  # of this run of a command; none: English

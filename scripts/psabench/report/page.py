@@ -104,10 +104,10 @@ def quoted_html(text: str) -> str:
     return f"<span lang=en>{escape(text)}</span>"
 
 
-def section(heading: str, *parts: str, kind: str = "", lang: str = "") -> str:
-    """A card; parts are HTML. lang: the heading is quoted, in this language."""
-    mark, quote = f" class={kind}" if kind else "", f" lang={lang}" if lang else ""
-    return f"<section{mark}><h2{quote}>{escape(heading)}</h2>{''.join(parts)}</section>"
+def section(heading: str, *parts: str, kind: str = "") -> str:
+    """A card; parts are HTML."""
+    mark = f" class={kind}" if kind else ""
+    return f"<section{mark}><h2>{escape(heading)}</h2>{''.join(parts)}</section>"
 
 
 def table(

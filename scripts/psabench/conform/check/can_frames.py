@@ -69,7 +69,7 @@ def frames_have_the_identifiers_of_the_node(e: Capture) -> str:
     missing = [what for can_id, what in services.items() if can_id not in mine]
     stray = [f for f in e.can.frames if _is_stray(e, f)]
     none_of(stray, lambda f: f"a frame {f.can_id:03X}h, which is no message of the unit", "its own", frames=stray)
-    conclusive(not missing, f"no {', '.join(missing)} in the log")
+    conclusive(not missing, f"not in the log: {', '.join(missing)}")
     if not mine & {i + e.node for i in pdos(e.variant.family).values()}:
         raise Failed(f"frames {', '.join(f'{i:03X}h' for i in sorted(mine))}", "TPDOs at the identifiers of the page")
     return f"frames {', '.join(f'{i:03X}h' for i in sorted(mine))}"

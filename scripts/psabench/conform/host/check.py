@@ -108,9 +108,9 @@ class HostCapture:
         return m
 
     def last_words(self) -> str:
-        """What the host has complained of last, in brackets."""
+        """What the host has complained of last, as the end of a sentence."""
         line = self.errors.strip().splitlines()[-1:]
-        return f" ({line[0][:200]})" if line else ""
+        return f"; said {line[0][:200]}" if line else ""
 
     def wall_s(self, begin_s: float, end_s: float) -> float:
         """How long a host may have held that simulated time for, which passes slower on a loaded machine."""

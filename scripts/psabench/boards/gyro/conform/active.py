@@ -29,7 +29,7 @@ def modes_that_cannot_be_are_refused(s: Dut, row: Requirement) -> str:
     expect(reason, "no reason in 2031h", "one in words")
     calm(s)
     s.unit.node.write(OD.CONTROL, 1, int(Mode.LEVEL))
-    return f"refused: {reason}"
+    return f"refused; said {reason}"
 
 
 @active("GYRO-MODE-10", needs={"can"}, after=calm)

@@ -83,7 +83,7 @@ def objects_have_type_rights_default_and_limits(e: Capture) -> str:
     rows: list[Row] = fact(e, "rows")
     beyond = int(row_for(e, "PSA2-FORM-07").limit("abort_code"))
     for r in rows:
-        d, name = r.due, f"{r.due.index:04X}h:{r.due.sub} {r.due.name}"
+        d, name = r.due, f"{r.due.index:04X}h:{r.due.sub} ({r.due.name})"
         if d.access == "wo":
             expect(r.abort == WRITE_ONLY, f"{name} read: abort {r.abort:08X}h", f"{WRITE_ONLY:08X}h")
             continue

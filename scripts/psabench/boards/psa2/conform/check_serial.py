@@ -52,7 +52,7 @@ def temp_messages(e: Capture) -> list[Message]:
 
 def least(e: Capture, saw_ns: Floats, at_ns: Ints, due_ns: float, what: str, lines: Sequence[str]) -> str:
     """Raises Failed for the shortest of intervals that is too short, Inconclusive for none."""
-    conclusive(len(saw_ns), f"nothing was recorded of {what}")
+    conclusive(len(saw_ns), f"nothing was recorded: {what}")
     k = int(np.argmin(saw_ns))
     if saw_ns[k] < due_ns - e.slack_ns(due_ns):
         raise Failed(f"{saw_ns[k]:.0f} ns {what}", f"not less than {due_ns:.1f} ns", at_ns=int(at_ns[k]), lines=lines)
@@ -63,7 +63,7 @@ def near(
     e: Capture, saw_ns: Floats, at_ns: Ints, due_ns: float, slack_ns: float, what: str, lines: Sequence[str]
 ) -> str:
     """Raises Failed for the interval that is farthest off, if it is too far; Inconclusive for none."""
-    conclusive(len(saw_ns), f"nothing was recorded of {what}")
+    conclusive(len(saw_ns), f"nothing was recorded: {what}")
     k = int(np.argmax(np.abs(saw_ns - due_ns)))
     allowed_ns = slack_ns + e.slack_ns(due_ns)
     saw, due = f"{saw_ns[k]:.1f} ns {what}", f"{due_ns:.1f} +- {allowed_ns:.1f} ns"

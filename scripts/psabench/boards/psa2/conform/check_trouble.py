@@ -31,7 +31,7 @@ def a_form_that_does_not_fit_is_refused(e: Capture, row: Requirement) -> str:
     text = fact(e, "form text").value
     if not isinstance(text, str) or not text:
         raise Failed("2031h is empty", "why the form was refused")
-    return f"abort {due:08X}h, EMCY, {text!r}"
+    return f"abort {due:08X}h, EMCY; said {text}"
 
 
 @check("fit", "PSA2-FIT-02")
@@ -60,8 +60,8 @@ def worst_case_times_are_those_of_the_table(e: Capture, row: Requirement) -> str
     for name in ("rate text", "form text"):
         text = fact(e, name).value
         if not isinstance(text, str) or due not in text:
-            raise Failed(repr(text), f"{due} for the pair")
-    return str(fact(e, "rate text").value)
+            raise Failed(f"2031h; said {text!r}", f"{due} for the pair")
+    return f"2031h; said {fact(e, 'rate text').value}"
 
 
 # ---- trouble

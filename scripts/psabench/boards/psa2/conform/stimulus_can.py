@@ -46,6 +46,9 @@ class Answer:
     value: object = None
     abort: int = 0
 
+    def __str__(self) -> str:
+        return f"abort {self.abort:08X}h" if self.abort else str(self.value)
+
 
 def answer_of(access: Callable[[], object]) -> Answer:
     """What comes of an access by SDO. Raises LinkError where no one answers."""
