@@ -21,7 +21,7 @@ import can
 from can.interfaces.slcan import slcanBus
 from can.interfaces.socketcan import SocketcanBus
 
-from psabench.errors import BadInput, LinkError, TimeOut, expected
+from psabench.errors import BadInput, LinkError, TimeOut, expected, link_error
 from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
 from psabench.link.socketcand_bus import SocketcandBus
@@ -382,7 +382,8 @@ def _greet(host: str, port: int) -> None:
         with socket.create_connection((host, port), GREETING_S) as s:
             hello = s.recv(256)
     except OSError as e:
-        raise LinkError(f"--can socketcand:{host}:{port}: {e.strerror or e}; is psa-emu running there?") from e
+        where = f"--can socketcand:{host}:{port}"
+        raise link_error(where, "a socketcand server", e, "is psa-emu running there?") from e
     if hello != b"< hi >":
         raise LinkError(expected("a socketcand server", "another answer", f"--can socketcand:{host}:{port}"))
 
