@@ -60,8 +60,18 @@ def path_found(e: Exception) -> str:
     """What there was in place of a file or a port, by the error it gave: for `expected`."""
     if isinstance(e, UnicodeDecodeError):
         return "bytes that are not UTF-8"
-    reason = (FOUND.get(e.errno or 0) or e.strerror) if isinstance(e, OSError) else None
-    return reason or " ".join(str(e).split())[:160]
+    number = _errno_of(e)
+    return FOUND.get(number) or (os.strerror(number) if number else " ".join(str(e).split())[:160])
+
+
+def _errno_of(e: BaseException | None) -> int:
+    """Of the error, or of those that led to it: pySerial and python-can wrap them. 0: none has one."""
+    while e is not None:
+        number = getattr(e, "errno", None) or next(iter(e.args), None)
+        if isinstance(number, int) and number > 0:
+            return number
+        e = e.__cause__ or e.__context__
+    return 0
 
 
 def input_error(where: object, what: str, e: Exception) -> BadInput:
@@ -110,6 +120,10 @@ def link_error(where: object, what: str, e: Exception, hint: str = "") -> LinkEr
 def listen_error(where: str, port: int, e: Exception) -> LinkError:
     """The error of a port of this machine that could not be listened at."""
     return LinkError(expected("a free port of 127.0.0.1 or 0 (any free port)", f"{port}: {path_found(e)}", where))
+
+
+class StartError(BenchError):
+    """The emulator did not start: what the machine lacks, as a free port."""
 
 
 class ControlError(BenchError):

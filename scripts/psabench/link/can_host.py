@@ -337,7 +337,7 @@ def open_bus(spec: str | None) -> can.BusABC:
             raise BadInput(expected(what, f"none that python-can opens ({e})", "--can")) from e
         raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
-        raise LinkError(f"--can {spec}: {e}") from e
+        raise link_error(f"--can {spec}", "a CAN adapter", e) from e
 
 
 def _open_interface(arguments: dict[str, Any]) -> can.BusABC:
