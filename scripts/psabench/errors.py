@@ -61,7 +61,11 @@ def path_found(e: Exception) -> str:
     if isinstance(e, UnicodeDecodeError):
         return "bytes that are not UTF-8"
     number = _errno_of(e)
-    return FOUND.get(number) or (os.strerror(number) if number else " ".join(str(e).split())[:160])
+    return FOUND.get(number) or getattr(e, "strerror", None) or (os.strerror(number) if number else _in_one_line(e))
+
+
+def _in_one_line(e: Exception) -> str:
+    return " ".join(str(e).split())[:160]
 
 
 def _errno_of(e: BaseException | None) -> int:
