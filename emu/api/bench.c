@@ -1,6 +1,7 @@
 #include "api/internal.h"
 
 #include "base/text.h"
+#include "base/why.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -87,5 +88,9 @@ int psabench_vcd(psabench *b, const char *path)
     if (closed) return closed;
     if (!path) return api_fail(b, PSABENCH_BAD_ARGUMENT, "psabench_vcd(): expected a path, got NULL");
     const int error = api_vcd_begin(b, path);
-    return error ? api_fail(b, PSABENCH_SYSTEM, "%.200s: %s", path, strerror(error)) : PSABENCH_OK;
+    char why[320], where[208];
+    if (!error) return PSABENCH_OK;
+    snprintf(where, sizeof where, "%.200s", path);
+    why_unwritable(why, sizeof why, where, error);
+    return api_fail(b, PSABENCH_SYSTEM, "%s", why);
 }

@@ -144,7 +144,7 @@ static bool check_path(const char *path, char *why)
         return why_fail(why, CONTROL_WHY_MAX, "%.100s: expected a regular file or none, got another kind of file",
                         path);
     if (access(folder, W_OK | X_OK) == 0) return true;
-    return why_fail(why, CONTROL_WHY_MAX, "%.100s: %s", path, strerror(errno));
+    return why_unwritable(why, CONTROL_WHY_MAX, path, errno);
 }
 
 /* False without memory. */

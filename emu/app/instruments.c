@@ -168,9 +168,7 @@ static bool open_port(struct instruments *all, const struct scpi_kind *kind, con
     snprintf(where, sizeof where, "--scpi %s%s%s", o->arg, many && name ? ": " : "", many && name ? name : "");
     const struct pty pty = i->port.pty;
     free(i);
-    if (err != -EADDRINUSE) return pty_fail(&pty, where, err, why, cap);
-    return why_fail(why, cap, "%s: expected a free port of 127.0.0.1 or 0 (any free port), got %u, which is in use",
-                    where, port);
+    return o->pty ? pty_fail(&pty, where, err, &all->refused, why, cap) : why_port(why, cap, where, -err);
 }
 
 /* `all` are those that the scenario has, each at an offset of its own whatever else there is. */

@@ -23,6 +23,7 @@ struct instruments {
     struct sched *sched;
     struct instrument *port[INSTRUMENTS_MAX];
     unsigned count;
+    bool refused; /* a pseudo-terminal could not be opened, and another name would do */
     struct scpi *sessions;
 };
 

@@ -167,11 +167,9 @@ static bool open_port(struct logic_ports *all, struct links *links, struct bench
         }
     }
     free(p);
-    if (err == -EADDRINUSE)
-        return why_fail(
-            why, cap, "--logic beaglelogic:%u: expected a free port of 127.0.0.1 or 0 (any free port), got one in use",
-            o->logic[i].port);
-    return err ? why_fail(why, cap, "--logic beaglelogic:%u: %s", o->logic[i].port, strerror(-err)) : false;
+    char where[48];
+    snprintf(where, sizeof where, "--logic beaglelogic:%u", o->logic[i].port);
+    return err ? why_port(why, cap, where, -err) : false;
 }
 
 bool logic_open(struct logic_ports *all, struct links *links, struct bench *b, const struct options *o, char *why,

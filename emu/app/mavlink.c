@@ -256,17 +256,16 @@ bool mavlink_check(const struct bench *b, const struct options *o, char *why, si
     return true;
 }
 
-static bool fail_open(const struct mavlink *m, int err, char *why, size_t cap)
+static bool fail_open(const struct mavlink *m, int err, bool *user, char *why, size_t cap)
 {
     char where[512];
     snprintf(where, sizeof where, "--mavlink %s", m->o->arg);
-    if (err == -EADDRINUSE)
-        return why_fail(why, cap, "%s: expected a free port of 127.0.0.1 or 0 (any free port), got one in use", where);
-    return pty_fail(&m->port.pty, where, err, why, cap);
+    if (m->o->kind != MAV_PTY) return why_port(why, cap, where, -err);
+    return pty_fail(&m->port.pty, where, err, user, why, cap);
 }
 
 struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
-                             const struct mav_options *a, char *why, size_t cap)
+                             const struct mav_options *a, bool *refused, char *why, size_t cap)
 {
     struct mavlink *m = calloc(1, sizeof *m);
     const unsigned unit = (unsigned)find_unit(b, a->unit);
@@ -289,7 +288,7 @@ struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct
     open_station(m, o, params);
     const int err = mav_port_open(&m->port, a->link[0] ? a->link : NULL);
     if (err) {
-        fail_open(m, err, why, cap);
+        fail_open(m, err, refused, why, cap);
         mav_station_close(&m->port.station);
         mavlink_free(m);
         return NULL;

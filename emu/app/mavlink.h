@@ -21,9 +21,9 @@ struct mavlink {
 /* Whether the bench has the units that the options name. False with one line in why. */
 bool mavlink_check(const struct bench *b, const struct options *o, char *why, size_t cap);
 
-/* Opens one, checked; hubs: those of the buses. NULL with one line in why. */
+/* Opens one, checked; hubs: those of the buses. NULL with one line in why; *refused: another name would do. */
 struct mavlink *mavlink_open(struct bench *b, struct can_hub *hubs, const struct options *o,
-                             const struct mav_options *m, char *why, size_t cap);
+                             const struct mav_options *m, bool *refused, char *why, size_t cap);
 
 /* A reading as a station takes it. Pure. */
 struct mav_reading mavlink_reading(const struct psa2_reading *r);

@@ -10,11 +10,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, int err, const struct pty *pty)
+/* An error of a pty, and whether it lies with the name that was given. */
+struct pty_error {
+    const struct pty *pty;
+    int err;
+    bool *user;
+};
+
+static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, struct pty_error e)
 {
     char where[1024];
     snprintf(where, sizeof where, "%s%s", option, arg);
-    return pty_fail(pty, where, err, why, cap);
+    return pty_fail(e.pty, where, e.err, e.user, why, cap);
 }
 
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
@@ -27,26 +34,25 @@ _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) 
 
 /* ---- CAN */
 
-static bool fail_busy(char *why, size_t cap, const char *kind, unsigned port)
+static bool fail_port(char *why, size_t cap, const char *kind, unsigned port, int err)
 {
-    return why_fail(why, cap, "--can %s:%u: expected a free port of 127.0.0.1 or 0 (any free port), got one in use",
-                    kind, port);
+    char where[64];
+    snprintf(where, sizeof where, "--can %s:%u", kind, port);
+    return why_port(why, cap, where, -err);
 }
 
 static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
                             size_t cap)
 {
     const int err = socketcand_listen(&c->socketcand, hub, c->hubs, o->port);
-    if (!err) return true;
-    if (err == -EADDRINUSE) return fail_busy(why, cap, "socketcand", o->port);
-    return why_fail(why, cap, "--can socketcand:%u: %s", o->port, strerror(-err));
+    return !err || fail_port(why, cap, "socketcand", o->port, err);
 }
 
 static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
-    return !err ||
-           fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "", err, &c->slcan.pty);
+    return !err || fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "",
+                            (struct pty_error){&c->slcan.pty, err, &c->refused});
 }
 
 static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -68,7 +74,7 @@ static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struc
         return why_fail(why, cap, "--can socketcan:%s: expected a kernel with CAN; use --can socketcand or --can slcan",
                         o->arg);
     }
-    return why_fail(why, cap, "--can socketcan:%s: %s", o->arg, strerror(-err));
+    return why_fail(why, cap, "--can socketcan:%s: expected a CAN interface, got \"%s\"", o->arg, strerror(-err));
 }
 
 static bool open_udp(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -88,16 +94,14 @@ static bool open_udp(struct can_hub *hub, struct ports_can *c, const struct opti
             "add 239.0.0.0/8 dev lo, or run all programs in `unshare -rn` after these commands",
             o->arg);
     }
-    return why_fail(why, cap, "--can udp:%s: %s", o->arg, strerror(-err));
+    return why_fail(why, cap, "--can udp:%s: expected a multicast group, got \"%s\"", o->arg, strerror(-err));
 }
 
 static bool open_cannelloni(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why,
                             size_t cap)
 {
     const int err = cannelloni_can_open(&c->cannelloni, hub, o->tunnel);
-    if (!err) return true;
-    if (err == -EADDRINUSE) return fail_busy(why, cap, "cannelloni", o->tunnel.own);
-    return why_fail(why, cap, "--can cannelloni:%u: %s", o->tunnel.own, strerror(-err));
+    return !err || fail_port(why, cap, "cannelloni", o->tunnel.own, err);
 }
 
 static bool open_log(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -189,7 +193,7 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     const struct pty pty = p->line ? p->line->pty : (struct pty){0};
     free(p->line);
     p->line = NULL;
-    return fail_pty(why, cap, "--line ", o->line, err, &pty);
+    return fail_pty(why, cap, "--line ", o->line, (struct pty_error){&pty, err, &p->refused});
 }
 
 /* ---- bus ports: cycles of the parallel buses of units as lines of text */
@@ -289,7 +293,7 @@ static bool open_bus_port(struct ports *p, struct bench *b, const struct options
     }
     const struct pty pty = bus->pty.pty;
     free(bus);
-    return fail_pty(why, cap, "--bus-port ", o->arg, err, &pty);
+    return fail_pty(why, cap, "--bus-port ", o->arg, (struct pty_error){&pty, err, &p->refused});
 }
 
 static bool open_bus_ports(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
@@ -330,7 +334,7 @@ static bool open_serial_port(struct ports *p, struct bench *b, const struct opti
     if (err) {
         const struct pty pty = port->pty.pty.pty;
         free(port);
-        return fail_pty(why, cap, "--serial ", o->arg, err, &pty);
+        return fail_pty(why, cap, "--serial ", o->arg, (struct pty_error){&pty, err, &p->refused});
     }
     port->unit->type->serial->connect(port->unit->board, serial_pty_byte, &port->pty);
     notice_unfit(port);
@@ -353,25 +357,28 @@ static void close_serial_port(struct serial_port *p)
 
 /* ---- sockets and file */
 
-static bool open_socket(struct ctl_server *s, const char *option, const char *path, char *why, size_t cap)
+static bool open_socket(struct ports *p, struct ctl_server *s, const char *option, const char *path, char *why,
+                        size_t cap)
 {
+    char where[1024];
     if (!path) return true;
     long owner = 0;
     const int err = ctl_listen(s, path, &owner);
     if (!err) return true;
+    snprintf(where, sizeof where, "--%s %s", option, path);
+    p->refused = err != -EADDRINUSE && !why_machine(-err);
     if (err == -EADDRINUSE)
-        return why_fail(why, cap, "--%s %s: expected a free path, got one that another process uses, pid %ld", option,
-                        path, owner);
-    if (err == -EEXIST)
-        return why_fail(why, cap, "--%s %s: expected a new path or a socket, got another file", option, path);
-    if (err == -ENAMETOOLONG) return why_fail(why, cap, "--%s %s: expected up to %u bytes", option, path, CTL_PATH_MAX);
-    return why_fail(why, cap, "--%s %s: %s", option, path, strerror(-err));
+        return why_fail(why, cap, "%s: expected a free path, got one that another process uses, pid %ld", where, owner);
+    if (err == -EEXIST) return why_expected(why, cap, where, "another file", "a new path or a socket");
+    if (err == -ENAMETOOLONG)
+        return why_fail(why, cap, "%s: expected up to %u bytes, got %zu", where, CTL_PATH_MAX, strlen(path));
+    return why_unwritable(why, cap, where, -err);
 }
 
 static bool open_mavlinks(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
 {
     for (unsigned i = 0; i < o->mavlink_count; i++) {
-        struct mavlink *m = mavlink_open(b, p->hub, o, &o->mavlink[i], why, cap);
+        struct mavlink *m = mavlink_open(b, p->hub, o, &o->mavlink[i], &p->refused, why, cap);
         if (!m) return false;
         p->mavlink[p->mavlink_count++] = m;
     }
@@ -439,8 +446,8 @@ bool ports_open(struct ports *p, struct bench *b, const struct options *o, char 
     return open_can(p, o, why, cap) && open_line(p, b, o, why, cap) && open_bus_ports(p, b, o, why, cap) &&
            open_serial_ports(p, b, o, why, cap) && logic_open(&p->logic, &p->links, b, o, why, cap) &&
            open_mavlinks(p, b, o, why, cap) && open_vcd(p, b, o, why, cap) && instruments_open(&p->scpi, o, why, cap) &&
-           open_socket(&p->control, "control", o->control, why, cap) &&
-           open_socket(&p->truth, "truth", o->truth, why, cap);
+           open_socket(p, &p->control, "control", o->control, why, cap) &&
+           open_socket(p, &p->truth, "truth", o->truth, why, cap);
 }
 
 static void close_can(struct ports_can *c)

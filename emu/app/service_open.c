@@ -243,6 +243,6 @@ bool service_open(struct service *s, struct bench *b, const struct options *o, c
     if (s->refused) return false;
     if (ports_open(&s->ports, b, o, why, cap))
         return service_open_truth_log(s, why, cap) && service_open_lcm(s, why, cap);
-    s->refused = s->ports.refused;
+    s->refused = s->ports.refused || s->ports.scpi.refused;
     return false;
 }

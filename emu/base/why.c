@@ -2,6 +2,7 @@
 
 #include "base/text.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -31,6 +32,47 @@ bool why_expected(char *why, size_t cap, const char *where, const char *got, con
     why_vexpected(why, cap, where, got, expected, ap);
     va_end(ap);
     return false;
+}
+
+const char *why_found(int err)
+{
+    static const struct {
+        int err;
+        const char *text;
+    } found[] = {{ENOENT, "no such file"},
+                 {EISDIR, "a folder"},
+                 {ENOTDIR, "a file among the folders of the path"},
+                 {EACCES, "one without permission"},
+                 {EPERM, "one without permission"},
+                 {EROFS, "a read-only file system"},
+                 {ELOOP, "a loop of links"},
+                 {ENAMETOOLONG, "too long a name"},
+                 {ENXIO, "a socket, or a pipe without a reader"},
+                 {EADDRINUSE, "one in use"},
+                 {ENETUNREACH, "none"}};
+    for (size_t i = 0; i < sizeof found / sizeof *found; i++)
+        if (found[i].err == err) return found[i].text;
+    return strerror(err);
+}
+
+bool why_machine(int err)
+{
+    static const int machine[] = {ENOSPC, EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ESTALE};
+    for (size_t i = 0; i < sizeof machine / sizeof *machine; i++)
+        if (machine[i] == err) return true;
+    return false;
+}
+
+bool why_unwritable(char *why, size_t cap, const char *where, int err)
+{
+    if (why_machine(err)) return why_fail(why, cap, "%s: %s", where, strerror(err));
+    const char *const got = err == ENOENT ? "no such folder" : why_found(err);
+    return why_expected(why, cap, where, got, "a path that can be written");
+}
+
+bool why_port(char *why, size_t cap, const char *where, int err)
+{
+    return why_expected(why, cap, where, why_found(err), "a free port of 127.0.0.1 or 0 (any free port)");
 }
 
 const char *why_text(char out[WHY_TEXT_MAX], const char *text)

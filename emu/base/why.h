@@ -14,6 +14,17 @@ __attribute__((format(printf, 5, 6))) bool why_expected(char *why, size_t cap, c
                                                         const char *expected, ...);
 bool why_vexpected(char *why, size_t cap, const char *where, const char *got, const char *expected, va_list ap);
 
+/* What there is at a path or a port, by an error of errno: "no such file"; any other error in the system's words. */
+const char *why_found(int err);
+
+/* Whether an error of a file lies with the machine (no space, descriptors or memory; a failing disk) or else with the path
+ * that the user gave. */
+bool why_machine(int err);
+
+/* A file, a socket or a link that could not be made, a port that could not be listened at. False. */
+bool why_unwritable(char *why, size_t cap, const char *where, int err);
+bool why_port(char *why, size_t cap, const char *where, int err);
+
 /* What was got: a text in quotes, cut where it is long; a number. They live as long as the block they are in. */
 #define WHY_TEXT(text) why_text((char[WHY_TEXT_MAX]){0}, (text))
 #define WHY_REAL(x)    why_real((char[WHY_REAL_MAX]){0}, (x))

@@ -81,14 +81,14 @@ bool snapshot_write(const char *path, struct journal *j, const char *scenario, c
     if (lstat(path, &there) == 0 && !S_ISREG(there.st_mode) && !S_ISDIR(there.st_mode))
         return why_fail(why, cap, "%s: expected a file or a new name, got another kind of file", path);
     struct writer w = {.out = fopen(part, "wbe")};
-    if (!w.out) return why_fail(why, cap, "%s: %s", path, strerror(errno));
+    if (!w.out) return why_unwritable(why, cap, path, errno);
     put_all(&w, j, scenario);
     w.failed |= fflush(w.out) != 0 || fsync(fileno(w.out)) < 0;
     const int err = errno;
     w.failed |= fclose(w.out) != 0;
     if (!w.failed && rename(part, path) == 0) return true;
     unlink(part);
-    return why_fail(why, cap, "%s: %s", path, strerror(w.failed ? err : errno));
+    return why_unwritable(why, cap, path, w.failed ? err : errno);
 }
 
 /* ---- reading */
@@ -216,7 +216,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
 {
     FILE *in = fopen(path, "rbe");
     if (!in) {
-        why_fail(why, cap, "%s: %s", path, strerror(errno));
+        why_expected(why, cap, path, why_found(errno), "a snapshot");
         return NULL;
     }
     size_t room = 1 << 16;
@@ -230,6 +230,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
         text = more;
         room *= 2;
     }
+    const int err = errno;
     const bool bad = ferror(in);
     fclose(in);
     if (text && !bad) {
@@ -237,7 +238,7 @@ static char *read_file(const char *path, size_t *len, char *why, size_t cap)
         return text;
     }
     free(text);
-    why_fail(why, cap, bad ? "%s: read error" : "%s: expected a snapshot, got a larger file", path);
+    why_expected(why, cap, path, bad ? why_found(err) : "a larger file", "a snapshot");
     return NULL;
 }
 

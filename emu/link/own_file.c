@@ -121,22 +121,19 @@ bool own_file_removed(int fd)
     return fstat(fd, &st) == 0 && st.st_nlink == 0;
 }
 
-bool own_file_machine(int error)
-{
-    static const int machine[] = {ENOSPC, EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ESTALE};
-    for (size_t i = 0; i < sizeof machine / sizeof *machine; i++)
-        if (machine[i] == error) return true;
-    return false;
-}
-
 const char *own_file_strerror(int error)
 {
-    return error == ESTALE ? "moved, removed or replaced while it was written" : strerror(error);
+    static char text[128];
+    if (error == ESTALE) return "moved, removed or replaced while it was written";
+    if (why_machine(error)) return strerror(error);
+    snprintf(text, sizeof text, "expected a path that can be written, got %s",
+             error == ENOENT ? "no such folder" : why_found(error));
+    return text;
 }
 
 bool own_file_fail(const char *where, const char *path, int err, long owner, bool *user, char *why, size_t cap)
 {
-    *user = !own_file_machine(-err);
+    *user = !why_machine(-err);
     if (err != -EBUSY) return why_fail(why, cap, "%s%.800s: %s", where, path, own_file_strerror(-err));
     char got[48] = "another process";
     if (owner == getpid()) snprintf(got, sizeof got, "this process, as another option");

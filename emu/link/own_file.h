@@ -30,10 +30,6 @@ void own_port_lock(int master, const char *path);
 /* Process that serves /dev/pts/N; 0: none, or in another PID namespace. Does not open it: its owner would see that. */
 long own_port_owner(const char *path);
 
-/* Whether an error of a file lies with the machine (no space, descriptors or memory; a failing disk) or else with the path
- * that the user gave. */
-bool own_file_machine(int error);
-
 /* An unbuffered stream, so that fclose() does not write again what a full disk did not take. NULL with one line in why,
  * which begins with `where` ("--vcd "), and *user: the fault lies with the path that was given. */
 FILE *own_file_output(const char *where, const char *path, bool *user, char *why, size_t cap);
@@ -41,7 +37,7 @@ FILE *own_file_output(const char *where, const char *path, bool *user, char *why
 /* The line and *user for -errno of own_file_open(). False. */
 bool own_file_fail(const char *where, const char *path, int err, long owner, bool *user, char *why, size_t cap);
 
-/* Text of an error of a file; ESTALE: moved, removed or replaced while it was written. */
+/* Text of an error of a file; ESTALE: moved, removed or replaced while it was written. Until the next call. */
 const char *own_file_strerror(int error);
 
 #endif

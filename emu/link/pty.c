@@ -160,10 +160,11 @@ int pty_open(struct pty *p, const char *name)
     return 0;
 }
 
-bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t cap)
+bool pty_fail(const struct pty *p, const char *where, int err, bool *user, char *why, size_t cap)
 {
-    static const char expected[] = "expected a new name or a symbolic link to a pty, got another file";
-    if (err != -EBUSY) return why_fail(why, cap, "%s: %s", where, err == -EEXIST ? expected : strerror(-err));
+    *user = err != -EBUSY && !why_machine(-err);
+    if (err == -EEXIST) return why_expected(why, cap, where, "another file", "a new name or a symbolic link to a pty");
+    if (err != -EBUSY) return why_unwritable(why, cap, where, -err);
     return why_fail(why, cap, "%s: expected a link that no other process serves, got one of pid %ld", where, p->owner);
 }
 

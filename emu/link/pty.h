@@ -32,7 +32,7 @@ struct pty {
 int pty_open(struct pty *p, const char *name);
 
 /* One line for -errno of pty_open(), which begins with `where` ("--line port"). False. */
-bool pty_fail(const struct pty *p, const char *where, int err, char *why, size_t cap);
+bool pty_fail(const struct pty *p, const char *where, int err, bool *user, char *why, size_t cap);
 
 /* Clients that have come or gone by now. Before the master is read: who writes has opened the slave before, but a poll that saw
  * his bytes may have looked at the watch just before he came. */

@@ -1,7 +1,10 @@
 #define _GNU_SOURCE /* readlink, scandir */
 #include "scenario/find.h"
 
+#include "base/why.h"
+
 #include <dirent.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,7 +72,7 @@ bool find_names(const char *path, char (**names)[FIND_NAME_MAX], unsigned *count
         free(found[i]);
     }
     free(found);
-    if (!*names) snprintf(why, cap, "%s: cannot be read", path);
+    if (!*names) why_expected(why, cap, path, why_found(errno), "a folder");
     return *names != NULL;
 }
 
@@ -91,8 +94,7 @@ bool find_proto(const char *folder, const char *name, const char *beside, char *
     if (is_path(name)) {
         take_path(name, beside, path);
         if (access(path, R_OK) == 0) return true;
-        snprintf(why, cap, "%s: no such file, or not readable", path);
-        return false;
+        return why_expected(why, cap, path, why_found(errno), "a %.*s file", (int)strlen(folder) - 1, folder);
     }
     for (unsigned i = 0; proto_place(i, dir, sizeof dir); i++) {
         snprintf(path, FIND_PATH_MAX, "%.380s/%s/%.60s.yaml", dir, folder, name);

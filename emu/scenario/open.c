@@ -18,7 +18,7 @@ static bool absolute_path(const char *beside, char *file, size_t size, char *why
     const char *slash = file[0] != '/' ? strrchr(beside, '/') : NULL;
     const int folder = slash ? (int)(slash - beside) + 1 : 0;
     snprintf(path, sizeof path, "%.*s%s", folder, beside, file);
-    if (!realpath(path, whole)) return why_fail(why, cap, "%s: %s", path, strerror(errno));
+    if (!realpath(path, whole)) return why_expected(why, cap, path, why_found(errno), "a recorded signal in CSV");
     if (strlen(whole) >= size)
         return why_fail(why, cap, "%.80s...: expected a path of up to %zu bytes", whole, size - 1);
     memcpy(file, whole, strlen(whole) + 1);

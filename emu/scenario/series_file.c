@@ -58,7 +58,7 @@ static bool read_lines(struct reading *r, FILE *in)
         memmove(text, text + used, held);
         if (held > SERIES_CSV_LINE) return take_line(r, text, held); /* no line is so long: it says so */
     }
-    if (ferror(in)) return why_fail(r->why, r->cap, "%s: %s", r->path, strerror(errno));
+    if (ferror(in)) return why_expected(r->why, r->cap, r->path, why_found(errno), "a recorded signal in CSV");
     if (held)
         return why_fail(r->why, r->cap, "%s:%lu: expected a line feed at the end, got none", r->path, r->line + 1);
     return r->count > 0 || why_fail(r->why, r->cap, "%s:%lu: expected samples, got none", r->path, r->line + 1);
@@ -96,7 +96,7 @@ bool series_file_open(const char *path, const char *column, struct series *s, ch
 {
     struct reading r = {.path = path, .why = why, .cap = cap};
     FILE *in = fopen(path, "rbe");
-    if (!in) return why_fail(why, cap, "%s: %s", path, strerror(errno));
+    if (!in) return why_expected(why, cap, path, why_found(errno), "a recorded signal in CSV");
     series_csv_init(&r.csv, column);
     sha256_init(&r.sum);
     const bool good = read_file(&r, in, s);

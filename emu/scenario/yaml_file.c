@@ -292,13 +292,14 @@ bool yaml_file_parse(struct yaml_file *f, const char *path, const char *text, si
 bool yaml_file_open(struct yaml_file *f, const char *path, char *why, size_t cap)
 {
     FILE *in = fopen(path, "rbe");
-    if (!in) return why_fail(why, cap, "%s: %s", path, strerror(errno));
+    if (!in) return why_expected(why, cap, path, why_found(errno), "a YAML file");
     char *text = malloc(YAML_FILE_MAX);
     const size_t len = text ? fread(text, 1, YAML_FILE_MAX, in) : 0;
-    const bool bad = ferror(in) || len == YAML_FILE_MAX || !text;
+    const int err = !text ? ENOMEM : ferror(in) ? errno : 0;
     fclose(in);
-    if (bad) snprintf(why, cap, "%s: cannot be read, or longer than %d bytes", path, YAML_FILE_MAX);
-    const bool ok = !bad && yaml_file_parse(f, path, text, len, why, cap);
+    if (err) why_expected(why, cap, path, why_found(err), "a YAML file");
+    else if (len == YAML_FILE_MAX) why_fail(why, cap, "%s: expected up to %d bytes, got more", path, YAML_FILE_MAX);
+    const bool ok = !err && len < YAML_FILE_MAX && yaml_file_parse(f, path, text, len, why, cap);
     free(text);
     return ok;
 }

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from psabench.errors import BadInput, BenchError
+from psabench.errors import BadInput, BenchError, StartError
 from psabench.link.control import Control
 from psabench.places import executable, find_emulator, own_emulators
 from psabench.report import provenance
@@ -167,7 +167,7 @@ class Emulator:
                 if not chunk:
                     bad_input = self._process.wait() == BadInput.exit_status
                     words = self.messages().strip() or f"emulator ended: {' '.join(self.argv)}"
-                    raise BadInput(words) if bad_input else BenchError(words)
+                    raise BadInput(words) if bad_input else StartError(words)
                 text += chunk
         for line in text.decode().splitlines():
             if line.startswith("ready ") and line != "ready all":

@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut, expected
+from psabench.errors import BadInput, InstrumentError, LinkError, TimeOut, expected, link_error
 from psabench.estimate.face import Face
 
 if TYPE_CHECKING:
@@ -372,4 +372,5 @@ def _knock(name: str, address: str) -> None:
     try:
         socket.create_connection((words[1], int(words[2])), CONNECT_S).close()
     except (OSError, OverflowError) as e:
-        raise LinkError(f"{name} at {address}: {e}; is the instrument switched on, or psa-emu running?") from e
+        hint = "is the instrument switched on, or psa-emu running?"
+        raise link_error(f"{name} at {address}", "an instrument", e, hint) from e

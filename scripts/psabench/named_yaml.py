@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.places import proto_file
 
 
@@ -15,17 +15,15 @@ def read_yaml(path: Path, what: str) -> object:
 
     try:
         return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as e:
-        raise BadInput(expected(f"{what} in YAML", "no file", path)) from e
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as e:
-        raise BadInput(expected(f"{what} in YAML", " ".join(str(e).split())[:160], path)) from e
+        raise input_error(path, f"{what} in YAML", e) from e
 
 
 def read_named(name: str, known: Sequence[str], folder: str, option: str, what: str) -> tuple[object, Path]:
     """The document and its path: one of `known` in this folder of proto/, or a file. Raises BadInput."""
     path = proto_file(f"{folder}/{name}.yaml") if name in known else Path(name)
     if name not in known and not path.exists():
-        raise BadInput(expected(f"{', '.join(known)}, or a file", f"no file {name}", option))
+        raise BadInput(expected(f"{', '.join(known)}, or a file", f"{name}, no such file", option))
     return read_yaml(path, what), path
 
 

@@ -42,8 +42,7 @@ static bool check_route(const struct lcm_url *url, const char *where, char *why,
 {
     const int err = try_route(url);
     if (!err) return true;
-    if (err != ENETUNREACH) return why_fail(why, cap, "%s: %s", where, strerror(err));
-    return why_expected(why, cap, where, "none", "%s",
+    return why_expected(why, cap, where, why_found(err), "%s",
                         "a route for multicast (as root: ip route add 224.0.0.0/4 dev lo)");
 }
 

@@ -13,7 +13,7 @@ from psabench.boards.devices import of_board, reader_of
 from psabench.boards.psa2.device import Psa2
 from psabench.boards.psa2.frames import SAMPLE_MESSAGES, FrameReader, Frames
 from psabench.boards.readings import ReadingReader, Readings
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, check_there, expected, input_error
 from psabench.link import lineport
 from psabench.link.lineport import LineDecoder, LineFormat, decode_stream
 from psabench.link.protocol_files import dbc_node, message
@@ -88,12 +88,6 @@ def senders_of(ids: set[int], board: str) -> set[int]:
     return {i - base for i in ids for base in bases if 1 <= i - base <= 127}
 
 
-def _check_there(path: Path) -> None:
-    """Before the table's head is printed."""
-    if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
-
-
 def _chunks(path: Path, reader: FrameReader | ReadingReader, ids: set[int]) -> Iterator[Frames | Readings]:
     """Frames of the reader's node, some at a time; `ids` collects the 11-bit identifiers of all data frames."""
     try:
@@ -152,11 +146,11 @@ def decode_line(path: Path, fmt: LineFormat, out: IO[str], table: Form = csv_tab
     Nothing is written before the first frame.
     """
     decoder = LineDecoder(fmt)
-    _check_there(path)
+    check_there(path, "a capture of a line port")
     try:
         stream = path.open("rb")
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a capture of a line port", e) from e
     with stream:
         begun = _write(table(out), (_of_line(f, fmt) for f in decode_stream(stream, decoder)))
     if not begun:

@@ -16,7 +16,7 @@ from typing import BinaryIO, Protocol
 from psabench.bench import Bench
 from psabench.conform.capture.log import LineLog
 from psabench.conform.sources.samples import line_log
-from psabench.errors import LinkError
+from psabench.errors import LinkError, link_error, path_found
 from psabench.link.lineport import SAMPLE_HZ, open_line
 from psabench.link.vcd import read_vcd
 
@@ -81,7 +81,7 @@ class PortProbe:
         try:
             port = open_line(self._path)
         except OSError as e:
-            raise LinkError(f"{self._path}: {e.strerror}; is the line port there?") from e
+            raise link_error(self._path, "a line port", e) from e
         self._data.clear()
         self._trouble = ""
         self._wake = os.pipe()
@@ -117,7 +117,7 @@ class PortProbe:
         try:
             data = port.read(BLOCK)
         except OSError as e:
-            self._trouble = str(e.strerror)
+            self._trouble = path_found(e)
             return
         self._data += data
         if not data or len(self._data) > MOST:

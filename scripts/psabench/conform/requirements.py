@@ -17,7 +17,7 @@ from typing import Any
 import yaml
 
 from psabench.conform.profile import YAML_LOADER
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, path_found
 from psabench.places import proto_file
 
 Limit = int | float
@@ -197,7 +197,7 @@ def _read(path: Path) -> Any:
     try:
         return yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as e:
-        raise RequirementsError(f"{path.name}: {e.strerror}") from e
+        raise RequirementsError(expected("requirements in YAML", path_found(e), path.name)) from e
     except yaml.YAMLError as e:
         raise RequirementsError(f"{path.name}: {' '.join(str(e).split())}") from e
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from psabench.errors import BadInput, expected
+from psabench.errors import input_error
 from psabench.explore.oracle import Violation
 from psabench.explore.play import Played, play_schedule
 from psabench.explore.schedule import Action, Schedule, of_data
@@ -98,7 +98,7 @@ def read_schedule(path: Path) -> Schedule:
     try:
         return of_data(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError) as e:
-        raise BadInput(expected("a schedule of psabench explore", e, path)) from e
+        raise input_error(path, "a schedule of psabench explore", e) from e
 
 
 def replay_file(path: Path) -> Played:

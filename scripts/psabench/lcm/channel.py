@@ -5,7 +5,6 @@ Without a route for multicast (a machine without a network): `ip route add 224.0
 
 from __future__ import annotations
 
-import errno
 import re
 import select
 import socket
@@ -18,7 +17,7 @@ from typing import Any, Protocol
 
 import can
 
-from psabench.errors import BadInput, LinkError, expected, output_error
+from psabench.errors import BadInput, LinkError, expected, link_error, output_error
 from psabench.lcm.event_log import put_event
 from psabench.lcm.frames import FRAMES, TYPE, to_message
 from psabench.lcm.types import lcm_type
@@ -69,8 +68,7 @@ def _check_route(url: str, group: str, port: int) -> None:
             s.connect((group, port))
         except OSError as e:
             what = "a route for multicast (as root: ip route add 224.0.0.0/4 dev lo)"
-            text = expected(what, "none", url) if e.errno == errno.ENETUNREACH else f"{url}: {e.strerror}"
-            raise LinkError(text) from e
+            raise link_error(url, what, e) from e
 
 
 class LcmBus(can.BusABC):

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.lcm.types import LcmType, type_of
 
 SYNC = 0xEDA1DA01
@@ -52,7 +52,7 @@ def read_events(path: Path) -> Iterator[Event]:
         with path.open("rb") as file:
             yield from _all_events(file, path)
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "an LCM log", e) from e
 
 
 def _all_events(file: IO[bytes], path: Path) -> Iterator[Event]:

@@ -21,7 +21,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.errors import CycleRefused, LinkError, expected
+from psabench.errors import CycleRefused, LinkError, expected, link_error
 
 TIMEOUT_S = 5.0  # for an answer
 QUANTUM_S = 0.001  # step of the bench's time while waiting for an answer
@@ -82,7 +82,7 @@ class BusPort(AbstractContextManager["BusPort"]):
         try:
             self._fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as e:
-            raise LinkError(f"{path}: {e.strerror}") from e
+            raise link_error(path, "a bus port", e) from e
         if os.isatty(self._fd):
             tty.setraw(self._fd)
 

@@ -21,7 +21,7 @@ import can
 from can.interfaces.slcan import slcanBus
 from can.interfaces.socketcan import SocketcanBus
 
-from psabench.errors import BadInput, LinkError, TimeOut, expected
+from psabench.errors import BadInput, LinkError, TimeOut, expected, link_error
 from psabench.link.cannelloni_bus import CannelloniBus
 from psabench.link.control import Control, Reply
 from psabench.link.listeners import Listeners
@@ -361,7 +361,7 @@ def open_bus(spec: str | None) -> can.BusABC:
             raise BadInput(expected(what, f"none that python-can opens ({e})", "--can")) from e
         raise BadInput(expected("INTERFACE:CHANNEL[,key=value]", e, f"--can {spec}")) from e
     except (can.CanError, OSError) as e:
-        raise LinkError(f"--can {spec}: {e}") from e
+        raise link_error(f"--can {spec}", "a CAN adapter", e) from e
 
 
 def _open_interface(arguments: dict[str, Any]) -> can.BusABC:
@@ -406,7 +406,8 @@ def _greet(host: str, port: int) -> None:
         with socket.create_connection((host, port), GREETING_S) as s:
             hello = s.recv(256)
     except OSError as e:
-        raise LinkError(f"--can socketcand:{host}:{port}: {e.strerror or e}; is psa-emu running there?") from e
+        where = f"--can socketcand:{host}:{port}"
+        raise link_error(where, "a socketcand server", e, "is psa-emu running there?") from e
     if hello != b"< hi >":
         raise LinkError(expected("a socketcand server", "another answer", f"--can socketcand:{host}:{port}"))
 

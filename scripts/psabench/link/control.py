@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from psabench.errors import ControlError, LinkError, expected
+from psabench.errors import ControlError, LinkError, expected, link_error
 
 REPLY_S = 600.0  # a long `run` in step pace answers when it is done
 EVENTS_KEPT = 100_000  # of subscriptions, until somebody takes them; older ones go first
@@ -42,7 +42,7 @@ class Control(AbstractContextManager["Control"]):
             self._socket.connect(str(path))
         except OSError as e:
             self._socket.close()
-            raise LinkError(f"control socket {path}: {e.strerror}; is psa-emu running with --control?") from e
+            raise link_error(path, "the control socket of psa-emu", e, "is psa-emu running with --control?") from e
         self._bytes = bytearray()  # of a line that is not all there yet
         self._id = 0
 

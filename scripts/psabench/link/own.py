@@ -180,9 +180,9 @@ SQLITE_ERRNO = {
     sqlite3.SQLITE_NOTADB: errno.EINVAL,
     sqlite3.SQLITE_ERROR: errno.EINVAL,  # a table of another form
     sqlite3.SQLITE_READONLY: errno.EACCES,
-    sqlite3.SQLITE_CANTOPEN: errno.EACCES,
-    sqlite3.SQLITE_BUSY: errno.EACCES,
-    sqlite3.SQLITE_LOCKED: errno.EACCES,
+    sqlite3.SQLITE_CANTOPEN: errno.EINVAL,
+    sqlite3.SQLITE_BUSY: errno.EINVAL,
+    sqlite3.SQLITE_LOCKED: errno.EINVAL,
 }
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import can
 import numpy as np
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.link.log_file import LogFile
 from psabench.link.own import output_text
 from psabench.logs.formats import READABLE
@@ -141,9 +141,8 @@ def _read_calls(path: Path) -> list[dict[str, str]]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(
-            f"{path}: {getattr(e, 'strerror', None) or e}; psabench run --record writes it beside the log"
-        ) from e
+        what = "the calls of a recorded run, which psabench run --record writes beside the log"
+        raise input_error(path, what, e) from e
     rows = list(csv.reader(text.splitlines()))
     if not rows or tuple(rows[0]) != COLUMNS:
         raise BadInput(expected(f"the columns {','.join(COLUMNS)}", ",".join(rows[0]) if rows else "none", f"{path}:1"))

@@ -11,7 +11,7 @@ from typing import Any
 import can
 from can.io.player import MESSAGE_READERS
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, check_there, expected, input_error
 from psabench.places import no_package
 
 READERS: Mapping[str, str] = {  # module and function; text logs: read_text
@@ -46,15 +46,14 @@ def read_frames(path: Path) -> Iterator[can.Message]:
     try:
         yield from reader_of(path)(path)
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a CAN log", e) from e
 
 
 def check_readable(path: Path) -> None:
     """Whether there is a log with an ending that we read; its content is not looked at. Raises BadInput."""
     if path.suffix.lower() not in READABLE:
         raise BadInput(expected(f"an ending of {' '.join(READABLE)}", path.suffix or "none", path))
-    if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+    check_there(path, "a CAN log")
 
 
 def reader_of(path: Path) -> Callable[[Path], Iterator[can.Message]]:

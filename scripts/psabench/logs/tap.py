@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from psabench.errors import BadInput, LinkError, output_error
+from psabench.errors import input_error, link_error, output_error
 from psabench.link.own import Owned, Unstored
 from psabench.logs.pcap import MAGIC_NS
 from psabench.logs.segments import SegmentFile
@@ -179,7 +179,7 @@ def _blocks_of(source: Path) -> Iterator[bytes]:
             while data := stream.read(BLOCK):
                 yield data
     except OSError as e:
-        raise BadInput(f"{source}: {e.strerror}") from e
+        raise input_error(source, "a recording of a port", e) from e
 
 
 class Relay:
@@ -193,7 +193,7 @@ class Relay:
         try:
             self._port = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as e:
-            raise LinkError(f"{port}: {e.strerror}") from e
+            raise link_error(port, "a serial port", e) from e
         self._ours, self._theirs = os.openpty()  # theirs stays open: programs may come and go
         for end in (self._port, self._theirs):
             if os.isatty(end):

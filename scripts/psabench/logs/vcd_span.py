@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 
 MOST_HEAD = 1 << 20  # bytes of a VCD in which its lines are declared
 TAIL = 1 << 16
@@ -21,7 +21,7 @@ def read_head(vcd: Path) -> bytes:
         with vcd.open("rb") as file:
             return file.read(MOST_HEAD)
     except OSError as e:
-        raise BadInput(f"{vcd}: {e.strerror}") from e
+        raise input_error(vcd, "a VCD file", e) from e
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from foxglove import Channel, Schema
 from mcap_ros2._dynamic import serialize_dynamic
 
 from psabench.boards.psa2.frames import FrameReader
-from psabench.errors import LinkError, expected
+from psabench.errors import LinkError, listen_error
 from psabench.link.can_host import CanHost, Message, WallClock
 from psabench.link.record import ctrl_c_noted, receive_until
 from psabench.logs.records import RAW_SCHEMA, RAW_TOPIC, Decoder, raw_record, schema, stamp_ns, units
@@ -172,7 +172,7 @@ class _Server:
                 name="psabench", host=HOST, port=port, context=context, message_backlog_size=BACKLOG
             )
         except (OSError, RuntimeError) as e:
-            raise LinkError(expected(f"a free port of {HOST}, or 0 (any free port)", f"{port} ({e})", "--port")) from e
+            raise listen_error("--port", port, e) from e
         self.port = int(self._server.port)
 
     def close(self) -> None:

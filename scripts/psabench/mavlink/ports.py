@@ -5,7 +5,6 @@ A port never blocks. A peer that reads too slowly loses whole messages, and is c
 
 from __future__ import annotations
 
-import errno
 import selectors
 import socket
 import threading
@@ -14,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from psabench.errors import LinkError, expected, port_in_use
+from psabench.errors import expected, listen_error
 
 HOST = "127.0.0.1"
 DEFAULT_PORTS = {"udp": 14550, "udpin": 14550, "tcp": 5760}
@@ -84,9 +83,7 @@ class Port:
                 s.listen(PEERS_MAX)
         except OSError as e:
             s.close()
-            if e.errno == errno.EADDRINUSE:
-                raise port_in_use(spec.port, "--mavlink") from e
-            raise LinkError(f"--mavlink {spec.kind}:{spec.port}: {e.strerror}") from e
+            raise listen_error("--mavlink", spec.port, e) from e
         return s
 
     def close(self) -> None:

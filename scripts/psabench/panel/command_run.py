@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import errno
 import logging
 import socket
 from collections.abc import Callable, Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import uvicorn
 
-from psabench.errors import BadInput, BenchError, LinkError, expected, port_in_use
+from psabench.errors import BadInput, BenchError, expected, listen_error
 from psabench.options import of_fields, refuse_beside
 from psabench.output import show_event
 from psabench.panel import view
@@ -76,9 +75,7 @@ def _listen_loopback(port: int) -> Iterator[socket.socket]:
             listener.bind(("127.0.0.1", port))
             listener.listen(64)
         except OSError as e:
-            if e.errno == errno.EADDRINUSE:
-                raise port_in_use(port, "--port") from e
-            raise LinkError(f"127.0.0.1:{port}: {e.strerror}") from e
+            raise listen_error("--port", port, e) from e
         yield listener
 
 

@@ -8,7 +8,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.errors import BenchError
+from psabench.errors import BenchError, input_error
 from psabench.places import find_emulator, proto_file
 from psabench.shell.lexer import Wrong
 
@@ -40,7 +40,7 @@ def text_of(scenario: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise BenchError(f"scenario {scenario}: {getattr(e, 'strerror', None) or 'not UTF-8'}") from e
+        raise input_error(f"scenario {scenario}", "a scenario", e) from e
 
 
 def checked_file(text: str, folder: Path) -> Path:

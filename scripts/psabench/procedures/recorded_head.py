@@ -24,7 +24,7 @@ from psabench.boards.psa2.frames import FrameReader
 from psabench.conform.capture.log import CanFrame
 from psabench.conform.sources.can_logs import read_can
 from psabench.conform.sources.taken import Bounds
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.estimate.face import Face
 from psabench.link.can_host import CanHost
 from psabench.logs.call_log import SETUP, Calls, CallWriter, check_ending
@@ -147,7 +147,7 @@ def _read_frames(path: Path) -> tuple[CanFrame, ...]:
     try:
         take = read_can(path, Bounds(max_s=LONGEST_S))
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror or e}") from e
+        raise input_error(path, "a CAN log", e) from e
     if take.note:
         raise BadInput(f"{path}: {take.note}")
     return tuple(f for f in take.frames if not f.error)

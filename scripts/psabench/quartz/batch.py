@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.places import proto_file
 from psabench.quartz.draws import draw_source
 from psabench.quartz.plate import NORMAL_DEGC, Array
@@ -39,7 +39,7 @@ def load_batch(name: str = SERIAL) -> Batch:
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
-        raise BadInput(expected("a batch of accelerometers", str(e).partition("\n")[0], path)) from None
+        raise input_error(path, "a batch of accelerometers", e) from None
     return _checked_numbers(found, None if shipped and name == SERIAL else list(load_batch()), path)
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.report.page import PAGE_NAME, page_without_foot
 from psabench.report.provenance import KEY
 
@@ -100,7 +100,7 @@ def read_result(path: Path) -> dict[str, Any]:
     try:
         data = json.loads(found[0].read_text(encoding="utf-8"))
     except OSError as e:
-        raise BadInput(f"{found[0]}: {e.strerror}") from e
+        raise input_error(found[0], "a result of psabench", e) from e
     except ValueError as e:
         raise BadInput(expected("a result of psabench in JSON", e, found[0])) from e
     if not isinstance(data, dict) or "format" not in data:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.report.diff import FILES, read_result
 from psabench.report.provenance import KEY
 
@@ -113,7 +113,7 @@ def read_series(path: Path) -> Series:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or e}") from e
+        raise input_error(path, "a series in CSV", e) from e
     rows = list(csv.reader(text[: text.rfind("\n") + 1].splitlines()))
     names = rows[0] if rows else []
     if not names or len(set(names)) != len(names) or not all(n and not _is_number(n) for n in names):

@@ -15,7 +15,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.estimate.uncertainty import Estimate
 from psabench.report.grading import Section, aligned, with_ci
 from psabench.report.page import html_table, section
@@ -82,7 +82,7 @@ def read_passport(path: Path) -> Nominal:
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as e:
-        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or ' '.join(str(e).split())}") from e
+        raise input_error(path, "a passport", e) from e
     if not isinstance(found, dict) or not found:
         raise BadInput(expected("lines NAME: VALUE", found, path))
     for name, value in found.items():

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from psabench.boards.psd1 import waveform as waveform_psd1
-from psabench.errors import BenchError, expected
+from psabench.errors import BenchError, check_there, expected
 from psabench.link.own import replace_file
 from psabench.link.vcd import Vcd, read_vcd
 from psabench.report.drawing import Panel, Section, Tag, need, render
@@ -157,6 +157,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"usage: python -m psabench.report.waveform RUN.vcd {'|'.join(pictures)} OUT.svg", file=sys.stderr)
         return 2
     try:
+        check_there(Path(args[0]), "a VCD file")
         replace_file(Path(args[2]), pictures[args[1]](read_vcd(Path(args[0]))))
     except (OSError, ValueError) as err:
         print(f"waveform: {args[0]}: {err}", file=sys.stderr)

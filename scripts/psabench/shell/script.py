@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psabench.errors import BadInput, BenchError, expected
+from psabench.errors import BadInput, BenchError, expected, input_error
 from psabench.shell.connect import Opening
 from psabench.shell.expect import Expectation
 from psabench.shell.grammar import parse
@@ -52,7 +52,7 @@ def run_file(path: Path, opening: Opening, voice: Voice) -> int:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or expected('UTF-8 text', 'other bytes')}") from e
+        raise input_error(path, "a script", e) from e
     first = next((n for n, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), 0)
     try:
         opening = opening.of_script(lines[first] if lines else "")

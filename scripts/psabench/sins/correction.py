@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.sins.increments import Floats, Increments
 
 KIND, VERSION = "psabench sins correction", 1
@@ -99,7 +99,7 @@ def read_correction(path: Path) -> Correction:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a calibration in JSON", e) from e
     except (UnicodeDecodeError, ValueError, RecursionError) as e:
         raise BadInput(expected("JSON", " ".join(str(e).split())[:160], path)) from e
     inside = _found_inside(found)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, check_there, expected, input_error
 from psabench.link.own import output_text
 from psabench.sins.increments import Floats, Increments
 from psabench.sins.layout import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, Layout, turn
@@ -25,9 +25,9 @@ CHILD = "psabench.sins.mf4_columns"
 def read_increments(path: Path, layout: Layout | None = None) -> Increments:
     """Raises BadInput with the file, and the row or the column."""
     given = layout or Layout()
+    check_there(path, "increments of a unit")
     if not path.is_file():
-        got = "a folder" if path.is_dir() else "a device or a pipe"
-        raise BadInput(expected("a file", got, path) if path.exists() else f"{path}: no such file")
+        raise BadInput(expected("increments of a unit", "a device or a pipe", path))
     read = _read_raw if given.format else READERS.get(path.suffix.lower())
     if read is None:
         raise BadInput(
@@ -36,7 +36,7 @@ def read_increments(path: Path, layout: Layout | None = None) -> Increments:
     try:
         columns = read(path, given)
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "increments of a unit", e) from e
     return _in_si(columns, given, path)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psabench.errors import BadInput, expected, output_error
+from psabench.errors import BadInput, expected, input_error, output_error
 from psabench.link.own import output_text, replace_file
 from psabench.sins.increments import Increments
 from psabench.sins.table import AXES
@@ -55,7 +55,7 @@ def _read_rows(path: Path) -> np.ndarray:
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "angles in CSV", e) from e
     found, started = [], False
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.startswith("#"):

@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from psabench.errors import BadInput, expected, output_error
+from psabench.errors import BadInput, expected, input_error, output_error
 from psabench.link.own import Owned, replace_file
 from psabench.procedures.recording import SeriesFile
 from psabench.thermal.schedule import POSITIONS
@@ -69,7 +69,7 @@ def whole_lines(path: Path) -> list[str]:
     except FileNotFoundError:
         return []
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(f"{path}: {getattr(e, 'strerror', None) or e}") from e
+        raise input_error(path, "rows of a run", e) from e
     return text[: text.rfind("\n") + 1].splitlines()
 
 
@@ -220,7 +220,7 @@ class RunFolder:
         except FileNotFoundError as e:
             raise BadInput(expected(f"a folder of psabench run thermal, with {SETUP}", "none", self.path)) from e
         except (OSError, ValueError, RecursionError) as e:
-            raise BadInput(expected("the set-up of a run", e, self.setup_path)) from e
+            raise input_error(self.setup_path, "the set-up of a run", e) from e
         return checked_setup(found, self.setup_path)
 
     def _snapshots(self) -> dict[int, Path]:

@@ -258,7 +258,7 @@ def test_files_that_cannot_be_done_again_are_refused_in_one_line(tmp_path: Path)
         assert not done.stdout, what
     done = psa_emu("--restore", tmp_path / "missing", "--can", "none")
     assert done.returncode == 2
-    assert "missing: No such file" in one_line(done.stderr, "psa-emu")
+    assert "missing: expected a snapshot, got no such file" in one_line(done.stderr, "psa-emu")
 
 
 def test_a_snapshot_that_cannot_be_written_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
@@ -355,7 +355,7 @@ def test_a_fork_that_cannot_have_its_endpoints_is_refused(tmp_path: Path) -> Non
         for args, why in (
             ({"control": str(path)}, "expected a free path, got one that another process uses"),
             ({"control": str(tmp_path / "c"), "can": "carrier"}, '--can: expected .*, got "carrier"'),
-            ({"control": str(tmp_path / "no" / "c")}, "No such file"),
+            ({"control": str(tmp_path / "no" / "c")}, "expected a path that can be written, got no such folder"),
         ):
             with pytest.raises(ControlError, match=why):
                 d.control.call("fork", **args)

@@ -146,7 +146,7 @@ def test_a_snapshot_goes_on_and_refuses_a_changed_file(tmp_path: Path) -> None:
 
 
 BAD = {
-    "no file": (None, "s.csv: No such file or directory"),
+    "no file": (None, "s.csv: expected a recorded signal in CSV, got no such file"),
     "a cut line": ("t_s,x_v,y_mps2\n0,1,2\n0.1,1", "s.csv:3: expected a line feed at the end, got none"),
     "no sample": ("t_s,x_v,y_mps2\n", "s.csv:2: expected samples, got none"),
     "time goes back": (

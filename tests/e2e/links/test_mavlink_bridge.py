@@ -157,7 +157,7 @@ def _signed(digits: str) -> int:
     [
         (("--mavlink", "usb"), "--mavlink: expected udp[:PORT], udpin[:PORT] or tcp[:PORT], got 'usb'"),
         (("--mavlink", "udp:0"), "--mavlink: expected a port from 1 to 65535, got 'udp:0'"),
-        (("--log", "no.log"), "no.log: no such file"),
+        (("--log", "no.log"), "no.log: expected a CAN log, got no such file"),
         (("--log", "no.txt"), "no.txt: expected an ending of .asc"),
         (("--log", "x.log", "--can", "y"), "--log: expected a log or a bench, got both"),
         (("--imu", "-5"), "--imu: expected 0 or a number from 0.01 to 10000, got '-5'"),

@@ -108,7 +108,7 @@ def test_a_second_without_increments_costs_the_weight(tmp_path: Path, capsys: Li
     ("words", "said"),
     [
         (("--scenario", "stream"), "expected a scenario with a unit that has a serial port"),
-        (("--data", "none"), "none/flight.json: No such file"),
+        (("--data", "none"), "none/flight.json: expected a file of a recorded flight, got no such file"),
         (("--data", "none", "--seed", "3"), "expected --data without a bench, got --seed"),
         (("--unit-class", "best"), "unit_class: expected good, bins, got best"),
         (("--latitude-deg", "55"), "place: expected latitude_deg and longitude_deg, or neither, got one of them"),

@@ -153,7 +153,7 @@ def test_what_was_not_recorded_is_refused(turns: Path, tmp_path: Path) -> None:
 
 def test_a_damaged_recording_is_refused(turns: Path, tmp_path: Path) -> None:
     log = Path(shutil.copy(turns, tmp_path))
-    assert "No such file or directory; psabench run --record writes it" in refused(log)
+    assert "which psabench run --record writes beside the log, got no such file" in refused(log)
     assert "expected a last row `end`" in refused(edited(turns, tmp_path, "\nend,", "\nwait,"))
     assert "expected the columns" in refused(edited(turns, tmp_path, "call,", "cell,"))
     assert "expected the set-up of a run" in refused(edited(turns, tmp_path, "average", "mean"))

@@ -117,7 +117,7 @@ def test_a_correction_levels_the_unit(tmp_path: Path) -> None:
         (("--plan", "none.yaml"), "--plan: expected article"),
         (("--gauge", "upper"), "gauge: expected article, lower, free9, got upper"),
         (("--scenario", "stream"), "expected a scenario with an inertial unit"),
-        (("--data", "no.csv"), "no.csv: no such file"),
+        (("--data", "no.csv"), "no.csv: expected increments of a unit, got no such file"),
         (("--latitude-deg", "89"), "latitude_deg: expected -85 to 85 deg"),
         (("--wobble-arcsec", "-1"), "wobble_arcsec: expected 0 to 3600 arcsec"),
         (("--quad-sd-ugpg2", "-1"), "quad_sd_ugpg2: expected 0 to 10000 ug/g2"),

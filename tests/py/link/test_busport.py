@@ -139,7 +139,7 @@ def test_a_board_that_goes_is_a_broken_link() -> None:
 
 
 def test_a_path_that_is_not_there_is_a_broken_link() -> None:
-    with pytest.raises(LinkError, match="No such file"):
+    with pytest.raises(LinkError, match="expected a bus port, got no such file"):
         BusPort("/nowhere/at/all")
 
 

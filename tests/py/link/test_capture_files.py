@@ -164,9 +164,9 @@ def test_a_folder_that_has_gone_ends_the_capture_and_not_the_run(tmp_path: Path)
         folder.rmdir()
         control.call("run", for_s=0.1)
         (file,) = captures(control)
-        assert (file["path"], file["error"]) == (str(folder / "c.vcd"), "No such file or directory")
+        assert (file["path"], file["error"]) == (str(folder / "c.vcd"), "expected a path that can be written, got no such folder")
         assert state(control) == "off"
-        assert f"capture {file['path']}: No such file or directory; the run continues\n" in emu.messages()
+        assert f"capture {file['path']}: {file['error']}; the run continues\n" in emu.messages()
         assert emu.stop() == 3
 
 
@@ -191,7 +191,7 @@ def test_what_cannot_be_armed_is_rejected(tmp_path: Path) -> None:
         ({"on": "line:Int:high", "count": 2}, "count: expected no count with a line"),
         ({"pre_s": 61}, "pre_s: expected"),
         ({"path": str(tmp_path)}, "expected a regular file or none, got another kind of file"),
-        ({"path": str(tmp_path / "none" / "c.vcd")}, "No such file or directory"),
+        ({"path": str(tmp_path / "none" / "c.vcd")}, "expected a path that can be written, got no such folder"),
         ({"path": "/dev/full"}, "expected a regular file or none"),
     ]
     with bench() as (_, control):

@@ -117,7 +117,7 @@ def test_other_files_get_what_opens_them_in_one_line(ending: str, capsys: pytest
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["none.vcd"], "none.vcd: No such file"),
+        (["none.vcd"], "none.vcd: expected a VCD file, got no such file"),
         ([str(CHECKOUT / "Makefile")], "expected a VCD file with a scope and wires"),
         (["x.vcd", "--can", "slcan:x"], "view: expected a file or --can, got both"),
         (["x.vcd", "--for", "1"], "view: expected a file or --for, got both"),

@@ -190,7 +190,7 @@ def test_a_strobe_that_is_too_short_is_told(length_ns: int, warnings: list[str],
     ("words", "text"),
     [
         ([], "expected a VCD file, --decoders or --wireshark, got none"),
-        (["nothing.vcd"], "No such file"),
+        (["nothing.vcd"], "nothing.vcd: expected a VCD file, got no such file"),
         ([__file__], "expected a VCD file with a scope and wires"),
         (["--decoders", "--dir", "/proc/x"], "/proc/x"),
         (["--wireshark", "--dir", "/proc/x"], "/proc/x"),

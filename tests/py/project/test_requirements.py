@@ -187,7 +187,7 @@ def test_an_id_stands_once_and_does_not_come_back(tmp_path: Path) -> None:
         ({"version": True}, "version: expected a number"),
         ({"grades": []}, "grades: expected a mapping of words"),
         ({"groups": [5]}, "groups: expected a text, got 5"),
-        ({"groups": ["gone"]}, "gone.yaml: No such file"),
+        ({"groups": ["gone"]}, "gone.yaml: expected requirements in YAML, got no such file"),
         ({"colour": "red"}, ", got colour"),
     ],
 )

@@ -109,5 +109,5 @@ def test_a_file_that_is_no_passport_is_refused(text: str, expected: str, tmp_pat
     path.write_text(text)
     with pytest.raises(BadInput, match=expected):
         read_passport(path)
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="expected a passport, got no such file"):
         read_passport(tmp_path / "nowhere.yaml")

@@ -209,7 +209,7 @@ def test_the_command_tells_the_same_from_another_and_both_from_a_file_that_is_no
         assert expected in capsys.readouterr().err
     assert cli.main(["report", "diff", str(tmp_path), str(a)]) == 2
     assert f"{tmp_path}: expected one of result.json and conform.json, got none" in capsys.readouterr().err
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="expected a result of psabench, got no such file"):
         read_result(tmp_path / "nowhere.json")
 
 

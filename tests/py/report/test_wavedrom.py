@@ -165,7 +165,7 @@ def test_windows_stand_below_one_another() -> None:
         ("{vcd} --svg x.svg --from 1 --to 2", "setup.vcd: window: expected 63000000 <= from < to"),
         ("{vcd} --svg x.svg --from 1h --to 1e999", "--to"),
         ("{vcd} --svg x.svg --from soon", "--from: expected a number, got 'soon'"),
-        ("nothing.vcd --svg x.svg", "nothing.vcd: No such file"),
+        ("nothing.vcd --svg x.svg", "nothing.vcd: expected a VCD file, got no such file"),
         ("{text} --svg x.svg", "expected a VCD file, got"),
     ],
 )

@@ -89,7 +89,7 @@ def test_a_damaged_recording_is_rejected_with_its_place(text: str, says: str) ->
     [
         ([], "usage"),
         (["a.vcd", "circle", "b.svg"], "usage"),
-        (["nothere.vcd", "frame", "b.svg"], "No such file"),
+        (["nothere.vcd", "frame", "b.svg"], "nothere.vcd: expected a VCD file, got no such file"),
         (["two.vcd", "setup", "b.svg"], "expected the lines CST, DIn, DInT"),
         (["two.vcd", "frame", "b.svg"], "expected the lines Data, got Int, CLK"),
         (["still.vcd", "frame", "b.svg"], "expected a whole frame"),

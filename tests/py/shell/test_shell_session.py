@@ -83,7 +83,7 @@ def test_a_session_is_saved_as_a_script_that_does_the_same(tmp_path: Path) -> No
 
 
 def test_where_it_cannot_be_saved_one_line_says_so() -> None:
-    with pytest.raises(BadInput, match="/nowhere/x: No such file"):
+    with pytest.raises(BadInput, match="/nowhere/x: expected a path that can be written, got no such folder"):
         Session(fake()[1]).do("save /nowhere/x")
 
 
@@ -164,7 +164,7 @@ def test_a_script_without_a_bench_is_refused(tmp_path: Path) -> None:
         with pytest.raises(BadInput) as e:
             run_file(path, Opening(), Voice(print))
         assert words in str(e.value)
-    with pytest.raises(BadInput, match="No such file"):
+    with pytest.raises(BadInput, match="expected a script, got no such file"):
         run_file(tmp_path / "none", Opening(), Voice(print))
 
 

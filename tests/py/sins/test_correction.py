@@ -170,4 +170,4 @@ def test_the_command_applies_checks_and_exports(tmp_path: Path, capsys: pytest.C
     assert cli.main(["nav", "header", str(tmp_path / "unit.json"), "--out", str(tmp_path / "u.h")]) == 0
     assert "unit_gyro_matrix" in (tmp_path / "u.h").read_text()
     assert cli.main([*words[:3], "--calibration", str(tmp_path / "none.json"), "--out", str(tmp_path / "o.csv")]) == 2
-    assert "none.json: No such file" in capsys.readouterr().err
+    assert "none.json: expected a calibration in JSON, got no such file" in capsys.readouterr().err

@@ -210,7 +210,7 @@ def test_a_csv_of_a_spreadsheet_is_read_and_one_field_without_end_is_refused(tmp
 
 
 def test_a_device_is_no_folder() -> None:
-    with pytest.raises(BadInput, match=r"^/dev/null: expected a file, got a device or a pipe"):
+    with pytest.raises(BadInput, match=r"^/dev/null: expected increments of a unit, got a device or a pipe"):
         read_increments(Path("/dev/null"), BY_NAME)
 
 

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* mkdtemp */
 #include "rig.h"
 
+#include "base/why.h"
 #include "link/http.h"
 #include "link/own_file.h"
 
@@ -186,11 +187,11 @@ static void whose_fault_it_is_follows_from_the_error(void **state)
     bool user = false;
     char why[200];
     (void)state;
-    assert_true(own_file_machine(ENOSPC) && own_file_machine(EMFILE) && own_file_machine(ESTALE));
-    assert_false(own_file_machine(ENOENT) || own_file_machine(EACCES) || own_file_machine(EBUSY));
+    assert_true(why_machine(ENOSPC) && why_machine(EMFILE) && why_machine(ESTALE));
+    assert_false(why_machine(ENOENT) || why_machine(EACCES) || why_machine(EBUSY));
     assert_null(own_file_output("--vcd ", "/nowhere/x", &user, why, sizeof why));
     assert_true(user);
-    assert_string_equal(why, "--vcd /nowhere/x: No such file or directory");
+    assert_string_equal(why, "--vcd /nowhere/x: expected a path that can be written, got no such folder");
     assert_string_equal(own_file_strerror(ESTALE), "moved, removed or replaced while it was written");
 }
 

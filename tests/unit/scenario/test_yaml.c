@@ -149,7 +149,7 @@ static const struct {
                                                "psa1), got w16, one of PSA-2 (board: psa2)"},
     {"units: [{profile: nope}]\n",
      "dir/s.yaml:1:19: units.a.profile: nope: expected a path or a name from proto/profiles"},
-    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: no such file"},
+    {"units: [{profile: ./nope.yaml}]\n", "dir/s.yaml:1:19: units.a.profile: dir/./nope.yaml: expected a profile file, got no such file"},
     {"units:\n- profile_set:\n    word_bits: 20\n",
      "dir/s.yaml:3:5: units.a.profile_set: word_bits: expected 16, 24 or 32, got 20"},
     {"units:\n- profile_set: {lead_in_clk: 0}\n",
@@ -444,7 +444,7 @@ static void a_missing_scenario_is_told_in_one_line(void **state)
              "multi, quartz_chamber, quartz_run_in, quiet, realistic, receiver, sins_coarse, sins_secondary, "
              "sins_table, six_positions, stream, table_rate");
     assert_false(scenario_load("./nope.yaml", &s, why, sizeof why));
-    assert_string_equal(why, "./nope.yaml: no such file, or not readable");
+    assert_string_equal(why, "./nope.yaml: expected a scenario file, got no such file");
 }
 
 static void a_dump_has_every_bit_of_a_number_and_every_unit_of_a_count(void **state)

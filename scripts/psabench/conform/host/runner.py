@@ -24,7 +24,7 @@ from psabench.conform.host.stimulus_line import LinePort
 from psabench.conform.profile import variant
 from psabench.conform.verdict import Inconclusive, Outcome, decide, not_decided
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, BenchError, expected
+from psabench.errors import BadInput, BenchError, StartError, expected
 from psabench.link.control import Control
 from psabench.procedures.head_bench import Progress
 
@@ -70,7 +70,7 @@ def wanted(
 
 
 def run(play: Play, tests: Sequence[CaseCheck], progress: Progress, told: Callable[[Outcome], None]) -> None:
-    """Each case once, then its tests; told: of each outcome as it comes."""
+    """Each case once, then its tests; told: of each outcome as it comes. Raises StartError: the first board has no port."""
     names = list(dict.fromkeys(j.case for j in tests))
     with progress.step("host", max(1, len(names))) as advance:
         for name in names:
@@ -80,6 +80,8 @@ def run(play: Play, tests: Sequence[CaseCheck], progress: Progress, told: Callab
             except BadInput:
                 raise
             except BenchError as e:
+                if isinstance(e, StartError) and name == names[0]:
+                    raise
                 shown = e
             took_s = time.monotonic() - begun_s
             for j in (j for j in tests if j.case == name):

@@ -27,7 +27,7 @@ from typing import Protocol, TextIO
 from psabench.conform.host import results
 from psabench.conform.host.results import Told
 from psabench.emulator import Emulator
-from psabench.errors import BadInput, TimeOut, expected
+from psabench.errors import BadInput, TimeOut, expected, input_error
 from psabench.link.control import Control
 
 STEP_S = 0.005  # simulated, between looks at the wall's clock
@@ -79,7 +79,7 @@ class Program:
                     start_new_session=True,
                 )
             except OSError as e:
-                raise BadInput(f"{self.argv[0]}: {e.strerror}") from e
+                raise input_error(self.argv[0], "a program", e) from e
 
     def gone(self) -> bool:
         return self.process is not None and self.process.poll() is not None

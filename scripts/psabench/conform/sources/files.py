@@ -15,7 +15,7 @@ from psabench.conform.sources.samples import PORT_LINES
 from psabench.conform.sources.sigrok import read_sr
 from psabench.conform.sources.taken import BLOCK, NS, Bounds, CanTake, LineTake
 from psabench.conform.sources.vcd_file import read_vcd_file
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, check_there, expected, input_error
 
 CAN_ENDINGS = can_logs.ENDINGS
 LINE_ENDINGS = (".vcd", ".sr", ".bin")
@@ -56,8 +56,7 @@ def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
     ending = path.suffix.lower()
     if ending not in CAN_ENDINGS + LINE_ENDINGS:
         raise BadInput(expected(f"an ending of {' '.join(CAN_ENDINGS + LINE_ENDINGS)}", ending or "none", path))
-    if not path.exists() or path.is_dir():
-        raise BadInput(expected("a file", "a folder", path) if path.exists() else f"{path}: no such file")
+    check_there(path, "a recording")
     try:
         if ending == ".vcd":
             return read_vcd_file(path, bounds)
@@ -65,7 +64,7 @@ def _read(path: Path, family: str, bounds: Bounds) -> CanTake | LineTake:
             return read_sr(path, bounds)
         return read_samples(path, PORT_LINES[family], bounds) if ending == ".bin" else can_logs.read_can(path, bounds)
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror or e}") from e
+        raise input_error(path, "a recording", e) from e
 
 
 def _one(path: Path, before: object, what: str) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from contextlib import suppress
 from dataclasses import dataclass
 
 import serial
 
-from psabench.errors import BadInput, LinkError, expected
+from psabench.errors import LinkError, expected, link_error
 
 BAUD = 115_200
 LOOK_S = 0.23  # between two looks, at most: the kernel's buffer of 4 kB lasts 0.35 s at 115200 bit/s
@@ -22,13 +21,12 @@ class SerialPort:
     """8 data bits, no parity, 1 stop bit; a pseudo-terminal or a device."""
 
     def __init__(self, path: str, baud: int = BAUD) -> None:
-        """Raises BadInput for a port that cannot be opened."""
+        """Raises LinkError for a port that cannot be opened."""
         self.path = path
         try:
             self._port = serial.Serial(path, baud, timeout=0)
         except (OSError, ValueError) as e:
-            got = os.strerror(e.errno) if isinstance(e, OSError) and e.errno else e
-            raise BadInput(expected("a serial port", got, f"--receiver {path}")) from e
+            raise link_error(f"--receiver {path}", "a serial port", e) from e
 
     def take(self) -> bytes:
         """All that has come. Raises LinkError where the device has gone.

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple, Self
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.link.can_host import Message
 from psabench.link.own import output_text, replace_file
 
@@ -92,7 +92,7 @@ def read_setup(folder: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a file of a recorded flight", e) from e
     except ValueError as e:
         raise BadInput(expected("JSON", e, path)) from e
     if not isinstance(found, dict):
@@ -122,7 +122,7 @@ def _whole_lines(path: Path) -> Iterator[tuple[int, str]]:
                 if line.endswith("\n"):
                     yield number, line
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a file of a recorded flight", e) from e
 
 
 def _read_can(path: Path) -> Iterator[Frame]:

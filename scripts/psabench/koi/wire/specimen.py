@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.koi.autocal import InstrumentClass
 from psabench.link.own import replace_file
 from psabench.link.signals import Floats
@@ -46,7 +46,7 @@ def _read_scenario(base: str) -> dict[str, Any]:
     try:
         found = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as e:
-        raise BadInput(f"{base}: {e.strerror}") from e
+        raise input_error(base, "a scenario", e) from e
     except yaml.YAMLError as e:
         raise BadInput(expected("YAML", str(e).splitlines()[0], base)) from e
     if not isinstance(found, dict):

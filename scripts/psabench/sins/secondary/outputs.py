@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.link.own import replace_file
 from psabench.native.strapdown import Floats
 from psabench.sins.increments import Increments
@@ -94,7 +94,7 @@ def _read_table(path: Path) -> tuple[list[str], Floats]:
                 warnings.simplefilter("ignore")  # of an empty file, which is refused below
                 numbers = np.loadtxt(file, delimiter=",", ndmin=2)
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "outputs of a unit in CSV", e) from e
     except (ValueError, UnicodeDecodeError) as e:
         raise BadInput(expected("a head of names and rows of numbers", " ".join(str(e).split())[:120], path)) from e
     if numbers.shape[0] < 2 or numbers.shape[1] != len(names):

@@ -26,7 +26,11 @@ MANY, FAST_S = 1030, 0.002  # readings that a noise wants; a word sooner than th
 
 @stimulus("power_on", boards=("psd1",))
 def power_on(s: Dut) -> Capture:
-    """From Res to the first cycles, streaming as soon as it has booted. facts: coefficients, as objects."""
+    """From Res to the first cycles, streaming as soon as it has booted. facts: coefficients, as objects.
+
+    Set up before: what moves in an earlier set-up would be taken for what follows Res.
+    """
+    calm(s)
     e = from_res(s, setup_s(s.variant))
     return replace(e, facts={**e.facts, "coefficients": kept_coefficients(s)})
 
