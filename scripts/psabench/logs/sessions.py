@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 
 from psabench.boards.board import PARALLEL_BUS
@@ -18,6 +19,8 @@ from psabench.link.own import replace_file
 from psabench.places import CHECKOUT
 
 NO_MARKERS = " ".join(26 * ["-1"])  # A to Z of GTKWave
+DECODED = "decoded"  # scope of the decoded rows in a recording for GTKWave
+GTK_ROW_PX, GTK_MARGIN_PX = 21, 130  # of GTKWave 3.3: a row; all that is not rows
 SHOWN_LINES = 10  # with the decoded rows as high as the window that PulseView opens, 1000 x 720
 FIRST_ROW_PX = (
     -10
@@ -79,19 +82,46 @@ def _option_lines(value: str | int) -> tuple[str, str]:
 
 def gtkwave_text(board: str, from_ns: int | None = None) -> str:
     """The .gtkw file; from_ns: where the window begins, in the recording's time (the board's)."""
-    session = SESSIONS[board]
-    begin_ns, cursor_ns = (session.gtk_from_ns, session.gtk_cursor_ns) if from_ns is None else (from_ns, from_ns)
-    first, second = session.comment.split("\n")
+    first, second = SESSIONS[board].comment.split("\n")
     return "\n".join([
         f"[*] GTKWave: gtkwave run.vcd share/{board}.gtkw (or File, Read Save File). {first}",
         f"[*] {second} Times here are nanoseconds.",
-        f"[timestart] {begin_ns}",
-        f"[size] 1400 {session.gtk_height}",
-        "[pos] -1 -1",
-        f"*-15.000000 {cursor_ns} {NO_MARKERS}",
-        *_group_lines(board, session.groups),
+        *_gtkwave_window(board, from_ns, SESSIONS[board].gtk_height),
+        *_group_lines(board, SESSIONS[board].groups),
         "",
     ])  # fmt: skip
+
+
+def decoded_gtkwave_text(board: str, rows: Sequence[str], from_ns: int | None = None) -> str:
+    """The .gtkw file of a recording with decoded rows (logs/decoded_vcd.py): those first, then the lines.
+
+    A parallel bus is a row for its address and a row for its data. The window is as high as the rows.
+    """
+    shown = ["@28", *(f"{DECODED}.{row}" for row in rows)]
+    for names in SESSIONS[board].groups.values():
+        shown += ["@200", "-"]
+        for name in names.split():
+            shown += _bus_lines(board) if name == "*" else ["@28", f"{board}.{name}"]
+    drawn = sum(not line.startswith("@") for line in shown)
+    height = max(SESSIONS[board].gtk_height, GTK_MARGIN_PX + GTK_ROW_PX * drawn)
+    return "\n".join([*_gtkwave_window(board, from_ns, height), "[sst_expanded] 0", *shown, ""])
+
+
+def _bus_lines(board: str) -> Iterator[str]:
+    """CS, RW, AB[3:0], D[15:0]; vectors in hexadecimal."""
+    for stem, numbered in groupby(PARALLEL_BUS, lambda line: line.rstrip("0123456789")):
+        lines = [f"{board}.{line}" for line in numbered]
+        if len(lines) > 1:
+            yield from ("@22", f"#{{{stem}[{len(lines) - 1}:0]}} {' '.join(reversed(lines))}")
+        else:
+            yield from ("@28", *lines)
+
+
+def _gtkwave_window(board: str, from_ns: int | None, height: int) -> Iterator[str]:
+    session = SESSIONS[board]
+    begin_ns, cursor_ns = (session.gtk_from_ns, session.gtk_cursor_ns) if from_ns is None else (from_ns, from_ns)
+    yield from (f"[timestart] {begin_ns}", f"[size] 1400 {height}", "[pos] -1 -1")
+    yield f"*-15.000000 {cursor_ns} {NO_MARKERS}"
 
 
 def _group_lines(board: str, groups: Mapping[str, str]) -> Iterator[str]:

@@ -39,9 +39,21 @@ def span_of(vcd: Path) -> Span:
     with vcd.open("rb") as file:
         file.seek(max(0, vcd.stat().st_size - TAIL))
         tail = file.read()
-    scale, first, last = SCALE.search(head), TIME.findall(head), TIME.findall(tail)
-    if not scale or not first or not last:
+    unit, first, last = _unit_in(head), TIME.findall(head), TIME.findall(tail)
+    if not unit or not first or not last:
         raise BadInput(expected("a VCD file with a time scale and times", "another file", vcd))
-    unit_fs = int(scale[1]) * FS[scale[2]]
-    start, edge, end = (int(t) * unit_fs // FS[b"ns"] for t in (first[0], [*first, last[-1]][1], last[-1]))
+    start, edge, end = (int(t) * unit // FS[b"ns"] for t in (first[0], [*first, last[-1]][1], last[-1]))
     return Span(start, edge, end)
+
+
+def unit_fs(vcd: Path) -> int:
+    """The unit of a recording's times. Raises BadInput."""
+    if unit := _unit_in(read_head(vcd)):
+        return unit
+    raise BadInput(expected("a VCD file with a time scale", "another file", vcd))
+
+
+def _unit_in(head: bytes) -> int:
+    """fs; 0: none is declared."""
+    scale = SCALE.search(head)
+    return int(scale[1]) * FS[scale[2]] if scale else 0

@@ -6,11 +6,13 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from psabench.errors import BadInput, BenchError, expected
+from psabench.logs.decoded_vcd import write_decoded
 from psabench.logs.viewers import shipped_folder, write_sessions
 
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # of X11 and Wayland
@@ -40,15 +42,18 @@ class Start:
         return " ".join([*(f"{k}={shlex.quote(v)}" for k, v in self.environment.items()), shlex.join(self.words)])
 
 
-def start_of(file: Path, program: str | None) -> Start:
-    """What opens FILE in the program, or in the first that is installed. Raises BadInput, OutputError."""
+def start_of(file: Path, program: str | None, decode_s: float) -> Start:
+    """What opens FILE in the program, or in the first that is installed. Raises BadInput, BenchError.
+
+    decode_s: how much of it is decoded for GTKWave; PulseView decodes by itself.
+    """
     _check_kind(file)
-    return PROGRAMS[program or _first_installed()](file, _ensure_sessions(file))
+    return PROGRAMS[program or _first_installed()](file, _ensure_sessions(file), decode_s)
 
 
-def view_file(file: Path, program: str | None) -> None:
+def view_file(file: Path, program: str | None, decode_s: float) -> None:
     """Opens FILE. Raises BadInput, BenchError."""
-    start = start_of(file, program)
+    start = start_of(file, program, decode_s)
     program = start.words[0]
     panel = f"psabench panel --recording {shlex.quote(str(file))} shows it in a browser"
     if not shutil.which(program):
@@ -80,17 +85,31 @@ def _ensure_sessions(vcd: Path) -> Mapping[str, Path]:
     return {path.suffix: path for path in [*write_sessions(vcd, keep=kept), *kept]}
 
 
-def _start_pulseview(vcd: Path, sessions: Mapping[str, Path]) -> Start:
+def _start_pulseview(vcd: Path, sessions: Mapping[str, Path], decode_s: float) -> Start:
     """-c: without the sessions that were open before. The file of the same base name it finds by itself."""
     decoders = {"SIGROKDECODE_DIR": str(shipped_folder("decoders"))}
     return Start(["pulseview", "-c", "-i", str(vcd), "-I", "vcd"], decoders)
 
 
-def _start_gtkwave(vcd: Path, sessions: Mapping[str, Path]) -> Start:
-    return Start(["gtkwave", str(vcd), str(sessions[".gtkw"])])
+def _start_gtkwave(vcd: Path, sessions: Mapping[str, Path], decode_s: float) -> Start:
+    """On a copy with decoded rows, or on the lines alone where sigrok is not installed or fails."""
+    lines = Start(["gtkwave", str(vcd), str(sessions[".gtkw"])])
+    if not shutil.which("sigrok-cli"):
+        _note(expected("sigrok-cli (apt-get install sigrok-cli)", "none; no decoded rows", "view"))
+        return lines
+    try:
+        decoded = write_decoded(vcd, decode_s)
+    except BenchError as e:
+        _note(f"{e}; no decoded rows")
+        return lines
+    return Start(["gtkwave", *map(str, decoded)]) if decoded else lines
 
 
-PROGRAMS: Mapping[str, Callable[[Path, Mapping[str, Path]], Start]] = {
+def _note(text: str) -> None:
+    print(f"psabench: {text}", file=sys.stderr)
+
+
+PROGRAMS: Mapping[str, Callable[[Path, Mapping[str, Path], float], Start]] = {
     "pulseview": _start_pulseview,
     "gtkwave": _start_gtkwave,
 }

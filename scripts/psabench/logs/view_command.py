@@ -13,9 +13,10 @@ from psabench.output import STREAM, add_json, show_data, show_event
 from psabench.places import no_package
 
 PORT = 8765  # what Foxglove offers
+DECODE_S = 0.2  # of a recording, for GTKWave: two seconds of a processor for a PSA-2, whose frames begin at 189 ms
 
 USAGE = """\
-psabench view FILE [--with pulseview|gtkwave] [--print]
+psabench view FILE [--with pulseview|gtkwave] [--decode SECONDS] [--print]
        psabench view [--can BUS] [--board BOARD] [--port PORT] [--for SECONDS] [--v-per-g V]"""
 EPILOG = """\
 examples:
@@ -25,9 +26,9 @@ examples:
   psabench view --can socketcand:127.0.0.1:29536          then open ws://127.0.0.1:8765 in Foxglove
   psabench view --can slcan:/dev/ttyACM0 --board psd1 --port 9000
 
-In a browser, without a viewer: psabench panel --recording FILE.
-With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there. Without: serves
-until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
+With FILE: writes the session files beside it, as psabench waveform, and keeps those that are there; for GTKWave also
+FILE.decoded.vcd, a copy with decoded rows, which sigrok-cli makes. In a browser: psabench panel --recording FILE.
+Without: serves until --for, Ctrl-C, or the end of the link (exit status 3). The server accepts local connections only.
 """
 
 
@@ -43,6 +44,8 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     file = p.add_argument_group("a recording of lines")
     file.add_argument("file", type=Path, nargs="?", metavar="FILE", help="VCD file of psa-emu --vcd or probe.start")
     file.add_argument("--with", dest="program", choices=["pulseview", "gtkwave"], help="(the first that is installed)")
+    first = "how much of it is decoded for GTKWave, from its first instant on (%(default)g)"
+    file.add_argument("--decode", dest="decode_s", type=positive, default=DECODE_S, metavar="SECONDS", help=first)
     file.add_argument("--print", dest="show", action="store_true", help="print the command line instead of starting it")
     live = p.add_argument_group("the bus, live")
     live.add_argument("--can", help=CAN_HELP)
@@ -69,9 +72,9 @@ def _run_view(args: argparse.Namespace) -> int:
     from psabench.logs.vcd_view import start_of, view_file
 
     if not args.show:
-        view_file(args.file, args.program)
+        view_file(args.file, args.program, args.decode_s)
         return 0
-    start = start_of(args.file, args.program)
+    start = start_of(args.file, args.program, args.decode_s)
     show_data(args, {"command": [*start.words], "environment": dict(start.environment)}, [start.command_line()])
     return 0
 

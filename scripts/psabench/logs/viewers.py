@@ -102,13 +102,22 @@ def shipped_folder(folder: str) -> Path:
     raise BadInput(expected(f"the folder {folder} of psabench", "none"))
 
 
+def scope_of(vcd: Path) -> str:
+    """The board of a recording, which its first scope names; "": none. Raises BadInput."""
+    scope = SCOPE.search(read_head(vcd))
+    return scope[1].decode() if scope else ""
+
+
+def lines_of(vcd: Path) -> list[str]:
+    """The lines of a recording, in its order. Raises BadInput."""
+    return [name.decode() for name in LINE.findall(read_head(vcd).partition(b"$enddefinitions")[0])]
+
+
 def write_sessions(vcd: Path, keep: Sequence[Path] = ()) -> list[Path]:
     """Sessions beside a VCD, of the board that its scope names, less those to keep. Raises BadInput, OutputError."""
-    head = read_head(vcd).partition(b"$enddefinitions")[0]
-    scope, lines = SCOPE.search(head), [name.decode() for name in LINE.findall(head)]
-    if not scope or not lines:
+    board, lines = scope_of(vcd), lines_of(vcd)
+    if not board or not lines:
         raise BadInput(expected("a VCD file with a scope and wires", "another file", vcd))
-    board = scope[1].decode()
     texts = board_texts(board, span_of(vcd)) if board in SESSIONS else {".gtkw": gtkw_text(board, lines)}
     written = [(vcd.with_suffix(ending), text) for ending, text in texts.items() if vcd.with_suffix(ending) not in keep]
     for path, text in written:
@@ -121,10 +130,16 @@ def board_texts(board: str, span: Span) -> dict[str, str]:
 
     PulseView counts from a recording's first instant on, GTKWave from power-on.
     """
+    from_ns = window_start_ns(board, span)
+    pulseview_ns = SESSIONS[board].from_ns if from_ns is None else from_ns
+    return {".gtkw": gtkwave_text(board, from_ns), ".pvs": pulseview_text(board, pulseview_ns - span.start_ns)}
+
+
+def window_start_ns(board: str, span: Span) -> int | None:
+    """The first edge of a recording without the instants at which the board's sessions begin; None: it has them."""
     session = SESSIONS[board]
-    if not all(span.start_ns <= t_ns < span.end_ns for t_ns in (session.from_ns, session.gtk_from_ns)):
-        return {".gtkw": gtkwave_text(board, span.edge_ns), ".pvs": pulseview_text(board, span.edge_ns - span.start_ns)}
-    return {".gtkw": gtkwave_text(board), ".pvs": pulseview_text(board, session.from_ns - span.start_ns)}
+    has_them = all(span.start_ns <= t_ns < span.end_ns for t_ns in (session.from_ns, session.gtk_from_ns))
+    return None if has_them else span.edge_ns
 
 
 def write_pictures(args: argparse.Namespace) -> list[Path]:
