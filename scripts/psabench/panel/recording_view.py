@@ -19,6 +19,7 @@ from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import describe_command
 from psabench.panel.playback import Player, Scan, recording_files, scan_log
+from psabench.panel.view import TURN_S
 from psabench.shell.builtins import ROWS
 from psabench.shell.commands import Vocabulary
 from psabench.shell.grammar import Call, parse
@@ -26,7 +27,6 @@ from psabench.shell.lexer import Wrong
 
 LINES = ("wait", "at", "time", "dut.use")  # of the shell that a recording understands
 UNITS = 128  # that are shown
-TURN_S = 0.1  # real time that playing may take before pages get their turn
 
 
 @dataclass(frozen=True, slots=True)
