@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from psabench.bench import Bench
+from psabench.bench import NS, Bench
 from psabench.boards.psa2.device import Psa2
 from psabench.errors import BenchError, ControlError, expected
 from psabench.link.signals import Ints
@@ -21,6 +21,8 @@ from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, channel_figures, overview_row, samples_of, unit_message
 from psabench.panel.describe import NOT_HERE, describe_bench
 from psabench.panel.frame_view import drawn_frame, tears_of
+from psabench.panel.view import TURN_S
+from psabench.shell.builtins import SLICE_NS
 from psabench.shell.grammar import Call, parse
 from psabench.shell.lexer import Wrong
 from psabench.shell.session import Session
@@ -44,7 +46,9 @@ class BenchView:
     session: Session = field(init=False)
     channels: dict[str, Channels] = field(init=False)
     traces: list[CanTrace] = field(init=False)
-    histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot, by its name
+    histories: dict[str, Transcript] = field(
+        default_factory=dict
+    )  # what led to each snapshot, by its name: the panel's
     lines: dict[str, Ints] = field(init=False)  # of a unit: frames drawn from its lines, torn ones
     tables: tuple[str, ...] = ()  # axes of the rate table: names of their readings
     mounts: dict[str, str] = field(default_factory=dict)  # where each unit is: head, table ...
@@ -74,7 +78,11 @@ class BenchView:
         self.bench.between = look
 
     def wait(self, for_s: float) -> None:
-        self.bench.wait(for_s)
+        """As far as it comes meanwhile: a high speed slows down rather than hold up what pages ask for."""
+        deadline_s, left_ns, slice_ns = time.monotonic() + TURN_S, round(for_s * NS), SLICE_NS
+        while left_ns > 0 and time.monotonic() < deadline_s:
+            self.bench.wait(min(slice_ns, left_ns) / NS)
+            left_ns, slice_ns = left_ns - slice_ns, 2 * slice_ns  # of a fast bench a long one soon
 
     def close(self) -> None:
         self.bench.close()
@@ -117,9 +125,8 @@ class BenchView:
             raise Wrong(expected(f"a file name without a folder (it will be in {self.out})", repr(name[:40]), "file"))
         return self.out / name
 
-    def go_on_from(self, name: str, before: BenchView) -> None:
-        """This bench comes from a snapshot of the one before: so does its script, where the panel has seen it made."""
-        self.histories = before.histories
+    def go_on_from(self, name: str) -> None:
+        """This bench comes from a snapshot: so does its script, where the panel has seen it made."""
         if name in self.histories:
             self.session.transcript = self.histories[name].copy()
 

@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import signal
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,11 +22,14 @@ from psabench.panel.guard import Door, Log
 from psabench.panel.handlers import HANDLERS
 from psabench.panel.hub import Hub
 from psabench.panel.procedures import Runs
+from psabench.panel.prompt_http import PromptHttp
 from psabench.panel.recorded.source import RecordingSource
 from psabench.panel.server import MESSAGE_BYTES, Pages, ThreadedHub
 from psabench.panel.source import Source
 from psabench.panel.worker import Worker, text_of
 from psabench.shell.connect import Opening, addresses
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last one when the terminal is closed
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
                 asyncio.run(_serve(listener, hub, worker, runs.out, ready))
         finally:
+            for number in ENDING:  # once is enough: what was started is being ended, forks, too
+                signal.signal(number, signal.SIG_IGN)
             runs.close()
             worker.stop()
     if worker.failed is not None:  # a recording that could not be read to its end
@@ -92,7 +98,7 @@ async def _serve(
         proxy_headers=False,  # there is no proxy whose headers could be trusted
         server_header=False,
         lifespan="off",
-        http="h11",
+        http=PromptHttp,
         ws=BoundedSocket,
         ws_max_size=MESSAGE_BYTES,
         ws_per_message_deflate=False,  # loopback: it would cost more than it saves
@@ -104,6 +110,8 @@ async def _serve(
     def end() -> None:
         loop.call_soon_threadsafe(setattr, server, "should_exit", True)
 
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+        signal.signal(signal.SIGHUP, lambda *_: end())
     worker.on_death = end
     if worker.died or worker.failed is not None:
         return

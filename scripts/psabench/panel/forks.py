@@ -38,7 +38,7 @@ def show_fork(w: Worker, file: str, seed: int | None) -> dict[str, Any]:
 
 def _from_snapshot(source: Source, view: BenchView, file: str) -> BenchView:
     new = source.restored(view.file(file))
-    new.go_on_from(file, view)
+    new.go_on_from(file)
     return new
 
 

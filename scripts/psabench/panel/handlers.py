@@ -69,7 +69,7 @@ def _restore_snapshot(w: Worker, request: Request) -> dict[str, Any]:
     source, name = own_source(w.source, "go back"), _text_of(request, "file")
     before = bench_view(w.view)
     new = source.restored(before.file(name))
-    new.go_on_from(name, before)
+    new.go_on_from(name)
     w.exchange(new, f"snapshot {name}", playing=False)
     return {"time": w.time()}
 

@@ -69,7 +69,7 @@ class Runs:
     def __init__(self, out: Path, changed: Callable[[], None]) -> None:
         self.out = out
         self.progress = Progress()
-        self.intervals = Intervals(out / "intervals.jsonl")
+        self.intervals = Intervals(out / f"intervals-{os.getpid()}.jsonl")  # another panel may have the same folder
         self._changed = changed
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
@@ -120,6 +120,7 @@ class Runs:
             except subprocess.TimeoutExpired:
                 _signal_group(self._process.pid, signal.SIGKILL)
                 self._process.wait()
+        self.intervals.forget()
 
     def _follow(self, ours: int, process: subprocess.Popen[bytes], progress: Progress) -> None:
         rest = b""

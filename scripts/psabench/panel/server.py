@@ -162,11 +162,12 @@ class Pages:
 
 
 def parse_request(text: str) -> dict[str, Any] | None:
-    """A request: an object with a text "do"; None: malformed."""
+    """A request: an object with a text "do"; None: malformed, or with half a surrogate pair, which no file takes."""
     if len(text.encode()) > MESSAGE_BYTES:
         return None
     try:
         request = json.loads(text)
+        json.dumps(request, ensure_ascii=False).encode()
     except (ValueError, RecursionError):
         return None
     is_one = isinstance(request, dict) and isinstance(request.get("do"), str)

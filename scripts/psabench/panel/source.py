@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from psabench.bench import Bench
@@ -11,6 +11,7 @@ from psabench.errors import BenchError, expected
 from psabench.panel import view
 from psabench.panel.bench_view import BenchView
 from psabench.shell.connect import Opening
+from psabench.shell.transcript import Transcript
 
 
 @dataclass(slots=True)
@@ -20,6 +21,7 @@ class Source:
     opening: Opening
     out: Path
     truth: Path | None = None
+    histories: dict[str, Transcript] = field(default_factory=dict)  # what led to each snapshot of any of its benches
 
     @property
     def is_own(self) -> bool:
@@ -41,7 +43,7 @@ class Source:
                 bench.truth_path = self.truth
             return bench
 
-        return bench_of(opened, lambda b: BenchView(b, self.out, opening.start))
+        return bench_of(opened, lambda b: BenchView(b, self.out, opening.start, self.histories))
 
     def begin(self, scenario: str, seed: int | None) -> BenchView:
         """Another scenario from now on, also after a loss. Raises BenchError, and nothing has changed."""
@@ -55,7 +57,9 @@ class Source:
         """From a snapshot. Raises BenchError."""
         self.check_own("go back")
         pace = self.opening.pace or "step"
-        return bench_of(lambda: Bench.restore(path, pace=pace), lambda b: BenchView(b, self.out))
+        return bench_of(
+            lambda: Bench.restore(path, pace=pace), lambda b: BenchView(b, self.out, histories=self.histories)
+        )
 
     def check_own(self, what: str) -> None:
         if not self.is_own:
@@ -79,8 +83,7 @@ def bench_view(shown: view.View) -> BenchView:
 
 def forked_view(origin: BenchView) -> BenchView:
     """A second bench that goes on from this instant, with the script that leads there. Raises BenchError."""
-    new = bench_of(origin.bench.fork, lambda b: BenchView(b, origin.out, origin.start))
-    new.histories = origin.histories
+    new = bench_of(origin.bench.fork, lambda b: BenchView(b, origin.out, origin.start, origin.histories))
     new.session.transcript = origin.session.transcript.copy()
     if origin.unit in new.bench.units:
         new.session.use(origin.unit)

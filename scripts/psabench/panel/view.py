@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+TURN_S = 0.1  # real time that a `wait` of the page may take before pages get their turn
+
 
 class View(Protocol):
     """Used in the worker's thread alone. In pace "step" time moves only by `wait` and lines."""
@@ -21,7 +23,10 @@ class View(Protocol):
         """Call it after each slice of a wait; what it raises ends the wait."""
         ...
 
-    def wait(self, for_s: float) -> None: ...
+    def wait(self, for_s: float) -> None:
+        """Let time pass, or less of it where that takes longer than about TURN_S of real time."""
+        ...
+
     def receive(self, for_s: float) -> None: ...
     def close(self) -> None: ...
     def now_s(self) -> float: ...

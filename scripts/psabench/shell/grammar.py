@@ -38,6 +38,9 @@ class Call:
 
 def parse(line: str, vocabulary: Vocabulary) -> Call | None:
     """The call of a line; None for a blank or a comment. Raises Wrong with the column and what would be right."""
+    first, *others = line.splitlines() or [""]
+    if others:  # a saved script would have two
+        raise Wrong(expected("one line", "a line break", "line"), len(first) + 1)
     name = re.match(r"\s*([^\s#]+)", line)
     command = vocabulary.commands.get(name[1]) if name else None
     if command and command.args and command.args[-1].kind is Kind.REST:

@@ -37,7 +37,7 @@ class Transcript:
         lines = [HEADER, *([self.start] if self.start else [])]
         for said in self.said:
             if said.wrong:
-                lines.append(f"# {said.line}   error: {' '.join(said.wrong.split())}")
+                lines.append(f"# {' '.join(said.line.split())}   error: {' '.join(said.wrong.split())}")
                 continue
             if not self.lockstep and said.t_ns is not None and not said.line.startswith("at "):
                 lines.append(f"at {seconds(said.t_ns)}")

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import panel_run as run
@@ -70,6 +73,24 @@ def test_forks_are_few_end_with_the_panel_and_after_a_lost_one_the_first_is_show
             processes += run.children(pid)
         assert len(processes) == 5
     assert [pid for pid in processes if runs(pid)] == []
+
+
+@pytest.mark.parametrize("often", [signal.SIGHUP, signal.SIGINT])
+def test_a_closed_terminal_and_a_second_ctrl_c_leave_no_process(often: signal.Signals, tmp_path: Path) -> None:
+    with run.running("quiet", "--paused", "--out", tmp_path) as panel, panel.socket() as socket:
+        assert "error" not in run.asked(socket, 1, do="fork")
+        assert "error" not in run.asked(socket, 2, do="run", name="turns")
+        processes = [panel.process.pid]
+        for pid in processes:
+            processes += run.children(pid)
+        assert len(processes) >= 4  # emulator, fork, procedure
+        while panel.process.poll() is None:
+            panel.process.send_signal(often)
+            with suppress(subprocess.TimeoutExpired):
+                panel.process.wait(0.02)
+    deadline_s = time.monotonic() + run.WAIT_S
+    while left := [pid for pid in processes if runs(pid)]:  # the procedure's own emulator ends with it
+        assert time.monotonic() < deadline_s, left
 
 
 def test_time_that_moves_by_itself_cannot_rest(tmp_path: Path) -> None:

@@ -5,22 +5,31 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import math
+import os
 import sys
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import uvicorn
+from panel_run import WAIT_S
 from psabench import cli
 from psabench.errors import BenchError
 from psabench.link.signals import Floats
+from psabench.panel import bench_view, prompt_http
+from psabench.panel.bench_view import BenchView
 from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, split_envelopes
 from psabench.panel.guard import Allowance, Door, Log
 from psabench.panel.hub import UPDATES, Client
-from psabench.panel.procedures import Progress
+from psabench.panel.procedures import Progress, Runs
 from psabench.panel.server import MESSAGE_BYTES, parse_request
 from psabench.panel.statistics import amplitude_density, channel_statistics
+from psabench.panel.view import TURN_S
+from uvicorn.server import ServerState
 
 DOOR = Door(port=8000, token="secret-token")
 OWN = {"host": "127.0.0.1:8000", "cookie": "psabench_panel_8000=secret-token"}
@@ -94,11 +103,62 @@ def test_a_page_may_send_a_burst_and_then_a_rate() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "null", "[]", "{}", '{"do":1}', '{"do":"hello","id":"x"}', "[" * 4000, '{"do":"' + "x" * MESSAGE_BYTES + '"}'],
-)
+    ["", "null", "[]", "{}", '{"do":1}', '{"do":"hello","id":"x"}', "[" * 4000, '{"do":"' + "x" * MESSAGE_BYTES + '"}',
+     '{"do":"line","line":"\\ud800"}'],
+)  # fmt: skip
 def test_malformed_requests_are_none(text: str) -> None:
     assert parse_request(text) is None
     assert parse_request('{"do":"hello","id":1}') == {"do": "hello", "id": 1}
+
+
+def test_at_a_speed_that_the_bench_has_not_pages_get_their_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock_s, waited_s = 0.0, 0.0
+    view = object.__new__(BenchView)
+    view.bench = Mock()
+    monkeypatch.setattr(bench_view, "time", Mock(monotonic=lambda: clock_s))
+
+    def wait(for_s: float, own_s: float) -> None:
+        nonlocal clock_s, waited_s
+        clock_s, waited_s = clock_s + for_s * own_s, waited_s + for_s
+
+    view.bench.wait = partial(wait, own_s=0.5)  # real time for a second of its own
+    view.wait(66.0)
+    assert TURN_S <= clock_s <= 2 * TURN_S
+    waited_s = 0.0
+    view.bench.wait = partial(wait, own_s=1e-4)
+    view.wait(66.666_666_667)
+    assert waited_s == pytest.approx(66.666_666_667, abs=1e-9)
+
+
+def test_another_panel_in_the_same_folder_has_intervals_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine = Runs(tmp_path, lambda: None)
+    monkeypatch.setattr(os, "getpid", lambda: 1)
+    other = Runs(tmp_path, lambda: None)
+    other.intervals.path.write_text('{"readings": 1, "estimates": []}\n')
+    mine.close()
+    assert other.intervals.path.exists()
+    other.close()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_a_connection_that_asks_for_nothing_ends(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prompt_http, "LIFE_S", 0.01)
+
+    async def answer() -> bytes:
+        config = uvicorn.Config(Mock(), log_config=None)
+        config.load()
+        new = asyncio.get_running_loop().create_server
+        async with await new(lambda: prompt_http.PromptHttp(config, ServerState(), {}), "127.0.0.1", 0) as server:
+            reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+            writer.write(sent)
+            read = await asyncio.wait_for(reader.read(), WAIT_S)
+            writer.close()
+            return read
+
+    assert asyncio.run(answer()) == b""
 
 
 def test_an_envelope_keeps_a_spike_and_every_sample_counts_once() -> None:

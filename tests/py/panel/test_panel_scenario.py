@@ -19,6 +19,7 @@ def test_another_scenario_takes_the_place_of_the_bench_and_every_page_is_told(tm
         assert offered["name"] == "quiet"
         assert {"calibrate", "multi"} <= {n["name"] for n in offered["names"]}
         assert "error" not in run.said(asks, 2, "wait 0.5")
+        assert "error" not in run.said(asks, 2, "bench.snapshot quiet.psasnap")
         text = run.asked(asks, 3, do="scenario", name="multi")["text"]
         assert "error" in run.asked(asks, 4, do="scenario", name="../../etc/passwd")
         answer = run.asked(asks, 5, do="begin", name="multi", text=text, seed=7)
@@ -34,6 +35,9 @@ def test_another_scenario_takes_the_place_of_the_bench_and_every_page_is_told(tm
         assert file.read_text() == edited
         assert "error" not in run.said(asks, 7, "save it.psa")
         assert f"start {file}\n" in (out / "it.psa").read_text()
+        assert "error" not in run.asked(asks, 8, do="restore", file="quiet.psasnap")  # of the bench before: it is known
+        assert "error" not in run.said(asks, 9, "save back.psa")
+        assert "start quiet\n" in (out / "back.psa").read_text()
 
 
 def test_a_wrong_text_is_rejected_with_its_place_and_the_bench_goes_on(tmp_path: Path) -> None:

@@ -66,6 +66,8 @@ WRONG: list[tuple[str, int, str]] = [
     ('probe.start "run', 13, "expected a closing quote, got \"run"),
     ("scpi.send tabel *IDN?", 11, "did you mean table?"),
     ("scpi.send table", 16, "line: expected a value (the rest of the line), got none"),
+    ("head.turn 5\nbench.quit", 12, "line: expected one line, got a line break"),
+    ("head.read # a\u2028bench.quit", 14, "line: expected one line, got a line break"),
 ]  # fmt: skip
 
 

@@ -208,6 +208,7 @@ def test_a_session_in_real_time_is_saved_with_its_instants() -> None:
     t.add("head.turn 5", 1_000_000_000)
     t.add("head.read", 1_000_000_000)
     t.add("head.spin", 1_100_000_000, "head.spin: unknown command")
+    t.add("head.spin\nbench.snapshot x", 1_100_000_000, "line: expected one line")  # stays a comment
     t.add("wait 1", 1_200_000_000)
     t.add("head.read", 2_250_000_001)
     assert t.script().splitlines()[1:] == [
@@ -216,6 +217,7 @@ def test_a_session_in_real_time_is_saved_with_its_instants() -> None:
         "head.turn 5",
         "head.read",
         "# head.spin   error: head.spin: unknown command",
+        "# head.spin bench.snapshot x   error: line: expected one line",
         "at 1.2",
         "wait 1",
         "at 2.250000001",

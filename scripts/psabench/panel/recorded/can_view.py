@@ -20,9 +20,9 @@ from psabench.panel.can_trace import CanTrace
 from psabench.panel.channels import Channels, overview_row, samples_of, unit_message
 from psabench.panel.recorded.base import PlayedView
 from psabench.panel.recorded.playback import Player, Scan, scan_log
+from psabench.panel.view import TURN_S
 
 UNITS = 128  # that are shown
-TURN_S = 0.1  # real time that playing may take before pages get their turn
 
 
 @dataclass(frozen=True, slots=True)
