@@ -153,4 +153,4 @@ def overview_row(name: str, title: str, c: Channels, counters: FrameCounters) ->
         [n, None if b is None else float(f"{b[2]:.7g}"), u] for n, b, u in zip(c.names, last, c.units, strict=False)
     ]
     head = {"name": name, "board": title, "samples": c.count, "lost": counters.lost}
-    return head | {"torn": counters.torn, "last": shown[:SHOWN]}
+    return head | {"torn": counters.torn, "stretches": counters.stretches, "last": shown[:SHOWN]}

@@ -102,7 +102,7 @@ export function overview(state, chosen, say) {
   if (state.overview.length > 1) fill($("#overview tbody"), state.overview.map((u) => [u.name, u.board, u.samples, [u.lost, u.lost ? "bad" : ""],
     [u.torn, u.torn ? "bad" : ""], [u.last.map(([n, v, unit]) => `${n} ${digits(v)} ${unit}`).join(", "), "text"]]));
   const unit = state.overview.find((u) => u.name === chosen);
-  $("#health").textContent = unit ? `${unit.board}: ${unit.samples} samples, lost ${unit.lost}, torn ${unit.torn}${lines(unit)}` : "";
+  $("#health").textContent = unit ? `${unit.board}: ${unit.samples} samples, lost ${unit.lost}, torn ${unit.torn}${lines(unit)}${begun(unit)}` : "";
   const names = state.overview.map((u) => u.name);
   const holder = $("#units");
   if (holder.dataset.key !== names.join()) {
@@ -112,6 +112,7 @@ export function overview(state, chosen, say) {
   for (const button of holder.children) button.setAttribute("aria-pressed", button.dataset.unit === chosen);
 }
 
+const begun = ({ stretches }) => (stretches > 1 ? `; in ${stretches} stretches of the stream` : "");
 const lines = ({ lines: [frames, torn] }) => (frames ? `; on the lines ${frames} frames drawn, torn ${torn}` : "");
 
 export function can(message) {
