@@ -106,4 +106,15 @@ def test_intervals_are_drawn_while_they_tighten(browser: Browser, tmp_path: Path
         assert box.locator("canvas").count() == 1
         expect(page.locator("#procedure-step")).to_contain_text("done", timeout=LONG_MS)
         expect(box).to_contain_text("480 readings")
+        found = re.search(r"kx_v_per_g (\S+) \u00b1 (\S+) V/g", box.inner_text())
+        assert found is not None
+        value, half = float(found[1]), float(found[2])
+        k = (
+            page.locator("[data-estimate]")
+            .evaluate_all("(all) => all.map((e) => e.dataset.estimate)")
+            .index("kx_v_per_g")
+        )
+        low, high = page.evaluate(f"import('/static/intervals.js').then((m) => m.scales()[{k}])")
+        assert high - low == pytest.approx(8 * half, rel=0.1)  # the latest interval is a quarter of the plot
+        assert (low + high) / 2 == pytest.approx(value, abs=half)
         assert page.locator("#intervals canvas").count() == SHOWN

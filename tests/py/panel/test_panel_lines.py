@@ -13,11 +13,11 @@ import panel_run as run
 import pytest
 from psabench.boards.board import PARALLEL_BUS
 from psabench.boards.psa2.device import CODE_V
+from psabench.boards.psa2.frames import Frames
 from psabench.errors import BadInput
-from psabench.link.signals import Floats
-from psabench.link.vcd import read_vcd
-from psabench.panel.recorded import lines_view
-from psabench.panel.recorded.line_window import COLUMNS, MOST_LINES
+from psabench.link.vcd import Wire, read_vcd
+from psabench.panel.recorded import line_words, lines_view
+from psabench.panel.recorded.line_window import COLUMNS, MOST_LINES, line_part
 from psabench.panel.recorded.lines_view import LinesView
 from psabench.panel.recorded.opening import Opening
 from psabench.panel.recorded.source import RecordingSource
@@ -27,14 +27,14 @@ from recorded_lines import record_psa2
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Floats]:
-    """100 ms of a PSA-2, the middle of it with a pulse of CLK missing in each frame; volts that CAN had, (n, 3)."""
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
+    """100 ms of a PSA-2, the middle of it with a pulse of CLK missing in each frame; what CAN had of it."""
     path = tmp_path_factory.mktemp("lines") / "run.vcd"
     return path, record_psa2(path)
 
 
 @pytest.fixture
-def view(recorded: tuple[Path, Floats]) -> LinesView:
+def view(recorded: tuple[Path, Frames]) -> LinesView:
     return opened(recorded[0])
 
 
@@ -63,12 +63,13 @@ def frames_at(view: LinesView, what: str) -> list[int]:
         at_ns = frame["begin_ns"]
 
 
-def test_the_values_are_those_that_can_has(view: LinesView, recorded: tuple[Path, Floats]) -> None:
+def test_the_values_are_those_that_can_has(view: LinesView, recorded: tuple[Path, Frames]) -> None:
     view.line("wait 10")
     view.take(every_unit=True)
     t_s, _ = view.channels["psa2"].latest("x")
-    shown = np.column_stack([view.channels["psa2"].latest(n)[1] for n in ("x", "y", "z")])
-    sent = {tuple(row) for row in np.rint(recorded[1] / CODE_V).tolist()}
+    shown = np.column_stack([view.channels["psa2"].latest(n)[1] for n in ("x", "y", "z", "t")])
+    can = recorded[1]
+    sent = {tuple(row) for row in np.column_stack([np.rint(can.u_v / CODE_V), can.temp_degc]).tolist()}
     assert len(t_s) == view.about()["frames"] - view.about()["torn"]
     assert {tuple(row) for row in shown.tolist()} <= sent
     assert (np.diff(t_s) > 0).all()
@@ -89,7 +90,7 @@ def test_torn_frames_are_found_and_say_what_is_wrong(view: LinesView) -> None:
     assert (before["place"], before["wrong"]) == (first["place"] - 1, "")
 
 
-def test_a_frame_that_is_missing_is_an_error(recorded: tuple[Path, Floats], tmp_path: Path) -> None:
+def test_a_frame_that_is_missing_is_an_error(recorded: tuple[Path, Frames], tmp_path: Path) -> None:
     vcd = read_vcd(recorded[0])
     falls, rises = vcd.wires["Int"].edges_ns(0), vcd.wires["Int"].edges_ns(1)
     cut_ns = (int(falls[3]) - 1000, int(rises[4]) + 1000)  # the emulator's own text without two frames
@@ -107,7 +108,7 @@ def test_a_frame_that_is_missing_is_an_error(recorded: tuple[Path, Floats], tmp_
     assert found.state(lines=False)["overview"][0]["lost"] == 2
 
 
-def test_a_window_has_the_edges_of_the_recording(view: LinesView, recorded: tuple[Path, Floats]) -> None:
+def test_a_window_has_the_edges_of_the_recording(view: LinesView, recorded: tuple[Path, Frames]) -> None:
     vcd = read_vcd(recorded[0])
     frame = view.next_frame({"at_ns": 0, "what": "frame"})
     near = windowed(view, from_ns=frame["begin_ns"] - 1000, to_ns=frame["end_ns"] + 1000)
@@ -119,7 +120,7 @@ def test_a_window_has_the_edges_of_the_recording(view: LinesView, recorded: tupl
     assert [w["text"].split(" = ")[0] for w in shown["words"]] == ["X", "Y", "Z", "T"]
 
 
-def test_more_edges_than_columns_are_what_each_column_has(view: LinesView, recorded: tuple[Path, Floats]) -> None:
+def test_more_edges_than_columns_are_what_each_column_has(view: LinesView, recorded: tuple[Path, Frames]) -> None:
     wire = read_vcd(recorded[0]).wires["CLK"]
     whole = windowed(view, columns=300)
     int_, clk = whole["lines"]
@@ -131,6 +132,13 @@ def test_more_edges_than_columns_are_what_each_column_has(view: LinesView, recor
         a, b = (begin + (end - begin) * n // 300 for n in (k, k + 1))
         moved = ((wire.t_ns > a) & (wire.t_ns <= b)).any()
         assert kind == ("2" if moved else str(int(wire.at(a))))
+
+
+def test_a_column_says_whether_the_line_moves_in_it() -> None:
+    wire = Wire(np.array([0, 10, 41, 42, 43, 44]), np.array([0, 1, 0, 1, 0, 1], np.uint8))
+    assert line_part("A", wire, 0, 80, 4) == {"name": "A", "level": 0, "edges": 5, "columns": "2121"}
+    assert line_part("A", wire, 0, 80, 5)["t_ns"] == [10, 41, 42, 43, 44]
+    assert line_part("A", wire, 42, 80, 5) == {"name": "A", "level": 1, "edges": 2, "t_ns": [43, 44]}
 
 
 BAD_WINDOWS: list[dict[str, Any]] = [
@@ -170,7 +178,7 @@ def test_time_goes_on_and_back(view: LinesView) -> None:
     assert view.now_s() == view.about()["end_ns"] / 1e9
 
 
-def test_words_of_a_psd1_are_what_its_host_reads_on_the_bus(tmp_path: Path) -> None:
+def test_words_of_a_psd1_are_what_its_host_reads_on_the_bus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole, bus = tmp_path / "psd1.vcd", tmp_path / "bus.vcd"
     words = ["converters", "--unit", "psd1", "--vcd", str(whole), "--pace", "free", "--for", "150ms", "--quiet"]
     subprocess.run([find_emulator(), *words], check=True, capture_output=True)
@@ -186,6 +194,8 @@ def test_words_of_a_psd1_are_what_its_host_reads_on_the_bus(tmp_path: Path) -> N
     serial.line("wait 1")
     serial.take(every_unit=True)
     assert serial.channels["psd1"].count == len(sent) // 3
+    monkeypatch.setattr(line_words, "MOST_WORDS", 6)
+    assert 0 < opened(whole).about()["frames"] <= 6
 
 
 def texts(view: LinesView) -> list[str]:
@@ -252,6 +262,7 @@ DAMAGED: dict[str, str] = {
     "torn_alone": "#0\n1a\n0b\n0c\n" + "".join(f"#{k}\n{k % 2}a\n" for k in range(1, 3000)),
     "clock_alone": "#0\n1a\n0b\n0c\n" + "".join(f"#{k}\n{k % 2}c\n" for k in range(1, 3000)),
     "endless_frame": "#0\n1a\n0b\n0c\n#1\n0a\n" + "".join(f"#{k}\n{k % 2}c\n" for k in range(2, 3000)),
+    "endless_words": "#0\n1a\n0b\n0c\n" + "".join(f"#{k}\n{k % 2}{'abc'[k % 3]}\n" for k in range(1, 3000)),
     "no_levels_of_two": "#0\n1a\n#5\n0a\n#9\n1a\n",
 }
 
@@ -273,14 +284,14 @@ def test_a_hostile_file_is_shown_as_far_as_it_goes(tmp_path: Path, name: str) ->
         assert found.ended() == about["damage"]
 
 
-def test_a_long_file_is_read_to_so_many_edges(recorded: tuple[Path, Floats], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_file_is_read_to_so_many_edges(recorded: tuple[Path, Frames], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lines_view, "MOST_EDGES", 1000)
     about = opened(recorded[0]).about()
     assert not about["whole"]
     assert "read to its" in about["damage"]
 
 
-def test_it_is_read_in_pieces_that_can_be_stopped(recorded: tuple[Path, Floats]) -> None:
+def test_it_is_read_in_pieces_that_can_be_stopped(recorded: tuple[Path, Frames]) -> None:
     done: list[float] = []
     RecordingSource(recorded[0]).open_slowly(done.append)
     assert len(done) > 2
@@ -299,7 +310,7 @@ def test_it_is_read_in_pieces_that_can_be_stopped(recorded: tuple[Path, Floats])
     assert not opening._thread.is_alive()
 
 
-def test_a_panel_shows_lines_and_a_bad_file_is_its_error_line(recorded: tuple[Path, Floats], tmp_path: Path) -> None:
+def test_a_panel_shows_lines_and_a_bad_file_is_its_error_line(recorded: tuple[Path, Frames], tmp_path: Path) -> None:
     folder = tmp_path / "files"
     folder.mkdir()
     (folder / "a.vcd").symlink_to(recorded[0])

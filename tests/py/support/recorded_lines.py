@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 from psabench.bench import Bench
-from psabench.link.signals import Floats
+from psabench.boards.psa2.frames import Frames
 
 PULSE = 40  # that each frame lacks
 
 
-def record_psa2(path: Path) -> Floats:
-    """From 0.21 s on 100 ms, 30 ms of them with torn frames. Returns volts (n, 3) of the frames on CAN."""
+def record_psa2(path: Path) -> Frames:
+    """From 0.21 s on 100 ms, 30 ms of them with torn frames. Returns what was on CAN."""
     with Bench.start("stream", seed=1) as bench:
         bench.wait(0.21)
         bench.probe.start(path)
@@ -22,4 +21,4 @@ def record_psa2(path: Path) -> Floats:
         fault.clear()
         bench.wait(0.04)
         bench.probe.stop()
-        return np.asarray(bench.unit.frames.take().u_v)
+        return bench.unit.frames.take()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,14 @@ def window(vcd: Vcd, found: Decoded, request: Mapping[str, Any]) -> dict[str, An
     if not begin_ns < end_ns or not columns:
         raise Wrong(expected("from_ns < to_ns, columns > 0", f"{begin_ns}, {end_ns}, {columns}", "window"))
     seen = found.between(begin_ns, end_ns)
+    wrong = found.wrong[slice(*np.searchsorted(found.wrong, [seen.start, seen.stop]))]
     return {
         "from_ns": begin_ns,
         "to_ns": end_ns,
         "lines": [line_part(n, vcd.wires[n], begin_ns, end_ns, columns) for n in names],
         "seen": len(seen),
         "frames": [frame_part(found, k) for k in seen] if len(seen) <= MOST_FRAMES else [],
-        "wrong": [int(found.begin_ns[k]) for k in found.wrong if k in seen][:MOST_MARKS],
+        "wrong": found.begin_ns[wrong[:MOST_MARKS]].tolist(),
     }
 
 
@@ -60,16 +61,16 @@ def frame_part(found: Decoded, k: int) -> dict[str, Any]:
 def frame_place(found: Decoded, k: int) -> dict[str, Any]:
     """Where a frame is, and what is wrong with it."""
     begin_ns, end_ns = int(found.begin_ns[k]), int(found.end_ns[k])
-    return {"place": k + 1, "begin_ns": begin_ns, "end_ns": end_ns, "wrong": found.wrong.get(k, "")}
+    return {"place": k + 1, "begin_ns": begin_ns, "end_ns": end_ns, "wrong": found.why(k)}
 
 
 def next_frame(found: Decoded, request: Mapping[str, Any]) -> dict[str, Any]:
     """The next frame, torn one or wrong one after an instant, or before it where "back" is true. Raises Wrong."""
     at_ns, what = _whole(request, "at_ns", MOST_NS), str(request.get("what", ""))[:40]
-    kinds: dict[str, Sequence[int]] = {"frame": range(len(found)), "torn": found.torn, "error": list(found.wrong)}
+    kinds = {"frame": np.arange(len(found)), "torn": found.torn, "error": found.wrong}
     if what not in kinds:
         raise Wrong(expected(", ".join(kinds), repr(what), "what"))
-    places = np.asarray(kinds[what], np.int64)
+    places = kinds[what]
     begins, back = found.begin_ns[places], request.get("back") is True
     k = int(np.searchsorted(begins, at_ns, "left")) - 1 if back else int(np.searchsorted(begins, at_ns, "right"))
     if not 0 <= k < len(places):

@@ -6,7 +6,7 @@ strobes of a parallel bus are those that the conformance suite judges.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,28 +26,35 @@ from psabench.report.waveform import frame_words
 FRAME, PSD1, BUS = ("Int", "Data", "CLK"), psd1.LINES, PARALLEL_BUS
 NS = 1_000_000_000
 WORD_BITS = (32, 24, 16)
+MOST_BITS = 1024  # of a frame whose words are written out
+MOST_WORDS = 100_000  # of a PSD-1: a minute
 PIECE = 500  # frames that are decoded between two looks at who waits
 ZERO_LSB = 0x8000  # of a word of PSD-1: offset binary (docs/boards/psd1.md)
 
 Look = Callable[[], None]
-Tags = Callable[[int], Sequence[Tag]]
+
+
+def _no_places() -> Ints:
+    return np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decoded:
     """n frames (of other boards words, or strobes of the bus) in order of time.
 
-    wrong: by place what is wrong with it. tags: its words, by place. samples: values of those that are whole, if any.
+    wrong, torn: places of those that are wrong, and of them those that are not whole. missing: how many there should be
+    before each. why, tags: by place, what is wrong with it, its words. samples: values of those that are whole, if any.
     """
 
     what: str  # a frame, a word
     lines: Sequence[str]  # that it is read from
     begin_ns: Ints
     end_ns: Ints
-    wrong: Mapping[int, str] = field(default_factory=dict)
-    torn: Sequence[int] = ()  # those of `wrong` that are not whole
-    missing: Mapping[int, int] = field(default_factory=dict)  # how many there should be before it
-    tags: Tags = lambda _: ()
+    wrong: Ints = field(default_factory=_no_places)
+    torn: Ints = field(default_factory=_no_places)
+    missing: Ints = field(default_factory=_no_places)
+    why: Callable[[int], str] = lambda _: ""
+    tags: Callable[[int], Sequence[Tag]] = lambda _: ()
     samples: Samples | None = None
 
     def __len__(self) -> int:
@@ -64,8 +71,7 @@ def decoded(vcd: Vcd, look: Look) -> Decoded:
     for lines, decode in ((FRAME, _frames), (PSD1, _psd1_words), (BUS, _strobes)):
         if all(line in vcd.wires for line in lines):
             return decode(vcd, look)
-    none = np.empty(0, np.int64)
-    return Decoded(what="frame", lines=(), begin_ns=none, end_ns=none)
+    return Decoded(what="frame", lines=(), begin_ns=_no_places(), end_ns=_no_places())
 
 
 # ---- PSA-1, PSA-2, the unit that has one: a frame of four words
@@ -87,14 +93,17 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
         look()
     whole = concat(parts)
     is_whole = np.isin(fall // vcd.unit_ns, whole.fall)
-    torn = np.flatnonzero(~is_whole).tolist()
-    missing, off_time = _off_time(fall // vcd.unit_ns, fmt)
-    wrong = off_time | {k: _tear(int(last[k] - first[k]), fmt.bits) for k in torn}
+    bits, torn = last - first, np.flatnonzero(~is_whole)
+    missing, off_s = (a[: len(fall)] for a in _timing(fall, fmt))
+
+    def why(k: int) -> str:
+        return _trouble(int(missing[k]), float(off_s[k])) if is_whole[k] else _tear(int(bits[k]), fmt.bits)
 
     def tags(k: int) -> Sequence[Tag]:
+        if not 1 < bits[k] <= MOST_BITS:
+            return ()
         begin, end = int(fall[k]), int(rise[k])
-        rises = last[k] - first[k]
-        return frame_words(vcd.part(FRAME, begin - 1, end), begin, end, fmt.word_bits) if rises > 1 else ()
+        return frame_words(vcd.part(FRAME, begin - 1, end), begin, end, fmt.word_bits)
 
     t_s = fall[is_whole] / NS
     samples = _values(t_s, whole.words.astype(np.int64), whole.signed(fmt.word_bits).astype(np.int64))
@@ -103,9 +112,10 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
         lines=FRAME,
         begin_ns=fall,
         end_ns=rise,
-        wrong=dict(sorted(wrong.items())),
+        wrong=np.flatnonzero(~is_whole | (missing > 0) | (off_s != 0.0)),
         torn=torn,
         missing=missing,
+        why=why,
         tags=tags,
         samples=samples,
     )
@@ -119,18 +129,21 @@ def _format_of(fall: Ints, bits: Ints, unit_ns: int) -> LineFormat:
     return LineFormat(word_bits=word_bits, sample_hz=NS / unit_ns, period_s=period_s, tolerance_s=tolerance_s)
 
 
-def _off_time(fall: Ints, fmt: LineFormat) -> tuple[dict[int, int], dict[int, str]]:
-    """By place: how many frames are missing before it; what is wrong with when it comes."""
-    steps, off_s = fmt.timing(np.diff(fall))
-    missing = {int(k) + 1: int(steps[k]) - 1 for k in np.flatnonzero(steps > 1)}
-    words = {k: f"{n} missing before it" for k, n in missing.items()}
-    for k in np.flatnonzero(off_s).tolist():
-        words.setdefault(k + 1, f"{abs(off_s[k]) * 1e6:.3f} us {'late' if off_s[k] > 0 else 'early'}")
-    return missing, words
+def _timing(fall_ns: Ints, fmt: LineFormat) -> tuple[Ints, Floats]:
+    """Of each frame, how many are missing before it, and by how many s it is off its time; of the first: 0."""
+    unit_ns = NS / fmt.sample_hz
+    steps, off_s = fmt.timing(np.diff(fall_ns // round(unit_ns)))
+    return np.concatenate((np.zeros(1, np.int64), steps - 1)), np.concatenate((np.zeros(1), off_s))
+
+
+def _trouble(missing: int, off_s: float) -> str:
+    if missing:
+        return f"{missing} missing before it"
+    return f"{abs(off_s) * 1e6:.3f} us {'late' if off_s > 0 else 'early'}" if off_s else ""
 
 
 def _tear(bits: int, due: int) -> str:
-    return f"torn: {bits} bits, not {due}" if bits != due else "torn: pulses of CLK out of their time"
+    return f"torn: {bits} bits, not {due}" if bits != due else "torn: pulses of CLK off their time"
 
 
 def _values(t_s: Floats, words: Ints, signed: Ints) -> Samples:
@@ -145,17 +158,20 @@ def _values(t_s: Floats, words: Ints, signed: Ints) -> Samples:
 
 
 def _psd1_words(vcd: Vcd, look: Look) -> Decoded:
-    log = LineLog(recording=vcd)
+    log = LineLog(recording=_first_words(vcd))
     words = psd1.words_of(log, 1 - int(vcd.wires["FL2"].level[0]))
     look()
     whole = [k for k, w in enumerate(words) if len(w.rises) == psd1.BITS]
     code = dict(zip(whole, psd1.serial_words(log, [words[k] for k in whole]).tolist(), strict=True))
-    torn = {k: f"torn: {len(w.rises)} pulses of SCLK, not {psd1.BITS}" for k, w in enumerate(words) if k not in code}
-    unread = {k: "no FL2 after it" for k, w in enumerate(words) if w.fl2 < 0 and k not in torn}
+
+    def why(k: int) -> str:
+        if k not in code:
+            return f"torn: {len(words[k].rises)} pulses of SCLK, not {psd1.BITS}"
+        return "no FL2 after it" if words[k].fl2 < 0 else ""
 
     def tags(k: int) -> Sequence[Tag]:
         w = words[k]
-        text = f"{'XYZ'[w.axis]} = {code[k] - ZERO_LSB} ({code[k]:04X}h)" if k in code else torn[k]
+        text = f"{'XYZ'[w.axis]} = {code[k] - ZERO_LSB} ({code[k]:04X}h)" if k in code else why(k)
         return [Tag("SDAT", w.fall, w.rise, text)]
 
     cycles = [k for k in code if words[k].axis == 0 and all(k + n in code and words[k + n].axis == n for n in (1, 2))]
@@ -166,11 +182,18 @@ def _psd1_words(vcd: Vcd, look: Look) -> Decoded:
         lines=PSD1,
         begin_ns=psd1.of(words, "fall"),
         end_ns=psd1.of(words, "rise"),
-        wrong=dict(sorted((torn | unread).items())),
-        torn=list(torn),
+        wrong=np.array([k for k in range(len(words)) if why(k)], np.int64),
+        torn=np.array([k for k in range(len(words)) if k not in code], np.int64),
+        why=why,
         tags=tags,
         samples=Samples(t_s=t_s, values=values, names=("x", "y", "z"), units=("LSB",) * 3),
     )
+
+
+def _first_words(vcd: Vcd) -> Vcd:
+    """As far as there are MOST_WORDS."""
+    lows = np.sort(np.concatenate([vcd.wires[line].edges_ns(0) for line in psd1.FRAMES]))
+    return vcd if len(lows) <= MOST_WORDS else vcd.part(PSD1, vcd.start_ns, int(lows[MOST_WORDS]))
 
 
 # ---- a parallel bus

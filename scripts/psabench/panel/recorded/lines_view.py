@@ -105,7 +105,7 @@ class LinesView(PlayedView):
         if not self.unit:
             return self.played([])
         past = int(np.searchsorted(self._found.end_ns, self._now_ns, "right"))
-        lost = sum(n for k, n in self._found.missing.items() if k < past)
+        lost = int(self._found.missing[:past].sum())
         counters = FrameCounters(frames=past, lost=lost, torn=int(np.searchsorted(self._found.torn, past)))
         row = overview_row(self.unit, self._title, self.channels[self.unit], counters)
         return self.played([row | {"lines": [0, 0]}])

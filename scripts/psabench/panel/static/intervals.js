@@ -35,6 +35,8 @@ export function range(values, halves) {
   return half > 0 ? [value - half, value + half] : null;
 }
 
+export const scales = () => charts.map(({ chart }) => [chart.scales.y.min, chart.scales.y.max]);  // for tests
+
 const scale = (chart, low, high) => {
   const [, lows, , values] = chart.data;
   return (values.length && range(values, values.map((v, i) => v - lows[i]))) || uPlot.rangeNum(low, high, 0.1, true);
