@@ -307,7 +307,7 @@ def _table(run: Run) -> str:
     verdicts = run.verdicts()
     rows = "".join(
         f"<tr><td class=id>{r.id}</td><td class={CSS.get(verdicts[r.id], 'v-other')}>{verdicts[r.id].value}</td>"
-        f"<td>{_required(r)}</td><td>{_sources(r)}</td><td>{r.grade}</td>"
+        f"<td>{_required(r)}</td><td style='overflow-wrap:anywhere'>{_sources(r)}</td><td>{r.grade}</td>"
         f"<td>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
         for r in run.rows
     )

@@ -41,7 +41,7 @@ _NAME = "|".join(
         r"\b[EIRW] [^;,]*? t=\d+|\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
         r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
         _NUMBER.pattern,
-        r"\[[^\]]*\]|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
+        r"\[[^\]]*\]|\{[^{}]*\}|\((?:[-+]?[\d.]+, )+[-+]?[\d.]+\)",
         r"(?<![\w.\-−/])(?!(?:[mµun]V|degC|SPS|kHz)\b)(?:[A-Za-z]+\d\w*|\w*[a-z_]\w*[A-Z]\w*|[A-Z][A-Z\d_]+(?:-\d+)?"
         r"|\w+_\w+|[XYZKTPNxyz]|Int|Data|Res|DIn|SClk)\b(?!')",
     )

@@ -84,7 +84,9 @@ def test_names_and_lists_are_blanks_of_an_entry_too(text: str, keys: tuple[str, 
 
 
 def test_the_closest_entry_is_taken() -> None:
-    ru = Language(name="ru", texts={"{} on {}": "{1}: {0}", "{} on CLK": "на CLK {}", "of {}": "из {}", "{} told": "{} дано"})
+    ru = Language(
+        name="ru", texts={"{} on {}": "{1}: {0}", "{} on CLK": "на CLK {}", "of {}": "из {}", "{} told": "{} дано"}
+    )
     assert ru.translate_page("<td>3 on CLK</td>") == "<td>на CLK 3</td>"
     assert ru.translate_page("<td>FFh on Data</td>") == "<td>Data: FFh</td>"
     assert ru.translate_page("<td>of X, Y</td><td>[1, 2] told</td>") == "<td>из X, Y</td><td>[1, 2] дано</td>"

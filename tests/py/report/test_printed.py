@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import shutil
 import subprocess
@@ -11,10 +12,17 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from psabench.conform import suite
+from psabench.conform.profile import variant
+from psabench.conform.report import Run, html_page
+from psabench.conform.runner import wanted
+from psabench.conform.selection import requirements_of
+from psabench.conform.verdict import Verdict, not_decided
 from psabench.report import calibration
 from psabench.report.language import localised_page, reports_in
 from psabench.report.nominal import ARTICLE
 from report_sections import TRUTH, sections
+from russian_pages import untranslated
 
 TOOLS = {name: shutil.which(name) for name in ("chromium", "pdftotext")}
 MISSING = [name for name, path in TOOLS.items() if path is None]
@@ -80,3 +88,36 @@ def test_no_picture_is_cut_and_no_word_runs_out_of_its_page(language: str, tmp_p
     assert max(word.page for word in words) >= 3  # long enough that pictures come to the end of a page
     assert [word.text for word in words if not word.is_inside] == []
     assert any(("погрешность" if language == "ru" else "error") in word.text for word in words)
+
+
+def conformance(folder: Path) -> str:
+    """A page with each requirement of a PSA-2: the first test fails, the others saw the same."""
+    suite.load()
+    board = variant("psa2", "article")
+    outcomes = [
+        dataclasses.replace(
+            not_decided(proof.test, [r.id for r in rows], ""),
+            verdict=Verdict.PASSED,
+            saw="low in 719 pauses and after 240 transfers",
+        )
+        for proof, rows in wanted(board)
+    ]
+    failed = dataclasses.replace(
+        outcomes[0], verdict=Verdict.FAILED, saw="CLK high between words", due="low", at_ns=1.5e6
+    )
+    rows = requirements_of(board)
+    run = Run(
+        suite="device", subject=board.name, facts={"board": board.name}, outcomes=[failed, *outcomes[1:]], rows=rows
+    )
+    return html_page(run, folder)
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_no_word_of_a_conformance_report_runs_out_of_its_page(language: str, tmp_path: Path) -> None:
+    english = conformance(tmp_path)
+    assert untranslated(english) == []
+    with reports_in(language):
+        words = list(words_on_paper(localised_page(english), tmp_path))
+    assert max(word.page for word in words) >= 10
+    assert [word.text for word in words if not word.is_inside] == []
+    assert any(("Требования" if language == "ru" else "Requirements") in word.text for word in words)
