@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.errors import BadInput, expected, output_error
+from psabench.errors import BadInput, check_there, expected, output_error
 from psabench.link.own import replace_file
 from psabench.logs.sessions import SESSIONS, gtkwave_text, pulseview_text
 from psabench.logs.vcd_span import Span, read_head, span_of
@@ -147,6 +147,7 @@ def write_pictures(args: argparse.Namespace) -> list[Path]:
     from psabench.link.vcd import read_vcd  # NumPy: session files do without
     from psabench.report.wavedrom import Window, wavedrom_text, window_picture
 
+    check_there(args.file, "a VCD file")
     try:
         vcd = read_vcd(args.file)
         window = Window(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import shutil
 import struct
 import subprocess
@@ -233,6 +234,54 @@ def test_a_line_that_is_cut_is_no_frame(tmp_path: Path, ending: str) -> None:
             for m in read_frames(path):
                 got.append((m.arbitration_id, m.dlc, m.data))
         assert got == whole[: len(got)]
+
+
+@pytest.mark.parametrize(
+    ("ending", "was", "now"),
+    [
+        (".asc", " Rx ", " Qx "),
+        (".asc", " d 8 ", " d 8z "),
+        (".asc", " 00", ""),
+        (".trc", " DT ", " QT "),
+        (".trc", " 8 ", " z "),
+        (".trc", " 00", ""),
+        (".trc", " 185 ", " "),
+        (".log", " vcan0 ", " "),
+        (".log", "185#", "185"),
+    ],
+)
+def test_a_damaged_line_is_named_after_the_frames_before_it(tmp_path: Path, ending: str, was: str, now: str) -> None:
+    path = write(tmp_path / f"bus{ending}", [m for n in range(4) for m in pair(n, n)])
+    whole = [(m.arbitration_id, bytes(m.data)) for m in read_frames(path)]
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if re.search(r"\b0*[12]85\b|[12]85#", line))
+    assert was in re.sub(r" 0*185 ", " 185 ", lines[first + 4])
+    lines[first + 4] = re.sub(r" 0*185 ", " 185 ", lines[first + 4]).replace(was, now)
+    path.write_text("".join(lines), encoding="utf-8")
+    got = []
+    with pytest.raises(BadInput, match=r"message 5: expected a whole message, got a damaged one .*the 4 before it are"):
+        for m in read_frames(path):
+            got.append((m.arbitration_id, bytes(m.data)))
+    assert got == whole[:4]
+
+
+@pytest.mark.parametrize(
+    ("ending", "line"),
+    [
+        (".asc", "// a comment"),
+        (".asc", "   0.500000 Start of measurement"),
+        (".asc", "   0.500000 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%"),
+        (".asc", "   0.500000 CAN 1 Status:chip status error active"),
+        (".trc", ";   a comment"),
+        (".trc", ""),
+    ],
+)
+def test_lines_that_are_no_frames_are_passed_over(tmp_path: Path, ending: str, line: str) -> None:
+    path = write(tmp_path / f"bus{ending}", [m for n in range(4) for m in pair(n, n)])
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    lines.insert(len(lines) - 3, f"{line}\n")
+    path.write_text("".join(lines), encoding="utf-8")
+    assert len(list(read_frames(path))) == 8
 
 
 def assert_bounded(path: Path, data: bytes) -> None:

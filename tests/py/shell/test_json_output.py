@@ -7,13 +7,12 @@ import ast
 import json
 import re
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cligen import tables
 from psabench import cli, output
 from psabench.link.protocol_files import dbc_node
 from psabench.places import find_emulator
@@ -21,6 +20,7 @@ from psabench.sins.increments import Increments
 from psabench.sins.readers import write_csv
 
 from tests.py.link.test_lineport import lines as line_samples
+from tests.py.support.commands import every_command
 
 ROOT = Path(__file__).parents[3]
 PACKAGE = ROOT / "scripts/psabench"
@@ -47,19 +47,9 @@ PRINTING: Mapping[str, str] = {
 }
 
 
-def _leaves(p: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    below = [a for a in p._actions if isinstance(a, argparse._SubParsersAction)]
-    if not below:
-        yield p
-    for action in below:
-        for one in action.choices.values():
-            yield from _leaves(one)
-
-
 @pytest.fixture(scope="module")
 def commands() -> dict[str, argparse.ArgumentParser]:
-    """Each command that does something, by its words."""
-    return {p.prog.removeprefix("psabench "): p for p in _leaves(tables.psabench())}
+    return every_command()
 
 
 def test_every_command_that_prints_data_has_json(commands: Mapping[str, argparse.ArgumentParser]) -> None:
