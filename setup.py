@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from setuptools import Distribution, setup
@@ -18,7 +19,8 @@ ROOT = Path(__file__).resolve().parent
 SCRATCH = ROOT / "build" / "wheel"  # build/ itself holds the emulator's objects
 # For linking, with paths of this machine in them: who compiles against the library installs it with make.
 NOT_IN_THE_WHEEL = ["lib/*.a", "lib/pkgconfig", "lib/*.so", "share/libsigrokdecode"]
-
+# Manual pages and completion: beside the environment's bin, where man and the shells look.
+OF_THE_PREFIX = ["share/man", "share/bash-completion", "share/zsh", "share/fish"]
 
 SYSTEM = re.compile(r"linux-vdso|ld-linux|lib(c|m|dl|rt|pthread|gcc_s)\.so")  # each Linux has these
 
@@ -31,7 +33,9 @@ class BuildPy(build_py):
             check_build_tools()
         super().run()
         if not self.editable_mode:
-            install(Path(self.build_lib).resolve() / "psabench" / "bundle")
+            bundle = Path(self.build_lib).resolve() / "psabench" / "bundle"
+            install(bundle)
+            self.distribution.data_files = list(moved_out(bundle, SCRATCH / "prefix"))
 
 
 class BdistWheel(bdist_wheel):
@@ -58,6 +62,7 @@ def check_build_tools() -> None:
 def install(bundle: Path) -> None:
     # A make that called us must not pass its flags on.
     env = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "DESTDIR")}
+    env["PYTHONPATH"] = str(ROOT / "scripts")  # tools/gen_cli.py loads the parsers
     jobs = f"-j{os.cpu_count() or 1}"
     subprocess.run(
         [
@@ -65,7 +70,7 @@ def install(bundle: Path) -> None:
             "--no-print-directory",
             jobs,
             f"PY={sys.executable}",
-            "CLI=",
+            f"CLI={SCRATCH / 'cli'}",
             "DESTDIR=",
             f"PREFIX={bundle}",
             "install",
@@ -80,6 +85,16 @@ def install(bundle: Path) -> None:
     add_libraries(bundle)
     for binary in [*bundle.glob("bin/*"), *bundle.glob("lib/*.so.*")]:
         subprocess.run(["strip", "--strip-unneeded", binary], check=True)  # debug information names our folders
+
+
+def moved_out(bundle: Path, prefix: Path) -> Iterator[tuple[str, list[str]]]:
+    """What belongs beside bin, out of the bundle; folder and files each, as setuptools takes them."""
+    for name in OF_THE_PREFIX:
+        (prefix / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(bundle / name, prefix / name)
+        for folder in sorted({path.parent for path in (prefix / name).rglob("*") if path.is_file()}):
+            files = sorted(str(path.relative_to(ROOT)) for path in folder.iterdir() if path.is_file())
+            yield str(folder.relative_to(prefix)), files
 
 
 def add_libraries(bundle: Path) -> None:

@@ -20,12 +20,28 @@ HIDDEN = ("/root", "/home", "/work", "/usr/local", "/opt", "/tmp")  # where othe
 FIRST_FRAME_S = 60.0
 DISTRIBUTIONS = {"pyserial": "python3-serial", "pyyaml": "python3-yaml", "prompt_toolkit": "python3-prompt-toolkit"}
 
+# The panel as a browser sees it: the page and its script, then what comes through the WebSocket first.
+PAGE = """
+import http.cookiejar, json, sys, urllib.request
+from websockets.sync.client import connect
+
+address = sys.argv[1]
+origin = address.partition("/?")[0]
+jar = http.cookiejar.CookieJar()
+opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar))
+print(opener.open(address).read().decode().count("<script"), len(opener.open(origin + "/static/main.js").read()) > 1000)
+cookie = "; ".join(f"{c.name}={c.value}" for c in jar)
+with connect(origin.replace("http", "ws") + "/ws", origin=origin, additional_headers={"Cookie": cookie}) as socket:
+    print(sorted(json.loads(socket.recv()))[:1] != [])
+"""
+
 # stdin: the package. Everything that it prints is read below.
 ON_THE_ROOT = r"""
 set -eu
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive
 cd /tmp
 cat > psabench.deb
+printf '%s' "$PAGE" > page.py
 listing() {
     find /usr /etc /var /lib /bin /sbin -xdev ! -path '/var/lib/dpkg/*' ! -path '/var/log/*' ! -path '/var/cache/*' |
         sort
@@ -46,6 +62,12 @@ kill $emulator; wait $emulator || true
 psabench --version
 printf 'start quiet\nhead.turn 30\n' > turn.psa
 psabench run script turn.psa
+echo "== panel"
+psabench panel quiet --paused > panel.txt 2> panel.err &
+panel=$!
+for _ in $(seq 400); do grep -q '^ready' panel.txt && break; sleep 0.05; done
+PYTHONPATH=/usr/lib/psabench/python python3 page.py "$(sed -n 's/^ready //p' panel.txt)" || cat panel.err
+kill -INT $panel; wait $panel || true
 echo "== library"
 printf '%s\n' '#include <psabench.h>' '#include <stdio.h>' \
     'int main(void) { psabench *b = psabench_new(1); puts(b ? "bench" : "none"); psabench_free(b); }' > a.c
@@ -113,7 +135,7 @@ mount --rbind /dev "$root/dev"
 mount -t proc none "$root/proc"
 exec chroot "$root" sh -c "$SCRIPT"
 """
-    env = ["env", f"SCRIPT={ON_THE_ROOT}"]
+    env = ["env", f"SCRIPT={ON_THE_ROOT}", f"PAGE={PAGE}"]
     said = run(
         [*env, "unshare", "--mount", "--net", "--pid", "--fork", "sh", "-c", f"ip link set lo up\n{script}"], package
     )
@@ -123,6 +145,7 @@ exec chroot "$root" sh -c "$SCRIPT"
     assert row.count(",") == header.count(",")
     (ms,) = re.findall(r"^== first frame ms: (\d+)$", said, re.MULTILINE)
     assert float(ms) < FIRST_FRAME_S * 1e3
+    assert re.fullmatch(r"[1-9]\d* True\nTrue\n", parts["panel"]), parts["panel"]
     assert parts["library"].splitlines()[0] == "bench"
     assert "/usr/share/man/man1/psabench.1.gz" in parts["library"]
     extra = "psabench: run: expected the extra 'reports', got none; pip install 'psabench[reports]'"

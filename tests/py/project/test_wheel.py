@@ -81,6 +81,25 @@ def test_it_holds_what_is_installed_and_no_path_of_this_machine(wheel: Path) -> 
         assert {f"share/psabench/{p.relative_to(ROOT)}" for p in here} <= set(files)
 
 
+def test_it_brings_the_manual_pages_and_the_completion_that_make_install_brings(wheel: Path, programs: Path) -> None:
+    run(["make", "-s", "cli"], ROOT)
+    share = programs.parent / "share"
+    places = {
+        ".1": "man/man1/{}.1",
+        ".bash": "bash-completion/completions/{}",
+        ".zsh": "zsh/site-functions/_{}",
+        ".fish": "fish/vendor_completions.d/{}.fish",
+    }
+    for command in ("psabench", "psa-emu"):
+        for ending, place in places.items():
+            made = (ROOT / "build/cli" / f"{command}{ending}").read_bytes()
+            assert (share / place.format(command)).read_bytes() == made
+    with zipfile.ZipFile(wheel) as z:
+        assert [n for n in z.namelist() if "/bundle/share/" in n and "/share/psabench/" not in n] == []
+    found = run(["man", "-w", "-M", share / "man", "psabench"], ROOT).strip()
+    assert found == str(share / "man/man1/psabench.1")
+
+
 def test_the_command_runs_a_procedure_on_its_own_emulator(programs: Path, tmp_path: Path) -> None:
     assert "psabench run all" in run([programs / "psabench", "--help"], tmp_path)
     said = run([programs / "psabench", "run", "turns", "--condition", "quiet"], tmp_path)
