@@ -159,7 +159,7 @@ def key_of(text: str) -> str:
     return _NUMBER.sub("{}", _plain(text))
 
 
-def keys_of(text: str) -> tuple[str, str, str]:
+def keys_of(text: str) -> tuple[str, ...]:
     """The msgids that fit a text, the closest first: without its numbers; its names, too; its lists of both as one."""
     plain = _plain(text)
     return tuple(blanked.sub("{}", plain) for blanked in (_NUMBER, _NAMED, _LISTED))
