@@ -47,7 +47,9 @@ _NAME = "|".join(
     )
 )
 _NAMED = re.compile(_NAME, re.DOTALL)
-_NAMES = re.compile(r"\b(?:Int|Data|Res|CLK|SEQ|SClk|CST|TFS|tCLK|DIn\w?|DOut\w)\b")  # lines and signals that may be a whole text
+_NAMES = re.compile(
+    r"\b(?:Int|Data|Res|CLK|SEQ|SClk|CST|TFS|tCLK|DIn\w?|DOut\w)\b"
+)  # lines and signals that may be a whole text
 _LISTED = re.compile(rf"(?:{_NAME})(?:, (?:{_NAME}))*", re.DOTALL)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
