@@ -30,7 +30,7 @@ _TOOLTIP = re.compile(r"(<\w+\b[^<>]* title=')([^']+)(')")
 # What a text is about: quoted words, numbers (hexadecimal ones with their h), digests, names of files.
 _QUOTED = re.compile(r"<\w+\b[^>]* lang=en>")
 _NUMBER = re.compile(
-    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf|eds)\b"
+    r"<span lang=en>.*?</span>|[\w./-]+\.(?:yaml|csv|json|log|sqlite|vcd|mf4|mcap|asc|blf|eds|sr|bin|trc|txt)\b"
     r"|\b[\da-f]{16,64}\b|(?<![\w.\-−])[\dA-F]+h\b|(?<![\w.\-−])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?",
     re.DOTALL,
 )
@@ -47,7 +47,9 @@ _NAME = "|".join(
     )
 )
 _NAMED = re.compile(_NAME, re.DOTALL)
-_NAMES = re.compile(r"\b(?:Int|Data|Res|CLK|SEQ|DIn|SClk|TFS|tCLK)\b")  # lines and signals that may be a whole text
+_NAMES = re.compile(
+    r"\b(?:Int|Data|Res|CLK|SEQ|SClk|CST|TFS|tCLK|DIn\w?|DOut\w)\b"
+)  # lines and signals that may be a whole text
 _LISTED = re.compile(rf"(?:{_NAME})(?:, (?:{_NAME}))*", re.DOTALL)
 _FACT = re.compile(r"(.*\S) <b>(.*)</b>", re.DOTALL)
 _DOUBT = re.compile(r"(<span class=bad>)(.*)(</span>)", re.DOTALL)
@@ -159,7 +161,7 @@ def key_of(text: str) -> str:
     return _NUMBER.sub("{}", _plain(text))
 
 
-def keys_of(text: str) -> tuple[str, str, str]:
+def keys_of(text: str) -> tuple[str, ...]:
     """The msgids that fit a text, the closest first: without its numbers; its names, too; its lists of both as one."""
     plain = _plain(text)
     return tuple(blanked.sub("{}", plain) for blanked in (_NUMBER, _NAMED, _LISTED))
