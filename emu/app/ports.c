@@ -10,20 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An error of a pty, and whether it lies with the name that was given. */
-struct pty_error {
-    const struct pty *pty;
-    int err;
-    bool *user;
-};
-
-static bool fail_pty(char *why, size_t cap, const char *option, const char *arg, struct pty_error e)
-{
-    char where[1024];
-    snprintf(where, sizeof where, "%s%s", option, arg);
-    return pty_fail(e.pty, where, e.err, e.user, why, cap);
-}
-
 /* The loop has room for every link: listeners and their clients, ptys and their watches. */
 _Static_assert(LOOP_LINKS_MAX >= OPTIONS_CAN_MAX * (SOCKETCAND_CLIENTS_MAX + 1) + OPTIONS_CAN_MAX +
                                      INSTRUMENTS_MAX * (SCPI_PORT_CLIENTS_MAX + 1) + 2 * (CTL_CLIENTS_MAX + 1) +
@@ -51,8 +37,8 @@ static bool open_socketcand(struct can_hub *hub, struct ports_can *c, const stru
 static bool open_slcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
 {
     const int err = slcan_pty_open(&c->slcan, hub, o->arg);
-    return !err || fail_pty(why, cap, o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "",
-                            (struct pty_error){&c->slcan.pty, err, &c->refused});
+    return !err || pty_fail_option(o->arg ? "--can slcan:" : "--can slcan", o->arg ? o->arg : "",
+                                   (struct pty_error){&c->slcan.pty, err, &c->refused}, why, cap);
 }
 
 static bool open_socketcan(struct can_hub *hub, struct ports_can *c, const struct options_can *o, char *why, size_t cap)
@@ -193,7 +179,7 @@ static bool open_line(struct ports *p, struct bench *b, const struct options *o,
     const struct pty pty = p->line ? p->line->pty : (struct pty){0};
     free(p->line);
     p->line = NULL;
-    return fail_pty(why, cap, "--line ", o->line, (struct pty_error){&pty, err, &p->refused});
+    return pty_fail_option("--line ", o->line, (struct pty_error){&pty, err, &p->refused}, why, cap);
 }
 
 /* ---- bus ports: cycles of the parallel buses of units as lines of text */
@@ -293,7 +279,7 @@ static bool open_bus_port(struct ports *p, struct bench *b, const struct options
     }
     const struct pty pty = bus->pty.pty;
     free(bus);
-    return fail_pty(why, cap, "--bus-port ", o->arg, (struct pty_error){&pty, err, &p->refused});
+    return pty_fail_option("--bus-port ", o->arg, (struct pty_error){&pty, err, &p->refused}, why, cap);
 }
 
 static bool open_bus_ports(struct ports *p, struct bench *b, const struct options *o, char *why, size_t cap)
@@ -334,7 +320,7 @@ static bool open_serial_port(struct ports *p, struct bench *b, const struct opti
     if (err) {
         const struct pty pty = port->pty.pty.pty;
         free(port);
-        return fail_pty(why, cap, "--serial ", o->arg, (struct pty_error){&pty, err, &p->refused});
+        return pty_fail_option("--serial ", o->arg, (struct pty_error){&pty, err, &p->refused}, why, cap);
     }
     port->unit->type->serial->connect(port->unit->board, serial_pty_byte, &port->pty);
     notice_unfit(port);

@@ -60,9 +60,9 @@ static void print_counters(struct service *s)
         fprintf(
             stderr,
             "psa-emu: frames late by us: p50 %.0f, p99 %.0f, p99.9 %.0f, max %.0f; events 1 ms late or more: %" PRIu64
-            "; slips: %" PRIu64 "\n",
+            "; slips: %" PRIu64 " (more than %d ms behind: not caught up)\n",
             pace_hist_us(&p->frames, 0.5), pace_hist_us(&p->frames, 0.99), pace_hist_us(&p->frames, 0.999),
-            (double)p->frames.max_ns * 1e-3, p->late, p->slips);
+            (double)p->frames.max_ns * 1e-3, p->late, p->slips, PACE_SLIP_NS / 1000000);
     }
     service_print_clients(s);
     logic_print_counters(&s->ports.logic);

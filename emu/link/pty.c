@@ -168,6 +168,13 @@ bool pty_fail(const struct pty *p, const char *where, int err, bool *user, char 
     return why_fail(why, cap, "%s: expected a link that no other process serves, got one of pid %ld", where, p->owner);
 }
 
+bool pty_fail_option(const char *option, const char *arg, struct pty_error e, char *why, size_t cap)
+{
+    char where[1024];
+    snprintf(where, sizeof where, "%s%s", option, arg);
+    return pty_fail(e.pty, where, e.err, e.user, why, cap);
+}
+
 void pty_close(struct pty *p)
 {
     char now[64];

@@ -34,6 +34,16 @@ int pty_open(struct pty *p, const char *name);
 /* One line for -errno of pty_open(), which begins with `where` ("--line port"). False. */
 bool pty_fail(const struct pty *p, const char *where, int err, bool *user, char *why, size_t cap);
 
+/* An error of a pty, and whether it lies with the name that was given. */
+struct pty_error {
+    const struct pty *pty;
+    int err;
+    bool *user;
+};
+
+/* The same for an option and its argument. */
+bool pty_fail_option(const char *option, const char *arg, struct pty_error e, char *why, size_t cap);
+
 /* Clients that have come or gone by now. Before the master is read: who writes has opened the slave before, but a poll that saw
  * his bytes may have looked at the watch just before he came. */
 void pty_take_news(struct pty *p, int64_t t_ns);

@@ -20,7 +20,7 @@ from psabench.errors import BadInput, expected
 MOST_LINE = 1 << 16  # characters of a line of a text log
 
 
-# Lines that are no frame, and of which python-can's readers say nothing; they pass over a damaged frame in the same way.
+# Lines that are no frame, and of which python-can's readers say nothing; they pass over a damaged frame as well.
 # ASC: comments, the head, events other than frames. TRC: comments, states of the bus, errors, events.
 NO_FRAME: Mapping[str, re.Pattern[str]] = {
     ".asc": re.compile(

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, check_there, expected
 from psabench.options import LINE_HZ, Parser, positive
 from psabench.output import STREAM, add_json, show_event
 
@@ -45,8 +45,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 def _run_tap(args: argparse.Namespace) -> int:
     from psabench.logs import tap
 
-    if not args.port.exists():
-        raise BadInput(expected("a port or a file", "none", args.port))
+    check_there(args.port, "a port or a file")
     if args.out.exists() and args.port.samefile(args.out):
         raise BadInput(expected("another file than the one that is read", args.out, "OUT"))
     with tap.tap_file(args.kind, args.out) as t:

@@ -307,7 +307,10 @@ def test_the_kernel_s_limit_of_a_file_is_not_called_the_recording_s(tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("options", "status", "says"),
-    [("size=4k", 3, "No space left on device; the file is not complete"), ("ro", 2, "expected a path that can be written, got a read-only file system")],
+    [
+        ("size=4k", 3, "No space left on device; the file is not complete"),
+        ("ro", 2, "expected a path that can be written, got a read-only file system"),
+    ],
 )
 def test_a_resolved_scenario_that_cannot_be_stored_ends_the_emulator(
     options: str, status: int, says: str, disk: Path
@@ -380,7 +383,11 @@ def test_a_snapshot_that_does_not_fit_leaves_nothing_and_is_an_error(size: str, 
         "print([p.name for p in disk.iterdir() if p.name != 'filler'])\n"
     )
     done = on_disk(size, disk, [sys.executable, script, disk, size])
-    why = "No space left on device" if size != "ro" else "expected a path that can be written, got a read-only file system"
+    why = (
+        "No space left on device"
+        if size != "ro"
+        else "expected a path that can be written, got a read-only file system"
+    )
     error, left = done.stdout.splitlines()
     assert error.startswith("ControlError")
     assert f"{disk}/x.psasnap: {why}" in error

@@ -130,7 +130,10 @@ def test_a_frame_that_no_bus_carries_is_named(change: dict[str, object], tmp_pat
 
 
 def test_paths_that_cannot_be_read_are_the_user_s(tmp_path: Path) -> None:
-    for path, words in ((tmp_path / "none", "expected an LCM log, got no such file"), (tmp_path, "expected an LCM log, got a folder")):
+    for path, words in (
+        (tmp_path / "none", "expected an LCM log, got no such file"),
+        (tmp_path, "expected an LCM log, got a folder"),
+    ):
         with pytest.raises(BadInput, match=words):
             list(read_frames(path))
     (tmp_path / "empty").touch()

@@ -164,7 +164,10 @@ def test_a_folder_that_has_gone_ends_the_capture_and_not_the_run(tmp_path: Path)
         folder.rmdir()
         control.call("run", for_s=0.1)
         (file,) = captures(control)
-        assert (file["path"], file["error"]) == (str(folder / "c.vcd"), "expected a path that can be written, got no such folder")
+        assert (file["path"], file["error"]) == (
+            str(folder / "c.vcd"),
+            "expected a path that can be written, got no such folder",
+        )
         assert state(control) == "off"
         assert f"capture {file['path']}: {file['error']}; the run continues\n" in emu.messages()
         assert emu.stop() == 3

@@ -260,8 +260,7 @@ def test_a_damaged_line_is_named_after_the_frames_before_it(tmp_path: Path, endi
     path.write_text("".join(lines), encoding="utf-8")
     got = []
     with pytest.raises(BadInput, match=r"message 5: expected a whole message, got a damaged one .*the 4 before it are"):
-        for m in read_frames(path):
-            got.append((m.arbitration_id, bytes(m.data)))
+        got.extend((m.arbitration_id, bytes(m.data)) for m in read_frames(path))
     assert got == whole[:4]
 
 

@@ -339,7 +339,7 @@ def test_a_relay_waits_for_a_reader_and_ends_with_the_port(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("slcan nothing out.pcap", "nothing: expected a port or a file, got none"),
+        ("slcan nothing out.pcap", "nothing: expected a port or a file, got no such file"),
         ("bus {file} {file}", "OUT: expected another file than the one that is read"),
         ("morse {file} out.pcap", "expected slcan, bus, line, got 'morse'"),
         ("line {file} /proc/x.pcap", "/proc/x.pcap"),

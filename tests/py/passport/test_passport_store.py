@@ -182,7 +182,10 @@ def test_reading_makes_and_changes_nothing(tmp_path: Path) -> None:
     with PassportStore(path) as store:
         store.put_run("QA-1", "quartz", make_run(1))
     before = path.read_bytes()
-    with PassportStore(path, read_only=True) as store, pytest.raises((BadInput, OutputError), match="got one without permission"):
+    with (
+        PassportStore(path, read_only=True) as store,
+        pytest.raises((BadInput, OutputError), match="got one without permission"),
+    ):
         store.put_run("QA-1", "quartz", make_run(2))
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["p"]

@@ -59,7 +59,10 @@ MISTAKES: list[tuple[str, str]] = [
     ("run sins-calibration-secondary --first x.csv --seed 1", "--first: expected a recording or a bench, got both"),
     ("run sins-calibration-secondary --first x.csv", "x.csv: expected outputs of a unit in CSV, got no such file"),
     ("campaign sins-secondary --pairs 0", "--pairs: expected 1 to 100000, got 0"),
-    ("campaign sins-secondary --experiment x.yaml", "--experiment: expected article, or a file, got x.yaml, no such file"),
+    (
+        "campaign sins-secondary --experiment x.yaml",
+        "--experiment: expected article, or a file, got x.yaml, no such file",
+    ),
     ("run heading-hold --average 16", "heading-hold: expected an option that --help lists, got --average"),
     (
         "run compare-converters --real-time",

@@ -70,7 +70,7 @@ def wanted(
 
 
 def run(play: Play, tests: Sequence[CaseCheck], progress: Progress, told: Callable[[Outcome], None]) -> None:
-    """Each case once, then its tests; told: of each outcome as it comes. Raises StartError: the first board has no port."""
+    """Each case once, then its tests; told: of each outcome as it comes. Raises StartError for the first."""
     names = list(dict.fromkeys(j.case for j in tests))
     with progress.step("host", max(1, len(names))) as advance:
         for name in names:
