@@ -21,6 +21,7 @@ def test_it_names_files_and_targets_that_exist() -> None:
         assert (context / source).is_file(), source
     targets = re.findall(r"make (?:-j\S+ )?(\w+)", config["postCreateCommand"])
     assert targets == ["setup", "all"]
+    assert re.findall(r"-j(\S*)", config["postCreateCommand"]) == ["$(nproc)"]  # -j alone compiles all files at once
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in targets)
     folder = config["workspaceFolder"]
