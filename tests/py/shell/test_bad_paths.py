@@ -60,6 +60,7 @@ BESIDE: Mapping[str, str] = {  # more words, for an option alone
     **dict.fromkeys((f"run {name} --record" for name in ("turns", "fourier", "reversal")), "--condition quiet"),
     **dict.fromkeys((f"run {name} --record" for name in ("gyrocompass", "heading-hold")), "--reading article"),
     "campaign gyrocompass --scenario": "--chain emulated",
+    "decode --store": "--passport S1",
     "record file": "--can virtual:bad_paths",
     "run sins-calibration-secondary --scenario": "--latitude-deg 50 --longitude-deg 30",
     "waveform --dir": "--decoders",
