@@ -169,8 +169,8 @@ RULES = {
     # 65,350, 72,772 and 2,302 before the panel, viewers, packages, notebooks, site and reports in Russian.
     # 65,414, 74,878 and 2,392 before JSON of every command, the panel's forks, scenarios, recordings and drawn views.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_738, 65_738),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 76_853, 76_853),
-    "tracked-files": Rule(lambda root: len(tracked(root)), 2_451, 2_451),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 76_902, 76_902),
+    "tracked-files": Rule(lambda root: len(tracked(root)), 2_453, 2_453),
 }
 
 
