@@ -134,7 +134,7 @@ $(PY): ; tools/setup run
 setup: ## system packages (as root or with sudo) and .venv, all that make test needs
 	tools/setup test
 run: ## set-up, build, and the main job: board up, accelerometers calibrated over CAN; report in build/run/report.html
-	@tools/setup run && $(MAKE) --no-print-directory all && .venv/bin/psabench run all --out build/run
+	@tools/setup run && $(MAKE) --no-print-directory $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$$(nproc)) all && .venv/bin/psabench run all --out build/run
 quick: ## build and the tests nearest to what changed since the last commit, within a minute; says what it left out
 	@tools/setup test && $(PY) tools/quick.py
 test: ## set-up, build, and the tests of tier `test` (tests/tiers.toml), ten minutes; ends with one line of counts
