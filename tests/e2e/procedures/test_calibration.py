@@ -105,21 +105,15 @@ def alpha0(result: ProcedureResult) -> Estimate:
 
 
 @pytest.mark.timeout(600)
-def test_at_two_microvolts_alpha0_is_within_ten_percent_in_four_of_five_of_100_runs(tmp_path: Path) -> None:
-    """Over the wire; test_procedures.py has 200 runs without it, test_estimate_uncertainty.py the share to a percent.
-
-    The standard deviation of 100 tells as much of the noise as the share of 200: both show one that is a quarter too
-    large, and it shows one that is too small as well.
-    """
+def test_at_two_microvolts_alpha0_is_within_ten_percent_in_four_of_five_of_200_runs(tmp_path: Path) -> None:
     seed = first_seed()
-    runs = [run_once(tmp_path, seed + k, 2e-6, FourierParams()) for k in range(100)]
+    runs = [run_once(tmp_path, seed + k, 2e-6, FourierParams()) for k in range(200)]
     found = np.array([alpha0(r).value for r in runs])
     good = int((np.abs(found - ALPHA0_DEG) < 0.1 * ALPHA0_DEG).sum())
     covered = int((np.abs(found - ALPHA0_DEG) < np.array([alpha0(r).ci_half for r in runs])).sum())
-    print(f"{good} of 100 within 10 %, sd {found.std():.5f} deg, mean {found.mean():.5f}; interval covers {covered}")
-    assert good >= (80 if seed == 1 else 68)  # 0.831 expected: one fair sample of 100 in five falls below 80
-    assert found.std(ddof=1) == pytest.approx(0.1 * ALPHA0_DEG / 1.375, rel=0.28)  # four times its own scatter, 7 %
-    assert covered >= 86  # 95 % of 100, less four standard deviations of the count
+    print(f"{good} of 200 within 10 %, sd {found.std():.5f} deg, mean {found.mean():.5f}; interval covers {covered}")
+    assert good >= (160 if seed == 1 else 145)  # 0.831 expected: one fair sample of 200 in eight falls below 160
+    assert covered >= 180  # 95 % of 200, less four standard deviations of the count
     assert estimate_fourier(runs[0].readings, FourierParams(), 9.8).get("alpha0_deg").value == found[0]
 
 
