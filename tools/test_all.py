@@ -44,6 +44,8 @@ class Step:
     limit_s: float
     beside: bool = False
     """Leaves room for another step beside it: one process, no time that is judged by this machine's clock."""
+    waits: bool = False
+    """Mostly for real time to pass: runs beside those in the lanes, and takes none of theirs."""
     builds: Sequence[str] = ()
     """What its make builds before it tests, where other steps build, too: made before it runs beside one."""
     tiers: Sequence[str] = TIERS
@@ -62,7 +64,7 @@ STEPS: list[Step] = [
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: all lanes end at about the same time.
-    Step("real time, a minute each", [*MAKE, "soak"], 3000, beside=True, builds=["all"], tiers=REST),
+    Step("real time, a minute each", [*MAKE, "soak"], 3000, beside=True, waits=True, builds=["all"], tiers=REST),
     Step("end to end on the host", [*MAKE, "e2e", TIER], 3600, beside=True, builds=["all"]),
     Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step(
@@ -241,16 +243,18 @@ class Run:
 
 
 class Lanes:
-    """Runs steps at once, as many as there are lanes, the next one where one has ended."""
+    """Runs steps at once, as many as there are lanes, the next one where one has ended; one that waits has its own."""
 
     def __init__(self, steps: Iterable[Step], count: int, screen: Screen) -> None:
         self.outcomes: dict[str, Outcome] = {}
-        self._next = deque(steps)
+        steps = list(steps)
+        shared = deque(step for step in steps if not step.waits)
+        self._queues = [deque([step]) for step in steps if step.waits] + [shared] * min(count, len(shared))
         self._screen = screen
         self._running: list[Run] = []
         self._lock = threading.Lock()
         # Waited for by events: a join() that Ctrl-C interrupts takes the thread for ended ever after.
-        self._done = [threading.Event() for _ in range(min(count, len(self._next)))]
+        self._done = [threading.Event() for _ in self._queues]
         self._threads = [threading.Thread(target=self._lane, args=(n,)) for n in range(len(self._done))]
 
     def run(self) -> None:
@@ -264,7 +268,8 @@ class Lanes:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough: what runs is being ended
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             with self._lock:
-                self._next.clear()
+                for queue in self._queues:
+                    queue.clear()
                 running = list(self._running)
             enders = [threading.Thread(target=run.end) for run in running]
             for thread in enders:
@@ -293,9 +298,9 @@ class Lanes:
         }
         while True:
             with self._lock:
-                if not self._next:
+                if not self._queues[number]:
                     return
-                step = self._next.popleft()
+                step = self._queues[number].popleft()
                 try:
                     run = Run(step, self._screen, env)
                 except OSError as error:

@@ -193,7 +193,7 @@ def test_a_trace_is_the_same_at_every_pace(tmp_path: Path, scenario: str | Path)
     assert trace(tmp_path / "wall.vcd", pace="wall", scenario=scenario) == free
 
 
-@pytest.mark.parametrize("build", ["build-clang", "build-O0", "build-san", "build-clang-san"])
+@pytest.mark.parametrize("build", ["build-clang", "build-O0", "build-san", "build-fuzz"])
 def test_traces_and_recordings_are_the_same_from_every_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: str
 ) -> None:
@@ -303,7 +303,7 @@ def test_lines_frames_and_truth_are_the_same_at_every_pace(tmp_path: Path) -> No
     assert run_and_hash(tmp_path, "free") == run_and_hash(tmp_path, "step") == run_and_hash(tmp_path, "wall")
 
 
-@pytest.mark.parametrize("build", ["build-clang", "build-O0", "build-san", "build-clang-san"])
+@pytest.mark.parametrize("build", ["build-clang", "build-O0", "build-san", "build-fuzz"])
 def test_lines_frames_and_truth_are_the_same_from_every_build(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, build: str
 ) -> None:

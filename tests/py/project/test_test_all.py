@@ -159,6 +159,22 @@ def test_a_failure_in_either_lane_is_named(
     ]
 
 
+def test_a_step_that_waits_takes_no_lane(
+    tool: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It ends when the second of the one lane has run."""
+    monkeypatch.setattr(tool, "LOGS", tmp_path / "logs")
+    monkeypatch.setattr(tool, "LANES", 1)
+    codes = {"waits": f"{MEET}tell('a'); wait('b'); {PASS}", "one": PASS, "two": f"{MEET}wait('a'); tell('b'); {PASS}"}
+    steps = [
+        tool.Step(name, [*SAY, code, str(tmp_path)], 60.0, beside=True, waits=name == "waits")
+        for name, code in codes.items()
+    ]
+    monkeypatch.setattr(tool, "STEPS", steps)
+    assert tool.main([]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "3 passed, 0 failed, 0 skipped"
+
+
 def test_the_output_of_two_steps_is_not_mixed(tool: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
     screen = tool.Screen()
 
