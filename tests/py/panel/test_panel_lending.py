@@ -87,7 +87,8 @@ def test_stopped_midway_it_gives_the_bench_back(panel: run.Running, tmp_path: Pa
         assert "error" in run.asked(socket, 1, do="run", name="gyrocompass", here=True)
         assert run.asked(socket, 2, do="run", name="reversal", here=True)["time"]["lent"] == "reversal"
         run.received(other, "hello")
-        for number, request in enumerate(({"do": "line", "line": "head.turn 5"}, {"do": "play", "on": True}), 3):
+        requests: list[dict[str, Any]] = [{"do": "line", "line": "head.turn 5"}, {"do": "play", "on": True}]
+        for number, request in enumerate(requests, 3):
             assert "the procedure reversal has it" in run.asked(other, number, **request)["error"]
         while run.received(socket, "procedure")["done"] < 2:
             pass

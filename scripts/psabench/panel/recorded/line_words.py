@@ -94,7 +94,7 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
     whole = concat(parts)
     is_whole = np.isin(fall // vcd.unit_ns, whole.fall)
     bits, torn = last - first, np.flatnonzero(~is_whole)
-    missing, off_s = (a[: len(fall)] for a in _timing(fall, fmt))
+    missing, off_s = _timing(fall, fmt)
 
     def why(k: int) -> str:
         return _trouble(int(missing[k]), float(off_s[k])) if is_whole[k] else _tear(int(bits[k]), fmt.bits)
@@ -133,7 +133,8 @@ def _timing(fall_ns: Ints, fmt: LineFormat) -> tuple[Ints, Floats]:
     """Of each frame, how many are missing before it, and by how many s it is off its time; of the first: 0."""
     unit_ns = NS / fmt.sample_hz
     steps, off_s = fmt.timing(np.diff(fall_ns // round(unit_ns)))
-    return np.concatenate((np.zeros(1, np.int64), steps - 1)), np.concatenate((np.zeros(1), off_s))
+    first = len(fall_ns[:1])
+    return np.concatenate((np.zeros(first, np.int64), steps - 1)), np.concatenate((np.zeros(first), off_s))
 
 
 def _trouble(missing: int, off_s: float) -> str:
