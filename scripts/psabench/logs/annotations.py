@@ -81,7 +81,7 @@ def _run_sigrok(vcd: Path, stacks: Sequence[Stack], decoders: Path, folder: Path
         for stack, output in zip(stacks, outputs, strict=True):
             words = ["-i", str(vcd), "-I", "vcd", *_words_of(stack, decoders), "--protocol-decoder-jsontrace"]
             with output.open("wb") as file:
-                running.append(_start(words, decoders, file))
+                running.append(_start_sigrok(words, decoders, file))
         for process in running:
             _wait_for(process)
     finally:
@@ -91,7 +91,7 @@ def _run_sigrok(vcd: Path, stacks: Sequence[Stack], decoders: Path, folder: Path
     return [output.read_text(encoding="utf-8", errors="replace") for output in outputs]
 
 
-def _start(words: Sequence[str], decoders: Path, stdout: BinaryIO | int) -> subprocess.Popen[bytes]:
+def _start_sigrok(words: Sequence[str], decoders: Path, stdout: BinaryIO | int) -> subprocess.Popen[bytes]:
     env = {**os.environ, "SIGROKDECODE_DIR": str(decoders)}
     return subprocess.Popen(["sigrok-cli", *words], env=env, stdout=stdout, stderr=subprocess.PIPE)
 
@@ -107,7 +107,7 @@ def _wait_for(process: subprocess.Popen[bytes]) -> str:
 
 def _words_of(stack: Stack, decoders: Path) -> list[str]:
     """-P and -A of sigrok-cli: decoders with lines and options, and the rows that are not hidden."""
-    ids = {name: channel for channel, name in _NAMED.findall(_about(stack.decoders[0].id, decoders)[1])}
+    ids = {name: channel for channel, name in _NAMED.findall(_show_decoder(stack.decoders[0].id, decoders)[1])}
     lines = [f"{ids[channel]}={line}" for channel, line in stack.channels.items()]
     words, shown = [], []
     for n, decoder in enumerate(stack.decoders):
@@ -119,14 +119,14 @@ def _words_of(stack: Stack, decoders: Path) -> list[str]:
 
 def _rows_of(decoder: Decoder, decoders: Path) -> list[tuple[str, str]]:
     """Id and name of each row of a decoder that the session does not hide."""
-    rows = _NAMED.findall(_about(decoder.id, decoders)[0])
+    rows = _NAMED.findall(_show_decoder(decoder.id, decoders)[0])
     return [row for n, row in enumerate(rows) if n not in decoder.hidden]
 
 
 @cache
-def _about(decoder: str, decoders: Path) -> tuple[str, str]:
+def _show_decoder(decoder: str, decoders: Path) -> tuple[str, str]:
     """What sigrok-cli says of a decoder: its rows; its channels. Raises BenchError."""
-    text = _wait_for(_start(["-P", decoder, "--show"], decoders, subprocess.PIPE))
+    text = _wait_for(_start_sigrok(["-P", decoder, "--show"], decoders, subprocess.PIPE))
     rows = text.partition("Annotation rows:")[2].partition("Binary classes:")[0]
     return rows, text.partition("Required channels:")[2]
 

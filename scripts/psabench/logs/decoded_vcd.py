@@ -33,17 +33,17 @@ def write_decoded(vcd: Path, for_s: float) -> tuple[Path, Path] | None:
         return None
     copy, session = vcd.with_suffix(".decoded.vcd"), vcd.with_suffix(".decoded.gtkw")
     with vcd.open(encoding="ascii", errors="replace", newline="") as source, output_text(copy) as file:
-        file.writelines(_merged(source, rows))
+        file.writelines(_merge_rows(source, rows))
     if not session.is_file():
         from_ns = window_start_ns(board, span_of(vcd))
         replace_file(session, decoded_gtkwave_text(board, [row.name for row in rows], from_ns))
     return copy, session
 
 
-def _merged(lines: Iterable[str], rows: Sequence[Row]) -> Iterator[str]:
+def _merge_rows(lines: Iterable[str], rows: Sequence[Row]) -> Iterator[str]:
     """The lines of the recording with the texts of the rows at their instants."""
     codes = [f"~~{n}" for n in range(len(rows))]  # the emulator's have one or two characters
-    texts = [(t, _value(text, code)) for row, code in zip(rows, codes, strict=True) for t, text in row.changes]
+    texts = [(t, _value_line(text, code)) for row, code in zip(rows, codes, strict=True) for t, text in row.changes]
     texts.sort()
     now, done = -1, 0
     for line in lines:
@@ -59,10 +59,10 @@ def _merged(lines: Iterable[str], rows: Sequence[Row]) -> Iterator[str]:
             now = t_next
         yield line
         if line.startswith("$dumpvars"):
-            yield from (_value("", code) for code in codes)
+            yield from (_value_line("", code) for code in codes)
     yield from (value for _, value in texts[done:])  # at the last instant
 
 
-def _value(text: str, code: str) -> str:
+def _value_line(text: str, code: str) -> str:
     escaped = "".join(chr(b) if 0x20 < b < 0x7F and b != 0x5C else f"\\x{b:02x}" for b in text.encode())
     return f"s{escaped} {code}\n"

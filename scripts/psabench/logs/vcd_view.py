@@ -95,17 +95,17 @@ def _start_gtkwave(vcd: Path, sessions: Mapping[str, Path], decode_s: float) -> 
     """On a copy with decoded rows, or on the lines alone where sigrok is not installed or fails."""
     lines = Start(["gtkwave", str(vcd), str(sessions[".gtkw"])])
     if not shutil.which("sigrok-cli"):
-        _note(expected("sigrok-cli (apt-get install sigrok-cli)", "none; no decoded rows", "view"))
+        _print_note(expected("sigrok-cli (apt-get install sigrok-cli)", "none; no decoded rows", "view"))
         return lines
     try:
         decoded = write_decoded(vcd, decode_s)
     except BenchError as e:
-        _note(f"{e}; no decoded rows")
+        _print_note(f"{e}; no decoded rows")
         return lines
     return Start(["gtkwave", *map(str, decoded)]) if decoded else lines
 
 
-def _note(text: str) -> None:
+def _print_note(text: str) -> None:
     print(f"psabench: {text}", file=sys.stderr)
 
 
