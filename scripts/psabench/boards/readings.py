@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing
+from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing_counts
 from psabench.errors import expected
 from psabench.link import signals
 from psabench.link.can_host import Message
@@ -81,7 +81,7 @@ def _columns(messages: tuple[str, ...]) -> list[dict[str, signals.Signal]]:
     return out
 
 
-def concat(parts: Sequence[Readings]) -> Readings:
+def join_readings(parts: Sequence[Readings]) -> Readings:
     """One `Readings` of one or more with the same columns."""
     if len(parts) == 1:
         return parts[0]
@@ -169,7 +169,7 @@ class ReadingReader:
                 self._begin()
             parts.append(self._decode(kept[span], t_s[span]))
         self.counters.frames += len(kept)
-        return concat(parts)
+        return join_readings(parts)
 
     def _decode(self, kept: list[list[bytes]], t_s: list[float]) -> Readings:
         """Of one stretch."""
@@ -195,5 +195,5 @@ class ReadingReader:
         return Readings(t_rx_s=np.array(t_s), t_sample_s=t_sample_s, columns=columns, units=units)
 
     def _count_gaps(self, counter: signals.Ints, bits: int) -> None:
-        self.counters.lost += missing(counter, bits, self._count)
+        self.counters.lost += missing_counts(counter, bits, self._count)
         self._count = int(counter[-1])

@@ -58,7 +58,7 @@ class NodeState:
         return starts
 
 
-def missing(counter: Ints, bits: int, before: int | None) -> int:
+def missing_counts(counter: Ints, bits: int, before: int | None) -> int:
     """How many numbers of a wrapping counter that rises by one are missing; before: its last one, if it is known.
 
     A number that comes twice is a repeated frame, not a lost one.

@@ -284,18 +284,18 @@ def _failure(o: Outcome, folder: Path) -> str:
 
 def _saw_and_due(o: Outcome) -> str:
     """What was required, what was seen and when: a table, so that each text of it is looked up by itself."""
-    rows = [(f"<td class=id>{i}</td>", _required(requirements().rows[i])) for i in o.requirements]
+    rows = [(f"<td class=id>{i}</td>", _required_by(requirements().rows[i])) for i in o.requirements]
     at = [] if o.at_ns is None else [("at", f"{o.at_ns * 1e-6:.6f} ms")]
     rows += [(f"<td>{name}</td>", escape(text)) for name, text in (("saw", o.saw), *at, ("due", o.due))]
     return html_table("", "".join(f"<tr>{head}<td>{text}</td></tr>" for head, text in rows))
 
 
-def _required(r: Requirement) -> str:
+def _required_by(r: Requirement) -> str:
     """The sentence, and the article's under it, in its language."""
     return escape(r.text) + (f"<p class=orig lang=ru>{escape(r.original)}</p>" if r.original else "")
 
 
-def _sources(r: Requirement) -> str:
+def _sources_of(r: Requirement) -> str:
     return "; ".join(quoted_html(s) if s.startswith(PAGES) else escape(s) for s in r.source)
 
 
@@ -307,7 +307,7 @@ def _table(run: Run) -> str:
     verdicts = run.verdicts()
     rows = "".join(
         f"<tr><td class=id>{r.id}</td><td class={CSS.get(verdicts[r.id], 'v-other')}>{verdicts[r.id].value}</td>"
-        f"<td>{_required(r)}</td><td style='overflow-wrap:anywhere'>{_sources(r)}</td><td>{r.grade}</td>"
+        f"<td>{_required_by(r)}</td><td style='overflow-wrap:anywhere'>{_sources_of(r)}</td><td>{r.grade}</td>"
         f"<td>{_seen(by_id.get(r.id, []), r.unobservable)}</td></tr>"
         for r in run.rows
     )

@@ -92,7 +92,7 @@ class StepClock:
         self._control = control
         self._hosts = list(hosts)
         first = _frames_of_all(control, self._hosts)
-        self._t_ns, self._base_tx = first.t_ns, _taken(first)
+        self._t_ns, self._base_tx = first.t_ns, _frames_taken(first)
         self._mine = sorted(first.rx)[-len(self._hosts) :] if self._hosts else []  # they came last
         self._base_rx = self._delivered(first)  # frames sent before these hosts were there
         self.in_bulk = bool(self._hosts) and all(h.counted for h in self._hosts)
@@ -139,7 +139,7 @@ class StepClock:
         """Another program has moved time, or has sent frames: both are counted from here on."""
         reply = self._control.call("frames")
         self._t_ns = reply.t_ns
-        self._base_tx = _taken(reply) - sum(h.sent for h in self._hosts)
+        self._base_tx = _frames_taken(reply) - sum(h.sent for h in self._hosts)
 
     def start_run(self, dwell_s: float) -> None:
         """Let time pass while this program does something else, which sends nothing; `finish_run` waits for its end."""
@@ -175,7 +175,7 @@ class StepClock:
         return [reply.rx.get(client, 0) for client in self._mine] or [reply.can_rx]
 
 
-def _taken(frames: Reply) -> int:
+def _frames_taken(frames: Reply) -> int:
     """How many frames the emulator has taken from all that have been on its buses."""
     return sum(int(c["taken"]) for c in [*frames.result["clients"], frames.result["gone"]])
 

@@ -12,15 +12,15 @@ from psabench.panel.procedures import OFFERED
 from psabench.procedures.command_line.commands import COMMANDS, Command
 
 
-def fitting(view: BenchView) -> list[str]:
+def fitting_procedures(view: BenchView) -> list[str]:
     """Procedures for which the bench has the board and the instruments, by the tables of `psabench run`."""
     hosts = view.bench.hosts.values()
     if view.pace == "real" or not hosts or any(h.joins_later for h in hosts):  # a serial line has one client
         return []
-    return [name for name in OFFERED if _fits(COMMANDS[name], view)]
+    return [name for name in OFFERED if _fits_bench(COMMANDS[name], view)]
 
 
-def _fits(command: Command, view: BenchView) -> bool:
+def _fits_bench(command: Command, view: BenchView) -> bool:
     if not command.takes_bench or _unit_for(command, view) is None:
         return False
     has_axes = "table" not in command.instruments or len(view.tables) >= command.axes
@@ -37,7 +37,7 @@ def _unit_for(command: Command, view: BenchView) -> Unit | None:
 
 def options_of(name: str, view: BenchView) -> Sequence[str]:
     """That bring the procedure to this bench. Raises BenchError for one that does not fit it."""
-    known = fitting(view)
+    known = fitting_procedures(view)
     if name not in known:
         what = ", ".join(known) or "a bench with the board and the instruments of a procedure"
         raise BenchError(expected(what, repr(name[:40]), "procedure on this bench"))

@@ -17,7 +17,7 @@ from psabench.output import without_nan
 from psabench.panel.bench_view import BenchView
 from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
-from psabench.panel.lending import check_free, fitting, options_of
+from psabench.panel.lending import check_free, fitting_procedures, options_of
 from psabench.panel.procedures import OFFERED, Runs
 from psabench.panel.recorded.opening import Opening
 from psabench.panel.recorded.source import RecordingSource
@@ -236,7 +236,7 @@ class Worker:
     def hello(self) -> dict[str, Any]:
         if self._view is None:
             return self._opening.message() if self._opening else {"kind": "lost", "why": self.lost}
-        fits = fitting(self._view) if isinstance(self._view, BenchView) else []
+        fits = fitting_procedures(self._view) if isinstance(self._view, BenchView) else []
         procedures = {"offered": dict(OFFERED), "procedure": self.runs.message(), "restores": self.source.is_own}
         return (
             self._view.describe()

@@ -142,7 +142,7 @@ class Language:
         return f"{self._known(word)} {found}" if found else None
 
     def _known(self, text: str) -> str | None:
-        plain = _plain(text)
+        plain = _plain_text(text)
         for blanked in (_NUMBER, _NAMED, _LISTED):
             key, taken = blanked.sub("{}", plain), blanked.findall(plain)
             words = self.texts.get(key)
@@ -152,23 +152,23 @@ class Language:
         return None
 
 
-def _plain(text: str) -> str:
+def _plain_text(text: str) -> str:
     return text.strip().replace("&#x27;", "'").replace("&quot;", '"')
 
 
 def key_of(text: str) -> str:
     """The msgid of a text."""
-    return _NUMBER.sub("{}", _plain(text))
+    return _NUMBER.sub("{}", _plain_text(text))
 
 
 def keys_of(text: str) -> tuple[str, ...]:
     """The msgids that fit a text, the closest first: without its numbers; its names, too; its lists of both as one."""
-    plain = _plain(text)
+    plain = _plain_text(text)
     return tuple(blanked.sub("{}", plain) for blanked in (_NUMBER, _NAMED, _LISTED))
 
 
 def _has_words(text: str) -> bool:
-    named = _NAMED.sub("", _plain(text))
+    named = _NAMED.sub("", _plain_text(text))
     if _NUMBER.search(text) and not _WORD.search(named):  # a value of a register: STATUS 41h
         return False
     return bool(_WORD.search(_SYMBOLS.sub("", _NAMES.sub("", key_of(text)))))

@@ -14,7 +14,7 @@ from psabench.bench import Bench
 from psabench.emulator import Emulator
 from psabench.errors import BenchError
 from psabench.panel.bench_view import BenchView
-from psabench.panel.lending import check_free, fitting, options_of
+from psabench.panel.lending import check_free, fitting_procedures, options_of
 from psabench.panel.procedures import OFFERED
 from psabench.procedures.command_line.commands import COMMANDS
 from psabench.procedures.command_line.offered import ON_THE_HEAD, ON_THE_PLATFORM
@@ -35,7 +35,7 @@ FITTING = {
 @pytest.mark.parametrize("scenario", FITTING)
 def test_a_bench_is_offered_what_fits_its_boards_and_instruments(scenario: str, tmp_path: Path) -> None:
     with Bench.start(scenario) as bench:
-        assert sorted(fitting(BenchView(bench, tmp_path))) == sorted(FITTING[scenario])
+        assert sorted(fitting_procedures(BenchView(bench, tmp_path))) == sorted(FITTING[scenario])
 
 
 def test_options_lead_to_the_bench_and_its_chosen_unit(tmp_path: Path) -> None:

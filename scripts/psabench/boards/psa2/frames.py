@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from psabench.boards.registry import DBC_NODE
-from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing
+from psabench.boards.stream import FrameCounters, NodeState, by_stretch, missing_counts
 from psabench.link import signals
 from psabench.link.can_host import Message
 from psabench.link.protocol_files import message
@@ -83,7 +83,7 @@ class Frames:
         return self.u_v[:, "xyz".index(name)]
 
 
-def concat(parts: Sequence[Frames]) -> Frames:
+def join_frames(parts: Sequence[Frames]) -> Frames:
     """One `Frames` of many, or none."""
     if len(parts) == 1:
         return parts[0]
@@ -160,7 +160,7 @@ class FrameReader:
             if span.start < span.stop:
                 self.counters.stretches += self._before is None
                 parts.append(self._decode(first[span], second[span], np.array(t_s[span])))
-        taken = concat(parts)
+        taken = join_frames(parts)
         self.counters.frames += len(taken)
         return taken
 
@@ -224,7 +224,7 @@ class FrameReader:
 
     def _count_gaps(self, counter: Ints, bits: int) -> None:
         """Adds the gaps of a wrapping counter that should rise by one."""
-        self.counters.lost += missing(counter, bits, self._before)
+        self.counters.lost += missing_counts(counter, bits, self._before)
         self._before = int(counter[-1])
 
     def _times(self, stamp: Ints, bits: int, unit_s: float) -> Floats:

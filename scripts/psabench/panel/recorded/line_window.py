@@ -34,10 +34,10 @@ def line_part(name: str, wire: Wire, begin_ns: int, end_ns: int, columns: int) -
     return found | {"columns": "".join(map(str, kind.tolist()))}
 
 
-def window(vcd: Vcd, found: Decoded, request: Mapping[str, Any]) -> dict[str, Any]:
+def window_of(vcd: Vcd, found: Decoded, request: Mapping[str, Any]) -> dict[str, Any]:
     """What the page draws between two instants. Raises Wrong for what cannot be drawn."""
-    begin_ns, end_ns = _whole(request, "from_ns", MOST_NS), _whole(request, "to_ns", MOST_NS)
-    columns, names = _whole(request, "columns", COLUMNS), _names(request, vcd)
+    begin_ns, end_ns = _whole_number(request, "from_ns", MOST_NS), _whole_number(request, "to_ns", MOST_NS)
+    columns, names = _whole_number(request, "columns", COLUMNS), _names_in(request, vcd)
     if not begin_ns < end_ns or not columns:
         raise Wrong(expected("from_ns < to_ns, columns > 0", f"{begin_ns}, {end_ns}, {columns}", "window"))
     seen = found.between(begin_ns, end_ns)
@@ -66,7 +66,7 @@ def frame_place(found: Decoded, k: int) -> dict[str, Any]:
 
 def next_frame(found: Decoded, request: Mapping[str, Any]) -> dict[str, Any]:
     """The next frame, torn one or wrong one after an instant, or before it where "back" is true. Raises Wrong."""
-    at_ns, what = _whole(request, "at_ns", MOST_NS), str(request.get("what", ""))[:40]
+    at_ns, what = _whole_number(request, "at_ns", MOST_NS), str(request.get("what", ""))[:40]
     kinds = {"frame": np.arange(len(found)), "torn": found.torn, "error": found.wrong}
     if what not in kinds:
         raise Wrong(expected(", ".join(kinds), repr(what), "what"))
@@ -79,14 +79,14 @@ def next_frame(found: Decoded, request: Mapping[str, Any]) -> dict[str, Any]:
     return frame_place(found, int(places[k]))
 
 
-def _whole(request: Mapping[str, Any], name: str, most: int) -> int:
+def _whole_number(request: Mapping[str, Any], name: str, most: int) -> int:
     value = request.get(name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
         raise Wrong(expected(f"an integer from 0 to {most}", repr(value)[:40], name))
     return value
 
 
-def _names(request: Mapping[str, Any], vcd: Vcd) -> list[str]:
+def _names_in(request: Mapping[str, Any], vcd: Vcd) -> list[str]:
     names = request.get("lines")
     if (
         not isinstance(names, list)

@@ -66,9 +66,9 @@ class Decoded:
         return range(first, max(first, int(np.searchsorted(self.begin_ns, end_ns, "right"))))
 
 
-def decoded(vcd: Vcd, look: Look) -> Decoded:
+def decode_lines(vcd: Vcd, look: Look) -> Decoded:
     """By the lines that there are. Nothing where no decoder knows them. Raises what `look` raises."""
-    for lines, decode in ((FRAME, _frames), (PSD1, _psd1_words), (BUS, _strobes)):
+    for lines, decode in ((FRAME, _frames_of), (PSD1, _psd1_words), (BUS, _strobes_of)):
         if all(line in vcd.wires for line in lines):
             return decode(vcd, look)
     return Decoded(what="frame", lines=(), begin_ns=_no_places(), end_ns=_no_places())
@@ -77,7 +77,7 @@ def decoded(vcd: Vcd, look: Look) -> Decoded:
 # ---- PSA-1, PSA-2, the unit that has one: a frame of four words
 
 
-def _frames(vcd: Vcd, look: Look) -> Decoded:
+def _frames_of(vcd: Vcd, look: Look) -> Decoded:
     log = LineLog(recording=vcd)
     fall, rise = log.pulses("Int", 0)
     clk = log.rises("CLK")
@@ -94,10 +94,10 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
     whole = concat(parts)
     is_whole = np.isin(fall // vcd.unit_ns, whole.fall)
     bits, torn = last - first, np.flatnonzero(~is_whole)
-    missing, off_s = _timing(fall, fmt)
+    missing, off_s = _timing_of(fall, fmt)
 
     def why(k: int) -> str:
-        return _trouble(int(missing[k]), float(off_s[k])) if is_whole[k] else _tear(int(bits[k]), fmt.bits)
+        return _trouble_text(int(missing[k]), float(off_s[k])) if is_whole[k] else _tear_text(int(bits[k]), fmt.bits)
 
     def tags(k: int) -> Sequence[Tag]:
         if not 1 < bits[k] <= MOST_BITS:
@@ -106,7 +106,7 @@ def _frames(vcd: Vcd, look: Look) -> Decoded:
         return frame_words(vcd.part(FRAME, begin - 1, end), begin, end, fmt.word_bits)
 
     t_s = fall[is_whole] / NS
-    samples = _values(t_s, whole.words.astype(np.int64), whole.signed(fmt.word_bits).astype(np.int64))
+    samples = _values_of(t_s, whole.words.astype(np.int64), whole.signed(fmt.word_bits).astype(np.int64))
     return Decoded(
         what="frame",
         lines=FRAME,
@@ -129,7 +129,7 @@ def _format_of(fall: Ints, bits: Ints, unit_ns: int) -> LineFormat:
     return LineFormat(word_bits=word_bits, sample_hz=NS / unit_ns, period_s=period_s, tolerance_s=tolerance_s)
 
 
-def _timing(fall_ns: Ints, fmt: LineFormat) -> tuple[Ints, Floats]:
+def _timing_of(fall_ns: Ints, fmt: LineFormat) -> tuple[Ints, Floats]:
     """Of each frame, how many are missing before it, and by how many s it is off its time; of the first: 0."""
     unit_ns = NS / fmt.sample_hz
     steps, off_s = fmt.timing(np.diff(fall_ns // round(unit_ns)))
@@ -137,17 +137,17 @@ def _timing(fall_ns: Ints, fmt: LineFormat) -> tuple[Ints, Floats]:
     return np.concatenate((np.zeros(first, np.int64), steps - 1)), np.concatenate((np.zeros(first), off_s))
 
 
-def _trouble(missing: int, off_s: float) -> str:
+def _trouble_text(missing: int, off_s: float) -> str:
     if missing:
         return f"{missing} missing before it"
     return f"{abs(off_s) * 1e6:.3f} us {'late' if off_s > 0 else 'early'}" if off_s else ""
 
 
-def _tear(bits: int, due: int) -> str:
+def _tear_text(bits: int, due: int) -> str:
     return f"torn: {bits} bits, not {due}" if bits != due else "torn: pulses of CLK off their time"
 
 
-def _values(t_s: Floats, words: Ints, signed: Ints) -> Samples:
+def _values_of(t_s: Floats, words: Ints, signed: Ints) -> Samples:
     """Codes as they are sent, which no recording says the volts of; temperature of the channel that T names."""
     code = (words[:, 3] & 0xFFFF).astype(np.uint16).view(np.int16).astype(np.int64)
     frames = Frames.of(t_s, t_s, np.zeros((len(t_s), 3)), {"T": code, "CHANNEL": words[:, 3] >> 16 & 15})
@@ -200,7 +200,7 @@ def _first_words(vcd: Vcd) -> Vcd:
 # ---- a parallel bus
 
 
-def _strobes(vcd: Vcd, _: Look) -> Decoded:
+def _strobes_of(vcd: Vcd, _: Look) -> Decoded:
     s = bus_cycles.strobes(LineLog(recording=vcd))
 
     def tags(k: int) -> Sequence[Tag]:

@@ -18,7 +18,7 @@ from psabench.link.vcd import Vcd, VcdPart, read_vcd_part
 from psabench.panel.channels import Channels, overview_row, unit_message
 from psabench.panel.recorded import line_window
 from psabench.panel.recorded.base import PlayedView
-from psabench.panel.recorded.line_words import NS, decoded
+from psabench.panel.recorded.line_words import NS, decode_lines
 
 MOST_EDGES = 10_000_000  # half a minute of a PSA-2; 0.2 GB while they are read
 MOST_NAMES = 1024  # of lines, as `link.vcd` reads them
@@ -31,10 +31,10 @@ class LinesView(PlayedView):
 
     def __init__(self, path: Path, files: Mapping[str, Path], look: Callable[[float], None]) -> None:
         super().__init__(path, files)
-        part = _read(path, look)
+        part = _read_lines(path, look)
         self._vcd = Vcd(max(1, part.unit_fs // 10**6), part.start_ns, part.end_ns, part.wires)
         self._damage = part.note
-        self._found = decoded(self._vcd, lambda: look(DECODED))
+        self._found = decode_lines(self._vcd, lambda: look(DECODED))
         scope = SCOPE.search(part.head)
         self._title = of_board(scope[1]).title if scope and scope[1] in BOARDS else "lines"
         if self._found.samples is not None:
@@ -80,7 +80,7 @@ class LinesView(PlayedView):
 
     def window(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Edges and words between two instants, as far as they are recorded. Raises Wrong."""
-        return line_window.window(self._vcd, self._found, request)
+        return line_window.window_of(self._vcd, self._found, request)
 
     def next_frame(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Raises Wrong where there is none."""
@@ -115,7 +115,7 @@ class LinesView(PlayedView):
         return {"kind": "can", "buses": []}
 
 
-def _read(path: Path, look: Callable[[float], None]) -> VcdPart:
+def _read_lines(path: Path, look: Callable[[float], None]) -> VcdPart:
     """Raises BadInput for what is no recording of lines, and what `look` raises."""
     try:
         size = max(1, path.stat().st_size)
