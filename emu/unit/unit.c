@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-const char *const unit_mounts[] = {[LAB_HEAD] = "head", [LAB_TABLE] = "table", [LAB_FIXED] = "fixed",
+const char *const unit_mounts[] = {[LAB_HEAD] = "head",         [LAB_TABLE] = "table",   [LAB_FIXED] = "fixed",
                                    [LAB_PLATFORM] = "platform", [LAB_FLIGHT] = "flight", NULL};
 
 /* In the chamber the board is as warm as the case, the thermometers of the sensors as their elements. */

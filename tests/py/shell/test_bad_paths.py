@@ -15,7 +15,7 @@ import pytest
 from psabench import cli
 from psabench.errors import BadInput, LinkError
 
-from tests.py.support.commands import every_command
+from commands import every_command
 
 FORM = re.compile(r"psabench: [^\n]+: expected [^\n]+, got [^\n]+\n")
 SYSTEM = re.compile(r"No such file|[Ii]s a directory|Not a directory|Errno|Permission denied|Connection refused")

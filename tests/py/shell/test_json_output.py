@@ -20,7 +20,7 @@ from psabench.sins.increments import Increments
 from psabench.sins.readers import write_csv
 
 from tests.py.link.test_lineport import lines as line_samples
-from tests.py.support.commands import every_command
+from commands import every_command
 
 ROOT = Path(__file__).parents[3]
 PACKAGE = ROOT / "scripts/psabench"
