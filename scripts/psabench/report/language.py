@@ -65,6 +65,7 @@ _SYMBOLS = re.compile(
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
 _VERBAL = re.compile(r"[A-Za-z]{4}")  # more than a preposition: {} of {}, whose cases depend on what it joins
+_REPR = re.compile(r"'[^']*'")
 _BLANK = re.compile(r"\\\{\\\}")
 _GAP = re.compile(
     r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[A-Za-z])| (?=\(\d+ of \d+\))"
@@ -81,6 +82,7 @@ class Language:
     found: set[str] = field(default_factory=set)
     missing: set[str] = field(default_factory=set)
     _tried: dict[str, str | None] = field(default_factory=dict)  # by _filled
+    _rows: dict[tuple[str, bool], str | None] = field(default_factory=dict)  # by _joined: a list has many beginnings
 
     def translate_page(self, page: str) -> str:
         """A page in this language; what the catalogue does not have stays English, and is in `missing`."""
@@ -128,9 +130,16 @@ class Language:
 
         The longest parts are tried first: a part may have commas of its own. filled: or texts whose blanks hold texts.
         """
+        if (text, filled) not in self._rows:
+            self._rows[text, filled] = self._row(text, filled=filled)
+        return self._rows[text, filled]
+
+    def _row(self, text: str, *, filled: bool) -> str | None:
         for gap in reversed(list(_GAP.finditer(text))):
             head, rest = self._part(text[: gap.start()], filled=filled), text[gap.end() :]
-            if head is not None and (tail := self._part(rest, filled=filled) or self._joined(rest, filled=filled)):
+            if head is None:
+                continue
+            if tail := self._part(rest, filled=filled) or self._joined(rest, filled=filled):
                 return head + gap[0] + tail
         return None
 
@@ -148,7 +157,7 @@ class Language:
             return None
         if word == _QUOTING:
             return f"{self._known(word)} <span lang=en>{rest}</span>"
-        found = self._known(rest) or (None if _has_words(rest) else rest)
+        found = self._known(rest) or (rest if _REPR.fullmatch(rest) or not _has_words(rest) else None)
         return f"{self._known(word)} {found}" if found else None
 
     def _filled(self, text: str) -> str | None:
