@@ -66,6 +66,8 @@ _SYMBOLS = re.compile(
 )
 _VERBAL = re.compile(r"[A-Za-z]{4}")  # more than a preposition: {} of {}, whose cases depend on what it joins
 _REPR = re.compile(r"'[^']*'")
+# What a blank may hold: a list, at the end of an entry only.
+_IN, _AT_END = r"((?:\[[^\]]*\]|[^;,])+?(?<!:))", "([^;]*?[^;:])"
 _BLANK = re.compile(r"\\\{\\\}")
 _GAP = re.compile(
     r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[A-Za-z])| (?=\(\d+ of \d+\))"
@@ -172,7 +174,9 @@ class Language:
         return self._tried[plain]
 
     def _fill(self, key: str, plain: str) -> str | None:
-        taken = re.fullmatch(_BLANK.sub("([^;]*?[^;:])", re.escape(key)), plain)
+        last = key.endswith("{}")
+        form = _BLANK.sub(lambda _: _IN, re.escape(key.removesuffix("{}"))) + (_AT_END if last else "")
+        taken = re.fullmatch(form, plain)
         fills = []
         for fill in taken.groups() if taken else ():
             found = self._part(fill, filled=True) or self._joined(fill, filled=True)
