@@ -10,6 +10,7 @@ locale/LANG/*.po: docs/tools/languages.md
 
 from __future__ import annotations
 
+import functools
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +38,7 @@ _NUMBER = re.compile(
 # The same with names of signals, registers, axes and with lists as Python prints them: a check writes one text of many.
 _NAME = "|".join(
     (
-        r"\b[\dA-F]{2}(?: [\dA-F]{2})+(?![.\w])",  # bytes
+        r"\b(?:[\dA-F]{2}(?: [\dA-F]{2})+|[\dA-F]{4}(?: [\dA-F]{4})+)(?![.\w])",  # bytes, words
         r"\b[EIRW] [^;,]*? t=\d+|\bE [a-z]+(?:-[a-z]+)*",  # an answer of the bus port
         r"[\dA-F]{4}h:\d+ \([^()]+\)",  # an object and its name
         _NUMBER.pattern,
@@ -58,10 +59,16 @@ _CYRILLIC = re.compile(r"[А-Яа-яЁё]")  # of a picture whose texts were tra
 _QUANTITY = re.compile(r"\{\} [A-Za-z]")  # 5 m/s: a value that is no name
 # What has no words: tags, indices, functions, units, symbols and names of data that are the same in each language.
 _SYMBOLS = re.compile(
-    r"<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
+    r"\{\"[^{}]*\}|\bE [a-z]+(?:-[a-z]+)*(?: [RW] \S+ t=\w+)?"  # lines in JSON, answers of the bus port
+    r"|<sub>\w*</sub>|<span class=flag .*?</span>|<[^>]*>|&\w+;|\b\w+_\w+\b|\b[A-Za-z]+\d+\b|[Α-Ωα-ω]\w*"
     r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b|\b[\dA-F]{2}(?: [\dA-F]{2})+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
+_VERBAL = re.compile(r"[A-Za-z]{4}")  # more than a preposition: {} of {}, whose cases depend on what it joins
+_REPR = re.compile(r"'[^']*'")
+# What a blank may hold: a list, at the end of an entry only.
+_IN, _AT_END = r"((?:\[[^\]]*\]|[^;,])+?(?<!:))", "([^;]*?[^;:])"
+_BLANK = re.compile(r"\\\{\\\}")
 _GAP = re.compile(
     r"[;:,] |(?<=[.!?]) |(?<=\d [num]s) (?=[A-Za-z])| (?=\(\d+ of \d+\))"
 )  # "5 ns" of what; how many of them
@@ -76,6 +83,8 @@ class Language:
     texts: Mapping[str, str]
     found: set[str] = field(default_factory=set)
     missing: set[str] = field(default_factory=set)
+    _tried: dict[str, str | None] = field(default_factory=dict)  # by _filled
+    _rows: dict[tuple[str, bool], str | None] = field(default_factory=dict)  # by _joined: a list has many beginnings
 
     def translate_page(self, page: str) -> str:
         """A page in this language; what the catalogue does not have stays English, and is in `missing`."""
@@ -97,6 +106,7 @@ class Language:
         if wrapped := _DOUBT.fullmatch(text):
             return wrapped[1] + self._text(wrapped[2]) + wrapped[3]
         found = self._known(text) or self._fact(text) or self._joined(text)
+        found = found or self._filled(text) or self._joined(text, filled=True)
         if found is None and _has_words(text) and not _CYRILLIC.search(text):
             self.missing.add(key_of(text))
         return found or text
@@ -117,19 +127,30 @@ class Language:
             self.missing.add(key_of(text))
         return found or text
 
-    def _joined(self, text: str) -> str | None:
+    def _joined(self, text: str, *, filled: bool = False) -> str | None:
         """A list, or a row of sentences, each part known or without words: which of them a page has depends on the run.
 
-        The longest parts are tried first: a part may have commas of its own.
+        The longest parts are tried first: a part may have commas of its own. filled: or texts whose blanks hold texts.
         """
+        if (text, filled) not in self._rows:
+            self._rows[text, filled] = self._row(text, filled=filled)
+        return self._rows[text, filled]
+
+    def _row(self, text: str, *, filled: bool) -> str | None:
         for gap in reversed(list(_GAP.finditer(text))):
-            head, rest = self._part(text[: gap.start()]), text[gap.end() :]
-            if head is not None and (tail := self._part(rest) or self._joined(rest)):
+            head, rest = self._part(text[: gap.start()], filled=filled), text[gap.end() :]
+            if head is None:
+                continue
+            if tail := self._part(rest, filled=filled) or self._joined(rest, filled=filled):
                 return head + gap[0] + tail
         return None
 
-    def _part(self, text: str) -> str | None:
-        return self._known(text) or self._clause(text) or (None if _has_words(text) else text)
+    def _part(self, text: str, *, filled: bool) -> str | None:
+        if found := self._known(text) or self._clause(text):
+            return found
+        if not _has_words(text):
+            return text
+        return self._filled(text) if filled else None
 
     def _clause(self, text: str) -> str | None:
         """What was expected, what was got (psabench.errors.expected); what was seen, due; what a program said."""
@@ -138,8 +159,34 @@ class Language:
             return None
         if word == _QUOTING:
             return f"{self._known(word)} <span lang=en>{rest}</span>"
-        found = self._known(rest) or (None if _has_words(rest) else rest)
+        found = self._known(rest) or (rest if _REPR.fullmatch(rest) or not _has_words(rest) else None)
         return f"{self._known(word)} {found}" if found else None
+
+    def _filled(self, text: str) -> str | None:
+        """A text whose blanks hold texts: "no heartbeat {}" of "after NMT stop". The longest entry that fits."""
+        plain = _plain_text(text)
+        if plain not in self._tried:
+            self._tried[plain] = None  # a blank does not hold the text that it is in
+            fitting = (
+                self._fill(key, plain) for key, words in _forms(tuple(self.texts)) if all(w in plain for w in words)
+            )
+            self._tried[plain] = next((found for found in fitting if found), None)
+        return self._tried[plain]
+
+    def _fill(self, key: str, plain: str) -> str | None:
+        last = key.endswith("{}")
+        form = _BLANK.sub(lambda _: _IN, re.escape(key.removesuffix("{}"))) + (_AT_END if last else "")
+        taken = re.fullmatch(form, plain)
+        fills = []
+        for fill in taken.groups() if taken else ():
+            found = self._part(fill, filled=True) or self._joined(fill, filled=True)
+            if found is None:
+                return None
+            fills.append(found)
+        if not taken:
+            return None
+        self.found.add(key)
+        return self.texts[key].format(*fills)
 
     def _known(self, text: str) -> str | None:
         plain = _plain_text(text)
@@ -148,8 +195,15 @@ class Language:
             words = self.texts.get(key)
             if words and key.count("{}") == len(taken):  # else braces of its own: a schema, a regular expression
                 self.found.add(key)
-                return words.format(*taken)
+                return words.format(*taken) if taken else words  # else braces of JSON may be in it
         return None
+
+
+@functools.cache
+def _forms(keys: tuple[str, ...]) -> Sequence[tuple[str, Sequence[str]]]:
+    """Entries with blanks, the longest first, and the words around these."""
+    longest = sorted((k for k in keys if "{}" in k and _VERBAL.search(k)), key=len, reverse=True)
+    return [(k, [w for w in k.split("{}") if w]) for k in longest]
 
 
 def _plain_text(text: str) -> str:

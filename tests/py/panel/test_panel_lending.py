@@ -141,7 +141,7 @@ def test_a_calibration_runs_on_the_bench_of_the_page_to_its_report(browser: Brow
         expect(page.locator("#lent")).to_contain_text("The procedure turns has this bench")
         assert page.evaluate("document.querySelector('#controls').inert")
         expect(page.locator("[data-estimate='kx_v_per_g']")).to_contain_text("readings", timeout=LONG_MS)
-        assert page.evaluate("readings.size") >= 3  # the head of the page turns
+        page.wait_for_function("readings.size >= 3", timeout=LONG_MS)  # the head of the page turns
         expect(page.locator("#lent")).to_be_hidden(timeout=LONG_MS)
         assert page.evaluate("panel.shown().points") > 3
         expect(page.locator("#procedure-step")).to_contain_text("done", timeout=LONG_MS)

@@ -93,6 +93,29 @@ def test_the_closest_entry_is_taken() -> None:
     assert ru.missing == set()
 
 
+def test_a_blank_holds_a_text_of_the_catalogue_and_the_other_words_stay_missing() -> None:
+    texts = {"no state {} {}": "нет состояния {} {}", "after a stop": "после остановки", "lost {}": "потеряно {}"}
+    ru = Language(name="ru", texts=texts | {"{} of them": "из них {}"})
+    assert ru.translate_page("<td>no state 04h after a stop</td>") == "<td>нет состояния 04h после остановки</td>"
+    assert ru.translate_page("<td>lost 3 of them, 5 of them</td>") == "<td>потеряно из них 3, из них 5</td>"
+    assert ru.missing == set()
+    ru.translate_page("<td>no state 04h after a start</td>")
+    assert ru.missing == {"no state {} after a start"}
+
+
+def test_braces_of_a_text_are_no_blanks() -> None:
+    ru = Language(name="ru", texts={'{"gone": true} once': '{"gone": true} один раз'})
+    assert ru.translate_page('<td>{"gone": true} once</td>') == '<td>{"gone": true} один раз</td>'
+
+
+def test_a_long_list_with_an_unknown_end_is_given_up_at_once() -> None:
+    """Each of its parts fits by itself, so that without a memory of them all rows of parts would be tried."""
+    text = "a part, " * 24 + "an end"
+    ru = Language(name="ru", texts={"a part": "часть", "a part, a part": "две части"})
+    assert ru.translate_page(f"<td>{text}</td>") == f"<td>{text}</td>"
+    assert ru.missing == {text}
+
+
 def test_quotes_of_a_source_and_words_of_a_program_stay_and_tooltips_are_translated() -> None:
     texts = {"a rule": "правило", "no frame": "нет кадра", "said": "сообщение:", "a tip": "пояснение"}
     ru = Language(name="ru", texts=texts)

@@ -17,7 +17,7 @@ TEXT = re.compile(r">([^<>]+)<")
 HEAD = re.compile(r"<style>.*?</style>|<title>.*?</title>|<(?:defs|metadata)>.*?</(?:defs|metadata)>", re.DOTALL)
 QUOTED = re.compile(r"<(\w+)\b[^>]* lang=en>.*?</\1>", re.DOTALL)
 FACTS = re.compile(r"<p class=facts>.*?</p>", re.DOTALL)  # values may be names of the user's
-ENGLISH = re.compile(r"\b(?:the|of|and|is|are|no|not|in|with|from|at|by|to|all|each|it|its|error|run|time|unit)\b")
+ENGLISH = re.compile(r"\b(?:the|of|and|is|are|no|not|in|with|from|at|by|to|all|each|it|its|error|run|time|unit)\b(?!-)")
 
 
 @functools.cache

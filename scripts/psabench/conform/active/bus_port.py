@@ -56,7 +56,7 @@ def each_line_has_its_answer_in_turn(s: Dut) -> str:
     answers = say(s, *lines)
     times = []
     for line, answer in zip(lines, answers, strict=True):
-        expect(answer.startswith(kinds[line]), f"{answer!r} to {line!r}", f"{kinds[line]}...")
+        expect(answer.startswith(kinds[line]), f"another answer; said {answer!r} to {line!r}", f"{kinds[line]}...")
         times.append(_time_ns(answer))
     expect(times == sorted(times), "times that fall", "times in the order of the lines")
     return f"{MANY} lines, {MANY} answers in their order"
@@ -148,7 +148,7 @@ def spelling_makes_no_difference(s: Dut) -> str:
         try:
             _cycle(answer, "R", a)
         except Failed as e:
-            raise Failed(f"{answer!r} to {line!r}", e.due) from e
+            raise Failed(f"another answer; said {answer!r} to {line!r}", e.due) from e
     return f"{len(lines)} spellings of one line"
 
 
@@ -215,7 +215,7 @@ def _read_alike(t: Talk, address: int) -> bool:
             return False
         if _agree(first, answer):
             return True
-    raise Failed(f"{answer!r} where CAN reads {words(first)}", "the same")
+    raise Failed(f"CAN reads {words(first)}; said {answer!r}", "the same")
 
 
 def _agree(over_can: bytes, answer: str) -> bool:

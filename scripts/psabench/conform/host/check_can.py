@@ -52,7 +52,7 @@ def the_end_is_told(e: HostCapture) -> str:
 def every_line_is_of_the_results_channel(e: HostCapture) -> str:
     """The lines told, against the words of the results channel."""
     enough(e.told.count or e.told.events or e.told.bad_lines, "a line")
-    none_of(e.told.bad, lambda x: f"{e.told.bad_lines} lines that are none, the first {x}", "docs/conform_host.md")
+    none_of(e.told.bad, lambda x: f"{e.told.bad_lines} lines that are none; said {x}", "docs/conform_host.md")
     return f"{e.told.count + len(e.told.events)} lines"
 
 
@@ -278,7 +278,9 @@ def each_axis_is_told_as_over_range(e: HostCapture) -> str:
     told = [(x.name, x.value) for x in e.told.events if x.name in ("over_range", "in_range")]
     if told != due:
         k = next((k for k, (a, b) in enumerate(zip(told, due, strict=False)) if a != b), min(len(told), len(due)))
-        raise Failed(f"{_word(told, k)} as number {k + 1} of {len(told)}", f"{_word(due, k)} of {len(due)}")
+        raise Failed(
+            f"{_word(told, k)} as number {k + 1} of {len(told)}", f"{_word(due, k)} as number {k + 1} of {len(due)}"
+        )
     e.nothing_but("over_range", "in_range", "frozen")
     return f"{len(due) // 2} times over the range and back"
 

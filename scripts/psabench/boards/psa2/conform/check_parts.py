@@ -35,7 +35,8 @@ def _known(
     lines: Sequence[str],
     last: int,
 ) -> str:
-    """Every message is a command of the table, with the bytes that it wants. Raises Failed."""
+    """Every message is a command of the table, with the bytes that it wants. Raises Failed; Inconclusive: no message."""
+    conclusive(found, "no command was recorded")
     for m in found:
         saw = f"{sum(b.bits for b in m.bursts)} clocks of {m.name}"
         expect(not any(b.bits % 8 for b in m.bursts), saw, "whole bytes", at_ns=m.begin_ns, lines=lines)
@@ -53,7 +54,6 @@ def _known(
 def accelerometer_converters_get_commands_that_they_have(e: Capture, row: Requirement) -> str:
     """Decode every burst on DIn."""
     found = port_traffic(e).of(temp=False)
-    conclusive(found, "no command was recorded")
     for b in port_traffic(e).reads:
         expect("1" not in b.sent, "DIn high in a read", "low", at_ns=int(b.rise_ns[0]), lines=ACCEL)
     known = (0x00, 0x01, 0x04, 0x05, 0x06, 0x07, 0x10, 0x11)  # sources 1.3, those that a read survives

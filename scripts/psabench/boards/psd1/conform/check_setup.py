@@ -286,9 +286,11 @@ def status_tells_the_lines(e: Capture, row: Requirement) -> str:
         expected["cycle_mask"] = log["A0"].at(just) == 1
     for name, due in expected.items():
         saw = (word & int(row.limit(name))) != 0
-        texts = [f"{name.removesuffix('_mask')} {int(v)} in STATUS {w:04X}h" for v, w in zip(saw, word, strict=True)]
+        texts = [
+            f"{name.removesuffix('_mask').upper()} {int(v)} in STATUS {w:04X}h" for v, w in zip(saw, word, strict=True)
+        ]
         first_bad(saw != due, begin, texts, "as the lines are", (*STATUS_LINES, "CS"))
-    seen = [f"{name.removesuffix('_mask')} {int(due.sum())}" for name, due in expected.items()]
+    seen = [f"{name.removesuffix('_mask').upper()} {int(due.sum())}" for name, due in expected.items()]
     return f"{len(begin)} reads of STATUS; active: {', '.join(seen)}"
 
 
