@@ -159,7 +159,7 @@ RULES = {
     "loose-modules": Rule(loose_modules, 14, 14),
     "object-numbers": Rule(object_numbers, 0, 0),
     f"modules-that-name-{BOARD}": Rule(places_of_board, 3, 3),
-    "one-word-functions-python": Rule(one_word_functions, 981, 981),
+    "one-word-functions-python": Rule(one_word_functions, 982, 982),
     # 47,300, 38,500 and 1,400 before LCM, MAVLink, the logic analyser, UDS, cannelloni, more logs and recorded units;
     # 56,900 of the emulator before fleets and temperature conversions that are skipped.
     # 59,500, 60,700 and 1,980 before the aircraft, the unit's own navigation, the methods beside the filter.
@@ -169,7 +169,7 @@ RULES = {
     # 65,350, 72,772 and 2,302 before the panel, viewers, packages, notebooks, site and reports in Russian.
     # 65,414, 74,878 and 2,392 before JSON of every command, the panel's forks, scenarios, recordings and drawn views.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_803, 65_803),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 78_393, 78_393),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 78_451, 78_451),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_485, 2_485),
 }
 

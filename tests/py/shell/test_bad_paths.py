@@ -12,10 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
+from commands import every_command
 from psabench import cli
 from psabench.errors import BadInput, LinkError
-
-from commands import every_command
 
 FORM = re.compile(r"psabench: [^\n]+: expected [^\n]+, got [^\n]+\n")
 SYSTEM = re.compile(r"No such file|[Ii]s a directory|Not a directory|Errno|Permission denied|Connection refused")

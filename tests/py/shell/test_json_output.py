@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import every_command
 from psabench import cli, output
 from psabench.link.protocol_files import dbc_node
 from psabench.places import find_emulator
@@ -20,7 +21,6 @@ from psabench.sins.increments import Increments
 from psabench.sins.readers import write_csv
 
 from tests.py.link.test_lineport import lines as line_samples
-from commands import every_command
 
 ROOT = Path(__file__).parents[3]
 PACKAGE = ROOT / "scripts/psabench"
