@@ -126,7 +126,7 @@ class _Units:
             raise LinkError(expected("a gyro unit", "none", "scenario"))
         made = [(u["name"], make(self, int(u["node"]))) for u, make in listed if u["bus"] == gyros[0]]
         self.units: dict[str, Gyro | Psa2] = dict(made)
-        heard = frozenset(i for u in self.units.values() for i in u.frames.ids)  # type: ignore[union-attr]
+        heard = frozenset(i for u in self.units.values() for i in u.frames.ids)
         self.bench = ScriptedBench(scenario, listen_to=heard, bus=gyros[0], plates=plates)
         self._end_s = self._timeout_s = 0.0
 

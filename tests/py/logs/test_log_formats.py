@@ -258,7 +258,7 @@ def test_a_damaged_line_is_named_after_the_frames_before_it(tmp_path: Path, endi
     assert was in re.sub(r" 0*185 ", " 185 ", lines[first + 4])
     lines[first + 4] = re.sub(r" 0*185 ", " 185 ", lines[first + 4]).replace(was, now)
     path.write_text("".join(lines), encoding="utf-8")
-    got = []
+    got: list[tuple[int, bytes]] = []
     with pytest.raises(BadInput, match=r"message 5: expected a whole message, got a damaged one .*the 4 before it are"):
         got.extend((m.arbitration_id, bytes(m.data)) for m in read_frames(path))
     assert got == whole[:4]
@@ -285,7 +285,7 @@ def test_lines_that_are_no_frames_are_passed_over(tmp_path: Path, ending: str, l
 
 def assert_bounded(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-    got = []
+    got: list[tuple[int, bytes]] = []
     with suppress(BadInput):
         for m in read_frames(path):
             got.append(m)

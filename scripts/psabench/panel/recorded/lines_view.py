@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from psabench.boards.devices import of_board
-from psabench.boards.psa2.frames import FrameCounters
 from psabench.boards.registry import BOARDS
+from psabench.boards.stream import FrameCounters
 from psabench.errors import BadInput, expected
 from psabench.link.vcd import Vcd, VcdPart, read_vcd_part
 from psabench.panel.channels import Channels, overview_row, unit_message
