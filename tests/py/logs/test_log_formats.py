@@ -285,7 +285,7 @@ def test_lines_that_are_no_frames_are_passed_over(tmp_path: Path, ending: str, l
 
 def assert_bounded(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-    got: list[tuple[int, bytes]] = []
+    got: list[can.Message] = []
     with suppress(BadInput):
         for m in read_frames(path):
             got.append(m)

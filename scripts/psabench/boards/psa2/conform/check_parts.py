@@ -35,7 +35,7 @@ def _known(
     lines: Sequence[str],
     last: int,
 ) -> str:
-    """Every message is a command of the table, with the bytes that it wants. Raises Failed, Inconclusive: none."""
+    """Every message is a command of the table, with its bytes. Raises Failed, Inconclusive: none."""
     conclusive(found, "no command was recorded")
     for m in found:
         saw = f"{sum(b.bits for b in m.bursts)} clocks of {m.name}"
