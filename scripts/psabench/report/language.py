@@ -122,7 +122,7 @@ class Language:
         return f"{name} <b>{self._value(fact[2])}</b>" if fact and name else None
 
     def _value(self, text: str) -> str:
-        found = self._known(text) or self._joined(text)
+        found = self._known(text) or self._joined(text) or self._joined(text, filled=True)
         if found is None and _QUANTITY.match(key_of(text)):
             self.missing.add(key_of(text))
         return found or text
@@ -159,7 +159,7 @@ class Language:
             return None
         if word == _QUOTING:
             return f"{self._known(word)} <span lang=en>{rest}</span>"
-        found = self._known(rest) or (rest if _REPR.fullmatch(rest) or not _has_words(rest) else None)
+        found = self._known(rest) or (None if _has_words(rest) else rest)
         return f"{self._known(word)} {found}" if found else None
 
     def _filled(self, text: str) -> str | None:
@@ -222,7 +222,10 @@ def keys_of(text: str) -> tuple[str, ...]:
 
 
 def _has_words(text: str) -> bool:
-    named = _NAMED.sub("", _plain_text(text))
+    plain = _plain_text(text)
+    named = _NAMED.sub("", plain)
+    if _REPR.fullmatch(plain):  # what a file has there
+        return False
     if _NUMBER.search(text) and not _WORD.search(named):  # a value of a register: STATUS 41h
         return False
     return bool(_WORD.search(_SYMBOLS.sub("", _NAMES.sub("", key_of(text)))))

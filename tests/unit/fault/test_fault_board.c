@@ -314,8 +314,9 @@ static void it_tells_its_type_its_counters_its_lines_and_its_truth(void **state)
     r.board.cycles = 3;
     r.board.chip[1].conversions = 17;
     r.board.chip[1].lost = 2;
-    assert_says("{'cmd':'units'}", "{'name':'f','board':'fake','serial':1,'node':5,'profile':'usual','ready':true,"
-                                   "'eager':'a board of this type always does'}");
+    assert_says("{'cmd':'units'}",
+                "{'name':'f','board':'fake','serial':1,'node':5,'profile':'usual','on':'head','ready':true,"
+                "'eager':'a board of this type always does'}");
     assert_says(
         "{'cmd':'counters','args':{'unit':'f'}}",
         "'result':{'board':{'cycles':3},'conv_a':{'conversions':0,'lost':0},'conv_b':{'conversions':17,'lost':2},"
