@@ -10,7 +10,6 @@ locale/LANG/*.po: docs/tools/languages.md
 
 from __future__ import annotations
 
-import functools
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -64,7 +63,7 @@ _SYMBOLS = re.compile(
     r"|\b[A-Z\d]+(?:-[A-Z\d]+)*-\d+\b|\b[\dA-F]{2}(?: [\dA-F]{2})+\b"
     r"|\b(?:sin|cos|atan|hypot|inf|nan|En|[mµn]V|ppm|AIC|BIC|NIS|baro)\b"
 )
-_VERBAL = re.compile(r"[A-Za-z]{4}")  # more than a preposition: {} of {}, whose cases depend on what it joins
+_VERBAL = re.compile(r"[A-Za-z]{4,}")  # more than a preposition: {} of {}, whose cases depend on what it joins
 _REPR = re.compile(r"'[^']*'")
 # What a blank may hold: a list, at the end of an entry only.
 _IN, _AT_END = r"((?:\[[^\]]*\]|[^;,])+?(?<!:))", "([^;]*?[^;:])"
@@ -84,6 +83,7 @@ class Language:
     found: set[str] = field(default_factory=set)
     missing: set[str] = field(default_factory=set)
     _tried: dict[str, str | None] = field(default_factory=dict)  # by _filled
+    _by_word: dict[str, list[str]] = field(default_factory=dict)  # entries with blanks, by _forms_of
     _rows: dict[tuple[str, bool], str | None] = field(default_factory=dict)  # by _joined: a list has many beginnings
 
     def translate_page(self, page: str) -> str:
@@ -167,11 +167,19 @@ class Language:
         plain = _plain_text(text)
         if plain not in self._tried:
             self._tried[plain] = None  # a blank does not hold the text that it is in
-            fitting = (
-                self._fill(key, plain) for key, words in _forms(tuple(self.texts)) if all(w in plain for w in words)
-            )
+            fitting = (self._fill(key, plain) for key in self._forms_of(plain))
             self._tried[plain] = next((found for found in fitting if found), None)
         return self._tried[plain]
+
+    def _forms_of(self, plain: str) -> list[str]:
+        """Entries with blanks whose longest word a text has, the longest entry first."""
+        if not self._by_word:
+            for key in self.texts:
+                if "{}" in key and (words := _VERBAL.findall(key)):
+                    self._by_word.setdefault(max(words, key=len), []).append(key)
+        return sorted(
+            (k for w in {*_VERBAL.findall(plain)} for k in self._by_word.get(w, ())), key=lambda k: (-len(k), k)
+        )
 
     def _fill(self, key: str, plain: str) -> str | None:
         last = key.endswith("{}")
@@ -197,13 +205,6 @@ class Language:
                 self.found.add(key)
                 return words.format(*taken) if taken else words  # else braces of JSON may be in it
         return None
-
-
-@functools.cache
-def _forms(keys: tuple[str, ...]) -> Sequence[tuple[str, Sequence[str]]]:
-    """Entries with blanks, the longest first, and the words around these."""
-    longest = sorted((k for k in keys if "{}" in k and _VERBAL.search(k)), key=len, reverse=True)
-    return [(k, [w for w in k.split("{}") if w]) for k in longest]
 
 
 def _plain_text(text: str) -> str:

@@ -29,7 +29,8 @@ def catalogue() -> Language:
 
 def untranslated(page: str) -> list[str]:
     """Texts of a page that are English in Russian."""
-    ru = Language(name="ru", texts=catalogue().texts)
+    ru = catalogue()  # one for all pages: it remembers what it has looked up
+    ru.missing.clear()
     shown = ru.translate_page(page).partition("<footer>")[0]
     texts = TEXT.findall(FACTS.sub("", QUOTED.sub("", HEAD.sub("", shown))))
     return sorted(ru.missing) + [text for text in texts if ENGLISH.search(text)]
