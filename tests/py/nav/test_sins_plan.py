@@ -184,7 +184,7 @@ def test_a_plan_is_read_from_a_file(tmp_path: Path) -> None:
     assert plan.turns[0].axis_b == (0.0, 1.0, 0.0)
     assert plan.start_c_nb @ plan.start_c_nb.T == pytest.approx(np.eye(3))
     known = "article, two_rates, secondary, secondary_reversing, six_positions"
-    with pytest.raises(BadInput, match=rf"^--plan: expected {known}, or a file, got no file nowhere$"):
+    with pytest.raises(BadInput, match=rf"^--plan: expected {known}, or a file, got nowhere, no such file$"):
         read_plan("nowhere")
     file.write_text("[")
     with pytest.raises(BadInput, match="expected a plan of rotations in YAML"):
