@@ -109,7 +109,7 @@ def test_a_file_that_is_no_schedule_is_named(tmp_path: Path, text: str, says: st
 
 
 def test_a_schedule_that_is_not_there_says_the_names() -> None:
-    with pytest.raises(BadInput, match="expected quick, full, or a file, got no file fast"):
+    with pytest.raises(BadInput, match="expected quick, full, or a file, got fast, no such file"):
         read_schedule("fast")
 
 
