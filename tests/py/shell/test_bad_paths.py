@@ -156,7 +156,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for ending in ("", *ENDINGS.values()):
         (tmp_path / f"folder{ending}").mkdir(exist_ok=True)
         (tmp_path / f"file{ending}").write_text("precious\n")
-    (tmp_path / "file.log").write_text("(0.100000) can0 185#0000000000000000\n" * 2)
+    (tmp_path / "file.log").write_text("".join(f"(0.100000) can0 {i}#0000000000000000\n" for i in (185, 185, 186)))
     (tmp_path / "calibration.json").write_text("{}\n")
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -97,7 +97,7 @@ def test_a_flight_is_read_and_refused(tmp_path: Path) -> None:
         path.write_text(text, encoding="utf-8")
         with pytest.raises(BadInput, match=word):
             read_flight(str(path))
-    with pytest.raises(BadInput, match="no file"):
+    with pytest.raises(BadInput, match="no such file"):
         read_flight("loop")
 
 
