@@ -26,6 +26,7 @@ def handle(args: argparse.Namespace) -> int:
     bench = _bench(args)
     suite.load()
     folder = args.out or OUT / f"recording-{v.board}-{v.profile}"
+    folder.mkdir(parents=True, exist_ok=True)  # before minutes of checks, not after
     outcomes: list[Outcome] = []
     interrupted = False
     try:
