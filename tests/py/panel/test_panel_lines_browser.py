@@ -86,7 +86,7 @@ def test_values_are_plotted_as_time_goes_and_a_bad_file_is_a_line(page: Page) ->
     said(page, "at 0.3")
     until(page, "panel.shown().points >= 2")
     assert page.locator("#plots canvas").count() == 4
-    expect(page.locator("#health")).to_contain_text("PSA-2: 61 samples, lost 0, torn 30")
+    expect(page.locator("#health")).to_contain_text("PSA-2: 60 samples, lost 0, torn 30")
     page.click("#lines-now")
     expect(page.locator("#lines-picture .now")).to_be_attached()
     expect(page.locator("#can")).to_be_hidden()
