@@ -67,6 +67,7 @@ OUTPUTS = {
     "log": Output(lambda p: ["--can", f"log:{p}"], whole_log),
     "truth-log": Output(lambda p: ["--can", "none", "--truth-log", p, "--truth-every", "1ms"], whole_truth),
 }
+READ_ONLY = "expected a path that can be written, got a read-only file system"
 KINDS = pytest.mark.parametrize("kind", sorted(OUTPUTS))
 
 
@@ -127,7 +128,7 @@ def test_a_full_disk_ends_the_file_whole_and_not_the_run(kind: str, disk: Path, 
 @pytest.mark.parametrize(
     ("where", "says"),
     [
-        ("disk/file", "expected a path that can be written, got a read-only file system"),
+        ("disk/file", READ_ONLY),
         ("nowhere/file", "expected a path that can be written, got no such folder"),
         (".", "expected a path that can be written, got a folder"),
     ],
@@ -307,10 +308,7 @@ def test_the_kernel_s_limit_of_a_file_is_not_called_the_recording_s(tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("options", "status", "says"),
-    [
-        ("size=4k", 3, "No space left on device; the file is not complete"),
-        ("ro", 2, "expected a path that can be written, got a read-only file system"),
-    ],
+    [("size=4k", 3, "No space left on device; the file is not complete"), ("ro", 2, READ_ONLY)],
 )
 def test_a_resolved_scenario_that_cannot_be_stored_ends_the_emulator(
     options: str, status: int, says: str, disk: Path
@@ -383,11 +381,7 @@ def test_a_snapshot_that_does_not_fit_leaves_nothing_and_is_an_error(size: str, 
         "print([p.name for p in disk.iterdir() if p.name != 'filler'])\n"
     )
     done = on_disk(size, disk, [sys.executable, script, disk, size])
-    why = (
-        "No space left on device"
-        if size != "ro"
-        else "expected a path that can be written, got a read-only file system"
-    )
+    why = READ_ONLY if size == "ro" else "No space left on device"
     error, left = done.stdout.splitlines()
     assert error.startswith("ControlError")
     assert f"{disk}/x.psasnap: {why}" in error

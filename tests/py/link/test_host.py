@@ -122,10 +122,8 @@ def test_what_is_no_reply_is_a_broken_link(tmp_path: Path, reply: bytes, says: s
 
 
 def test_a_control_socket_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        LinkError,
-        match=r"no/control: expected the control .*, got no such file; is psa-emu running with --control\?",
-    ):
+    absent = r"no/control: expected the control .*, got no such file; is psa-emu running with --control\?"
+    with pytest.raises(LinkError, match=absent):
         Control(tmp_path / "no/control")
 
 
@@ -391,9 +389,8 @@ def test_what_is_no_socketcand_server_is_refused_at_once(words: bytes) -> None:
 def test_a_port_where_nobody_listens_is_refused_at_once() -> None:
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
-        with pytest.raises(
-            LinkError, match=r"expected a socketcand server, got one that no process serves; is psa-emu running there\?"
-        ):
+        unserved = r"expected a socketcand server, got one that no process serves; is psa-emu running there\?"
+        with pytest.raises(LinkError, match=unserved):
             open_bus(f"socketcand:127.0.0.1:{unused.getsockname()[1]}")
 
 

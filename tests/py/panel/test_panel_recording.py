@@ -6,7 +6,6 @@ import csv
 import io
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -168,10 +167,4 @@ def test_a_panel_plays_goes_back_and_changes_the_file(folder: Path, tmp_path: Pa
 def test_a_bad_file_ends_the_panel_with_status_2(tmp_path: Path) -> None:
     bad = tmp_path / "bad.log"
     bad.write_text("nothing of the kind\n")
-    words = ["panel", "--recording", str(bad), "--out", str(tmp_path / "out")]
-    done = subprocess.run(
-        [sys.executable, "-m", "psabench.cli", *words], capture_output=True, text=True, timeout=run.WAIT_S
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
-    assert str(bad) in done.stderr
+    run.assert_refuses(bad, tmp_path / "out")

@@ -135,3 +135,12 @@ def children(pid: int) -> list[int]:
     """Processes that any thread of this one has started."""
     lists = Path(f"/proc/{pid}/task").glob("*/children")
     return [int(word) for path in lists for word in path.read_text().split()]
+
+
+def assert_refuses(recording: Path, out: Path) -> None:
+    """A recording that cannot be read ends the command with one line that names it, and status 2."""
+    words = [sys.executable, "-m", "psabench.cli", "panel", "--recording", str(recording), "--out", str(out)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert str(recording) in done.stderr

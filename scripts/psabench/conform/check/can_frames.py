@@ -125,7 +125,7 @@ def state_0_is_said_once(e: Capture, row: Requirement) -> str:
 
 @check("services", "BUS-HB-01", needs={"can", "stamps"})
 def heartbeats_keep_their_period(e: Capture, row: Requirement) -> str:
-    """Measure the intervals between heartbeats, until somebody writes 1017h."""
+    """Measure the intervals between heartbeats, until a write to 1017h."""
     due_s, late_s = row.limit("default_ms") * 1e-3, row.limit("jitter_max_ms") * 1e-3
     beats: list[CanFrame] = []
     for f in e.can.frames:

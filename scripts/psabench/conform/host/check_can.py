@@ -291,7 +291,7 @@ def _word(words: list[tuple[str, str]], k: int) -> str:
 
 @checks("HOST-RST-01", "restart")
 def a_restart_is_told_and_the_stream_goes_on(e: HostCapture) -> str:
-    """A brown-out and a reset node by somebody else: boot-up messages, numbers from 0."""
+    """A brown-out and a reset node of another master: boot-up messages, numbers from 0."""
     restarts = len([t for t in e.bus.boots if e.bus.starts and t > e.bus.starts[0]])
     enough(restarts, "a boot-up message")
     expect(len(e.told.of("restart")) == restarts, f"{len(e.told.of('restart'))} restarts", f"{restarts}")

@@ -13,7 +13,7 @@ import numpy as np
 from psabench.boards.devices import of_board
 from psabench.boards.registry import BOARDS
 from psabench.boards.stream import FrameCounters
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, input_error
 from psabench.link.vcd import Vcd, VcdPart, read_vcd_part
 from psabench.panel.channels import Channels, overview_row, unit_message
 from psabench.panel.recorded import line_window
@@ -124,7 +124,7 @@ def _read_lines(path: Path, look: Callable[[float], None]) -> VcdPart:
                 file, str(path), most_edges=MOST_EDGES, look=lambda: look(READ * min(1.0, file.tell() / size))
             )
     except OSError as e:
-        raise BadInput(f"{path}: {e.strerror}") from e
+        raise input_error(path, "a VCD file", e) from e
     except ValueError as e:
         raise BadInput(str(e)) from e
     if part.start_ns < 0 or not part.wires:
