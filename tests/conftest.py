@@ -8,6 +8,7 @@ inherit that, and the tests that press Ctrl-C would wait without end.
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -28,6 +29,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--tier", choices=tiers.CHOICES, default="all", help="tests of tests/tiers.toml: test, rest, all (default)"
     )
     parser.addoption("--budget", type=float, metavar="S", help="begin no test after so many seconds (make quick)")
+
+
+@pytest.fixture(autouse=True)
+def signals_are_heard() -> Iterator[None]:
+    """What a test starts inherits ignored signals: a test that leaves one ignored makes another one hang."""
+    yield
+    ignored = [s.name for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is signal.SIG_IGN]
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    assert not ignored, f"left ignored: {', '.join(ignored)}"
 
 
 class Budget:

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
     runs = Runs(out / "procedures", lambda: hub.publish(text_of(runs.message())))
     worker = Worker(source, hub, runs, HANDLERS, playing=not args.paused)
-    with _listen_loopback(args.port) as listener:
+    with _listen_loopback(args.port) as listener, _handlers_kept():
         try:
             worker.start()
             with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C, which uvicorn raises again, is how it ends
@@ -70,6 +70,17 @@ def _source_of(args: argparse.Namespace, out: Path) -> view.Source:
     options = {f"--{n}": getattr(args, n) for n in ("pace", "connect", "truth", "seed", "can")}
     refuse_beside("--recording", {"scenario": args.scenario, "--scpi": args.scpi or None} | options, "panel")
     return RecordingSource(args.recording, args.board or "psa2", args.node)
+
+
+@contextlib.contextmanager
+def _handlers_kept() -> Iterator[None]:
+    """Signals find the caller's handlers again: a program that calls us goes on."""
+    before = [(number, signal.getsignal(number)) for number in ENDING]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
 
 
 @contextlib.contextmanager
