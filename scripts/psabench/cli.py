@@ -7,11 +7,12 @@ import logging
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
-from psabench.errors import BadInput, BenchError, expected, output_error
+from psabench.errors import PROGRAM_FAULT, BadInput, BenchError, expected, output_error
 from psabench.options import Parser
 from psabench.places import need_extra, no_package
 from psabench.report import provenance
@@ -61,8 +62,8 @@ examples:
 
 psabench COMMAND --help lists the options. --lang ru with any command: its report in Russian.
 --json with a command that prints data: JSON on stdout (docs/tools/json.md).
-Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the bench or a link failed, 130 ended by
-Ctrl-C.
+Exit status: 0 done and within limits, 1 done and out of limits, 2 bad input, 3 the bench or a link failed, 70 a
+fault of psabench itself, 130 ended by Ctrl-C.
 """
 
 
@@ -110,6 +111,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("; ".join(filter(None, ("psabench: interrupted", kept))), file=sys.stderr)
         return 130
+    except Exception:  # left alone, Python would end with 1, which is a result out of limits
+        traceback.print_exc()
+        print("psabench: the lines above show a fault of psabench itself; please report them", file=sys.stderr)
+        return PROGRAM_FAULT
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:

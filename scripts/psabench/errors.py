@@ -12,6 +12,7 @@ from pathlib import Path
 
 # What the machine lacks; any other reason why a file cannot be written lies in the path that the user gave.
 MACHINE = {errno.ESTALE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
+PROGRAM_FAULT = 70  # exit status of an exception of no kind below: EX_SOFTWARE of sysexits.h
 # What was found at a path or a port, for `expected`; any other error of the system in its own words.
 FOUND = {
     errno.ENOENT: "no such file",

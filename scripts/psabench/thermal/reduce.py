@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 AXES = "xyz"
 ARCSEC = float(np.degrees(1.0)) * 3600.0
 LEFT_OUT = 2.0  # a gap twice as long: twice the error where the sweep turns, elsewhere up to 7 times
+SIGNAL = 10.0  # times the scatter of a recording that an axis's reading of 1 g has at least
 LEAST_VISITS = 6  # of a position in a sweep
 TOP_K = 0.1  # noise of the chamber's reading
 SIDE_FACES = (Face.SIDE, Face.SIDE_REVERSED)
@@ -162,6 +163,7 @@ def _level_rows(rows: Sequence[Recording]) -> Array:
     u = np.array([_volts_of(r) for r in rows])
     at = [POSITIONS[r.position] for r in rows]
     scale = np.array([_rough_scale(u, at, i) for i in range(3)])
+    _check_signal(u, at, scale, _scatter_of(rows))
     off = [gravity_at(p, r.alpha_deg) - p.sign * np.eye(3)[p.axis] for p, r in zip(at, rows, strict=True)]
     return np.asarray(u - np.array(off) * scale)
 
@@ -172,6 +174,17 @@ def _rough_scale(u: Array, at: Sequence[Position], i: int) -> float:
     if not down or not up:
         raise BadInput(expected(f"recordings with {AXES[i]} down and up", "one of them missing", "thermal run"))
     return float(np.mean(down) - np.mean(up)) / 2.0
+
+
+def _check_signal(u: Array, at: Sequence[Position], scale: Array, scatter_v: Array) -> None:
+    """Raises BadInput for an axis that does not see gravity: its readings change no more than they scatter."""
+    here = np.array([[p.axis, p.sign] for p in at])
+    for i, axis in enumerate(AXES):
+        sd = max(float(np.std(u[(here == (i, sign)).all(axis=1), i])) for sign in (1.0, -1.0))
+        least = sd + SIGNAL * float(scatter_v[i])
+        if abs(scale[i]) <= least:
+            wanted = f"more than {least:.2g} V/g, what its readings scatter by"
+            raise BadInput(expected(wanted, f"{scale[i]:.2g} V/g", f"accelerometer {axis}"))
 
 
 def _solve_positions(by: Mapping[str, Array]) -> tuple[Array, Array, Array]:

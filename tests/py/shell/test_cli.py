@@ -212,6 +212,19 @@ def help_of(words: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.
     return out
 
 
+def test_a_fault_of_the_program_has_a_status_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Python's own status, 1, is that of a result out of limits."""
+
+    def fail(_: argparse.Namespace) -> int:
+        raise ZeroDivisionError("of a test")
+
+    monkeypatch.setattr(cli, "parse", lambda _: argparse.Namespace(handler=fail))
+    assert cli.main(["decode"]) == 70
+    assert "ZeroDivisionError: of a test\npsabench: the lines above" in capsys.readouterr().err
+
+
 def test_help_of_run_names_each_procedure_and_no_option_of_any(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
