@@ -24,6 +24,7 @@ ON_HEAD = [*ON_THE_HEAD, "all"]
 FITTING = {
     "quiet": ON_HEAD,
     "climate": [*ON_HEAD, "thermal"],
+    "quartz_run_in": [*ON_HEAD, "thermal"],
     "gyrocompass": list(ON_THE_PLATFORM),
     "sins_table": ["sins-calibration"],
     "mems_gyro": ["mems-gyro"],
@@ -120,6 +121,21 @@ def test_the_same_bench_gives_the_same_result_as_the_command(panel: run.Running,
         assert run.command(*words) == 0
     readings = [next(p.glob("turns*.csv")).read_text() for p in (tmp_path / "procedures/turns", tmp_path / "own")]
     assert readings[0] == readings[1]
+
+
+@pytest.mark.parametrize(("scenario", "name"), [("gyrocompass", "gyrocompass"), ("quartz_run_in", "thermal")])
+def test_a_platform_and_a_chamber_are_lent_and_given_back(scenario: str, name: str, tmp_path: Path) -> None:
+    with run.running(scenario, "--paused", "--out", tmp_path) as panel, panel.socket() as socket:
+        run.asked(socket, 1, do="run", name=name, here=True)
+        while (message := run.received(socket, "procedure"))["state"] == "running":
+            pass
+        assert (message["state"], message["report"]) == ("done", f"/reports/{name}/report.html"), message["lines"]
+        while run.received(socket, "hello")["time"]["lent"]:
+            pass
+        before_s = run.said(socket, 2, "time")["result"]["t_s"]
+        assert before_s > 60.0
+        run.said(socket, 3, "wait 1s")
+        assert run.said(socket, 4, "time")["result"]["t_s"] == pytest.approx(before_s + 1.0)
 
 
 NOTES_HEAD = """() => {
