@@ -59,7 +59,7 @@ STEPS: list[Step] = [
     # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
     Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
     Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
-    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check", TIER], 1200),
+    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200, tiers=REST),
     # gcc's sanitizers run every C test; clang's run the fuzz targets, and an emulator of `builds` beside the others.
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),

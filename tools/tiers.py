@@ -19,7 +19,7 @@ TABLE = ROOT / "tests/tiers.toml"
 TIERS = ("test", "all")
 CHOICES = ("test", "rest", "all")
 SECTIONS = {"c": "tests/unit", "python": "tests"}  # where their files are, at any depth
-KEYS = {"c": {"tier", "sanitizers"}, "python": {"tier", "sample", "all"}}
+KEYS = {"c": {"tier", "long"}, "python": {"tier", "sample", "all"}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Row:
     """Of a parametrized test function, make test runs the first case and every so many-th after it."""
     all: tuple[str, ...] = ()
     """Test functions, or cases as globs, that only make test-all runs."""
-    sanitizers: str = "test"
-    """Of a C test program: the tier of its run under sanitizers."""
+    long: bool = False
+    """Of a C test program: takes seconds, a minute under sanitizers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +63,8 @@ def _row(where: str, section: str, value: Any) -> Row:
     fields = {"tier": value} if isinstance(value, str) else value
     if not isinstance(fields, dict) or not fields.keys() <= KEYS[section]:
         raise ValueError(f"{where}: expected a tier or a table of {', '.join(sorted(KEYS[section]))}, got {value!r}")
-    for key in ("tier", "sanitizers"):
-        if fields.get(key, "test") not in TIERS:
-            raise ValueError(f"{where}: {key}: expected {' or '.join(TIERS)}, got {fields[key]!r}")
+    if fields.get("tier", "test") not in TIERS:
+        raise ValueError(f"{where}: tier: expected {' or '.join(TIERS)}, got {fields['tier']!r}")
     sample = fields.get("sample", 1)
     if not isinstance(sample, int) or sample < 1:
         raise ValueError(f"{where}: sample: expected a number of 1 or more, got {sample!r}")
@@ -125,19 +124,14 @@ def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> l
     return chosen
 
 
-def c_tests(table: Table, tier: str, sanitizers: bool, root: Path = ROOT) -> list[Path]:
+def c_tests(table: Table, tier: str, root: Path = ROOT) -> list[Path]:
     """C test programs of a choice of tiers, those that take long first: no core waits for the last one."""
-
-    def in_make_test(path: Path) -> bool:
-        row = table.row(path) or Row()
-        return row.tier == "test" and (not sanitizers or row.sanitizers == "test")
-
-    files = [path for path in files_of_tests(root) if path.suffix == ".c"]
-    files.sort(key=lambda path: (row := table.row(path) or Row()).tier == row.sanitizers == "test")
-    return [path for path in files if tier == "all" or in_make_test(path) == (tier == "test")]
+    rows = {path: table.row(path) or Row() for path in files_of_tests(root) if path.suffix == ".c"}
+    files = sorted(rows, key=lambda path: rows[path].tier == "test" and not rows[path].long)
+    return [path for path in files if tier == "all" or (rows[path].tier == "test") == (tier == "test")]
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2 or sys.argv[1] not in CHOICES:
-        sys.exit("usage: tiers.py test|rest|all [--sanitizers]: names of the C tests")
-    print(*(path.stem for path in c_tests(load(), sys.argv[1], "--sanitizers" in sys.argv[2:])))
+    if len(sys.argv) != 2 or sys.argv[1] not in CHOICES:
+        sys.exit("usage: tiers.py test|rest|all: names of the C tests")
+    print(*(path.stem for path in c_tests(load(), sys.argv[1])))

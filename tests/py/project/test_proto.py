@@ -3,7 +3,6 @@
 import configparser
 import re
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -57,11 +56,6 @@ def eds(protocol: Any) -> Path:
 
 def od_of(protocol: Any) -> Any:
     return canopen.import_od(str(eds(protocol)), protocol.device["node"])
-
-
-def test_files_in_git_are_up_to_date() -> None:
-    run = subprocess.run([sys.executable, str(ROOT / "tools/gen_proto.py"), "--check"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
 
 
 def test_check_names_a_file_that_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,13 +68,12 @@ def test_c_tests_of_a_tier(tmp_path: Path) -> None:
     for name in ("base/test_a", "test_b", "test_c"):
         (tmp_path / f"tests/unit/{name}.c").parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / f"tests/unit/{name}.c").touch()
-    table = Table({"test_a.c": Row(), "test_b.c": Row(sanitizers="all"), "test_c.c": Row("all")}, {})
+    table = Table({"test_a.c": Row(), "test_b.c": Row(long=True), "test_c.c": Row("all")}, {})
 
-    def names(tier: str, sanitizers: bool) -> str:
-        return " ".join(p.stem[-1] for p in tiers.c_tests(table, tier, sanitizers, tmp_path))
+    def names(tier: str) -> str:
+        return " ".join(p.stem[-1] for p in tiers.c_tests(table, tier, tmp_path))
 
-    assert [names(t, False) for t in tiers.CHOICES] == ["b a", "c", "b c a"]
-    assert [names(t, True) for t in tiers.CHOICES] == ["a", "b c", "b c a"]
+    assert [names(t) for t in tiers.CHOICES] == ["b a", "c", "b c a"]
 
 
 @pytest.mark.parametrize(
@@ -82,7 +81,7 @@ def test_c_tests_of_a_tier(tmp_path: Path) -> None:
     [
         ("[c]\n", "x.toml: expected the tables c, python, got c"),
         ('[c]\n[python]\n"a.py" = "never"', "x.toml: a.py: tier: expected test or all, got 'never'"),
-        ('[c]\n"a.c" = {sample = 2}\n[python]\n', "x.toml: a.c: expected a tier or a table of sanitizers, tier, got"),
+        ('[c]\n"a.c" = {sample = 2}\n[python]\n', "x.toml: a.c: expected a tier or a table of long, tier, got"),
         ('[c]\n[python]\n"a.py" = {sample = 0}', "x.toml: a.py: sample: expected a number of 1 or more, got 0"),
     ],
 )
