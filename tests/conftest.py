@@ -9,6 +9,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import hypothesis
@@ -68,7 +69,7 @@ class Unused:
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         if any("::" in arg for arg in config.args):
             return
-        if unused := tiers.unused(tiers.load(), [_described(item) for item in items]):
+        if unused := tiers.unused(table(), [_described(item) for item in items]):
             raise pytest.UsageError("\n".join(unused))
 
 
@@ -78,11 +79,22 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Budget(budget_s))
 
 
+@cache
+def table() -> tiers.Table:
+    return tiers.load()
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """A file without a test of the tier is not even imported: half of them in the rest."""
+    is_test = collection_path.suffix == ".py" and collection_path.name.startswith("test_")
+    return True if is_test and tiers.has_none(table().row(collection_path), config.getoption("tier")) else None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     tier = config.getoption("tier")
     if tier == "all":
         return
-    chosen = tiers.in_test(tiers.load(), [_described(item) for item in items])
+    chosen = tiers.in_test(table(), [_described(item) for item in items])
     kept: list[pytest.Item] = []
     left: list[pytest.Item] = []
     for item, in_test in zip(items, chosen, strict=True):

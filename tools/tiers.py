@@ -124,6 +124,13 @@ def in_test(table: Table, tests: Sequence[tuple[Path, str, str, Hashable]]) -> l
     return chosen
 
 
+def has_none(row: Row | None, tier: str) -> bool:
+    """Whether a Python file has no test of a choice of tiers, as far as its row alone says."""
+    if row is None or tier == "all":
+        return False
+    return row.tier == "all" if tier == "test" else row == Row()
+
+
 def c_tests(table: Table, tier: str, root: Path = ROOT) -> list[Path]:
     """C test programs of a choice of tiers, those that take long first: no core waits for the last one."""
     rows = {path: table.row(path) or Row() for path in files_of_tests(root) if path.suffix == ".c"}

@@ -76,6 +76,16 @@ def test_c_tests_of_a_tier(tmp_path: Path) -> None:
     assert [names(t) for t in tiers.CHOICES] == ["b a", "c", "b c a"]
 
 
+@pytest.mark.parametrize("row", [Row(), Row("all"), Row(sample=2), Row(all=("test_g",)), None])
+def test_a_file_is_left_out_where_none_of_its_tests_is_chosen(row: Row | None) -> None:
+    names = ["test_g", *CASES]
+    runs = chosen(row or Row(), *names)
+    if row is None:  # test_every_test_file_has_a_row… says so
+        assert not any(tiers.has_none(row, tier) for tier in tiers.CHOICES)
+        return
+    assert [tiers.has_none(row, tier) for tier in tiers.CHOICES] == [not runs, runs == names, False]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
