@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import errno
+import os
 import re
+import stat
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from psabench.boards.registry import NAMES, of_name
-from psabench.errors import BadInput, expected
+from psabench.errors import BadInput, expected, output_error
 from psabench.output import add_json
 
 Options = TypeVar("Options")
@@ -130,6 +133,20 @@ def given_parameters(args: argparse.Namespace) -> dict[str, Any]:
     return {k.removeprefix("param_"): v for k, v in vars(args).items() if k.startswith("param_") and v is not None}
 
 
+def report_folder(text: str) -> Path:
+    """One that is there or can be made: looked at before hours of work, made with its first file. Raises BadInput."""
+    path = Path(text)
+    there = next((p for p in (path, *path.parents) if os.path.lexists(p)), Path())
+    try:
+        if not stat.S_ISDIR(there.stat().st_mode):
+            raise FileExistsError(errno.EEXIST, "") if there == path else NotADirectoryError(errno.ENOTDIR, "")
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, "")
+    except OSError as e:
+        raise output_error(path, e) from e
+    return path
+
+
 def yes_no(text: str) -> bool:
     if text.lower() in ("1", "yes", "true", "on"):
         return True
@@ -202,7 +219,7 @@ def add_selection(p: Any, beginning: str, out: str, default: Path | None = None)
     p.add_argument("--min-judged", metavar="N|P%", help=text)
     text = "requirement ids or prefixes: each must have passed"
     p.add_argument("--require", nargs="+", default=[], metavar="ID", help=text)
-    p.add_argument("--out", type=Path, default=default, metavar="FOLDER", help=f"folder of the report ({out})")
+    p.add_argument("--out", type=report_folder, default=default, metavar="FOLDER", help=f"folder of the report ({out})")
     p.add_argument("-v", "--verbose", action="store_true", help="list passed requirements as well")
     add_json(p, "print the report's conform.json instead of text")
 

@@ -13,7 +13,7 @@ from unittest.mock import patch
 import shtab
 from psabench.campaign.procedures import CAMPAIGNS
 from psabench.cli import COMMANDS, parser
-from psabench.options import Parser
+from psabench.options import Parser, report_folder
 from psabench.procedures.command_line.commands import COMMANDS as PROCEDURES
 from psabench.procedures.command_line.parser import SCRIPT
 
@@ -142,7 +142,7 @@ def _mark_files(p: argparse.ArgumentParser) -> None:
     """Where a value is a file, the shell completes file names."""
     for action in p._actions:
         form = action.metavar if isinstance(action.metavar, str) else ""
-        if action.choices is None and (action.type is Path or OF_FILES.search(form)):
+        if action.choices is None and (action.type in (Path, report_folder) or OF_FILES.search(form)):
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     below = _subparsers(p)
     for one in below.choices.values() if below else ():

@@ -17,7 +17,7 @@ from psabench.campaign.setup import Setup, as_input
 from psabench.campaign.store import Store
 from psabench.campaign.workers import reach, workers
 from psabench.errors import BadInput, expected
-from psabench.options import KEPT, Parser, natural, of_fields
+from psabench.options import KEPT, Parser, natural, of_fields, report_folder
 from psabench.output import add_json, show_data, show_report
 from psabench.places import find_emulator
 from psabench.procedures.head_bench import Progress
@@ -115,7 +115,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         "--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler, as tcp://192.0.2.7:8786"
     )
     p.add_argument("--store", type=Path, help="database of results (OUT/store.sqlite)")
-    p.add_argument("--out", type=Path, default=Path("build/campaign"), help="folder of the report (%(default)s)")
+    p.add_argument(
+        "--out", type=report_folder, default=Path("build/campaign"), help="folder of the report (%(default)s)"
+    )
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
     p.add_argument("--forget-others", action="store_true", help="delete results of other builds")
     add_json(p)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, add_parameter, given_parameters, natural
+from psabench.options import Parser, add_parameter, given_parameters, natural, report_folder
 from psabench.output import add_json, show_report
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--seed", type=natural, default=SEED, help="random seed (%(default)s)")
     p.add_argument("--hours", type=float, default=HOURS, help="time of the flight, h (%(default)s)")
     p.add_argument("--chain", choices=CHAINS, default=CHAINS[0], help="how a run is computed (%(default)s)")
-    p.add_argument("--out", type=Path, default=OUT, help="folder of the report (%(default)s)")
+    p.add_argument("--out", type=report_folder, default=OUT, help="folder of the report (%(default)s)")
     add_json(p)
     _add_parameters(p)
     return p.parse_args(words)

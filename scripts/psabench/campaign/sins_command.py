@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural
+from psabench.options import Parser, natural, report_folder
 from psabench.output import add_json, show_data
 
 if TYPE_CHECKING:
@@ -43,7 +43,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     text = "change between both experiments, of an error's standard deviation (the experiment's)"
     p.add_argument("--repeatability", type=float, metavar="X", help=text)
     p.add_argument("--seed", type=natural, help="random seed (the experiment's)")
-    p.add_argument("--out", type=Path, default=Path("build/sins"), help="folder of recordings and report (%(default)s)")
+    p.add_argument(
+        "--out", type=report_folder, default=Path("build/sins"), help="folder of recordings and report (%(default)s)"
+    )
     add_json(p)
     return p.parse_args(words)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural
+from psabench.options import Parser, natural, report_folder
 from psabench.output import add_json, show_report
 
 ABOUT = """\
@@ -34,7 +34,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.set_defaults(handler=_run_command)
     p.add_argument("--units", type=natural, default=UNITS, help="units to draw (%(default)s)")
     p.add_argument("--seed", type=natural, default=SEED, help="random seed (%(default)s)")
-    p.add_argument("--out", type=Path, default=OUT, help="folder of the report (%(default)s)")
+    p.add_argument("--out", type=report_folder, default=OUT, help="folder of the report (%(default)s)")
     add_json(p)
     return p.parse_args(words)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from psabench.boards.registry import BOARDS, NAMES
-from psabench.options import Parser, natural, positive
+from psabench.options import Parser, natural, positive, report_folder
 from psabench.output import STREAM, add_json, show_event
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--length", type=positive, metavar="S", help=f"simulated time of a schedule at most ({lengths})")
     p.add_argument("--findings", type=natural, metavar="N", help="end after N different violations")
     p.add_argument("--jobs", type=natural, metavar="N", help="processes (one per core for many schedules)")
-    p.add_argument("--out", type=Path, metavar="FOLDER", help=f"folder of the findings ({OUT}/BOARD-PROFILE)")
+    p.add_argument("--out", type=report_folder, metavar="FOLDER", help=f"folder of the findings ({OUT}/BOARD-PROFILE)")
     p.add_argument("--fresh", action="store_true", help="play again what is done")
     p.add_argument("--replay", type=Path, metavar="FILE", help="play one schedule from its file")
     add_json(p, STREAM)

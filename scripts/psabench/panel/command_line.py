@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from psabench.options import BUS_HELP, Parser, add_scpi, board_name, node_id, port_number
+from psabench.options import BUS_HELP, Parser, add_scpi, board_name, node_id, port_number, report_folder
 from psabench.output import STREAM, add_json
 from psabench.places import no_package
 
@@ -33,7 +33,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     panel.add_argument("--connect", "--control", type=Path, metavar="CONTROL", help="control socket of an emulator")
     panel.add_argument("--truth", type=Path, metavar="SOCKET", help="truth port of that emulator")
     panel.add_argument("--port", type=port_number, default=0, help="port on 127.0.0.1 (any free one)")
-    panel.add_argument("--out", type=Path, default=Path("build/panel"), help="folder for files (%(default)s)")
+    panel.add_argument("--out", type=report_folder, default=Path("build/panel"), help="folder for files (%(default)s)")
     panel.add_argument("--seed", type=int, help="random seed; overrides the scenario")
     panel.add_argument("--can", help=f"{BUS_HELP}; default: the bus of the emulator")
     add_scpi(panel, "VISA address of an instrument; may be repeated")

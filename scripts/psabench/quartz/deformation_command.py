@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural
+from psabench.options import Parser, natural, report_folder
 from psabench.output import add_json, show_data, show_report
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     text = "change a figure of the element; names in --list"
     p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE[:TOLERANCE]", help=text)
     p.add_argument(
-        "--out", type=Path, default=Path("build/quartz-deformation"), help="folder of the report (%(default)s)"
+        "--out", type=report_folder, default=Path("build/quartz-deformation"), help="folder of the report (%(default)s)"
     )
     add_json(p)
     return p.parse_args(words)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import KEPT, Parser, natural, of_fields
+from psabench.options import KEPT, Parser, natural, of_fields, report_folder
 from psabench.output import add_json, show_report
 from psabench.report import provenance
 
@@ -103,7 +103,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
         "--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler, as tcp://192.0.2.7:8786"
     )
     p.add_argument("--store", type=Path, help="database of results (OUT/store.sqlite)")
-    p.add_argument("--out", type=Path, default=usual.out, help="folder of the report (%(default)s)")
+    p.add_argument("--out", type=report_folder, default=usual.out, help="folder of the report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
     add_json(p)
     return p.parse_args(words)

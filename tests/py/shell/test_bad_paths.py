@@ -15,6 +15,7 @@ import pytest
 from commands import every_command
 from psabench import cli
 from psabench.errors import BadInput, LinkError
+from psabench.options import report_folder
 
 FORM = re.compile(r"psabench: [^\n]+: expected [^\n]+, got [^\n]+\n")
 SYSTEM = re.compile(r"No such file|[Ii]s a directory|Not a directory|Errno|Permission denied|Connection refused")
@@ -69,16 +70,6 @@ LATE: Mapping[str, str] = {  # what is not opened at once, by its name alone or 
     "campaign gyrocompass --store": "made where there is none",
     "campaign run-in --store": "made where there is none",
     "run koi-season --store": "made where there is none",
-    "campaign gyrocompass --out": "when the campaign is over",
-    "campaign heading-modes --out": "when the campaign is over",
-    "campaign koi --out": "when the campaign is over",
-    "campaign quartz-deformation --out": "when the campaign is over",
-    "campaign run-in --out": "when the campaign is over",
-    "campaign sins-methods --out": "when the campaign is over",
-    "campaign sins-plan --out": "when the campaign is over",
-    "campaign sins-secondary --out": "when the campaign is over",
-    "conform device --out": "when the board is judged",
-    "conform host --out": "when the first host starts",
     "conform host --results": "when the first host starts",
     "koi replay folders": "after the passport of --with-estimates",
     "nav apply recording": "after --calibration",
@@ -94,17 +85,12 @@ LATE: Mapping[str, str] = {  # what is not opened at once, by its name alone or 
     "run sins-calibration --angles": "after --data",
     "run sins-calibration-secondary --plan": "after --first",
     "run sins-calibration-secondary --second": "after --first",
-    "run sins-calibration-secondary --out": "after --first",
     "waveform --wavedrom": "after FILE",
     "waveform --svg": "after FILE",
     "conform device --lines": "beside --can, whose board is asked first",
     "conform device --bus-port": "beside --can, whose board is asked first",
     "conform device --control": "beside --can, whose board is asked first",
-    "explore --out": "at the first finding",
-    "panel --out": "at the first file",
     "run sins-calibration-secondary --control": "beside --can",
-    "run sins-covariance --out": "when its tables are printed",
-    "run sins-snake --out": "when the flight is over",
 }
 ON_STDOUT = ("run sins-calibration",)  # commands that print what their plan can give, before anything is opened
 
@@ -114,7 +100,7 @@ def _name(action: argparse.Action) -> str:
 
 
 def _is_path(action: argparse.Action) -> bool:
-    return action.type is Path or _name(action) in NAMED
+    return action.type in (Path, report_folder) or _name(action) in NAMED
 
 
 def _kind(command: str, name: str) -> str:

@@ -77,6 +77,7 @@ MISTAKES: list[tuple[str, str]] = [
     ("record run.log --speed 3", "record: expected --can, --lcm, --board, --node, --for, --count, --json, got --speed"),
     ("run all --axis w", "turns: axis: expected x, y or z, got 'w'"),
     ("run turns --out /dev/null/x", "/dev/null/x: "),
+    ("run turns --truth x.sock", "--truth: expected --control of its emulator with it, got x.sock"),
     ("run turns --can socketcand:127.0.0.1:1", "--head: expected the VISA address of the dividing head"),
     ("decode nothing.log", "nothing.log: expected a CAN log, got no such file"),
     ("decode README.md", "README.md: expected an ending of .asc .blf"),

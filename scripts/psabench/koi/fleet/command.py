@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import KEPT, Parser, natural
+from psabench.options import KEPT, Parser, natural, report_folder
 from psabench.output import add_json, show_report
 from psabench.report import provenance
 
@@ -55,7 +55,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--linear", action="store_true", help="predict the same from the filter's covariance, too")
     p.add_argument("--jobs", type=natural, help="processes (one per core); 1: this process alone")
     p.add_argument("--seed", type=natural, default=SEED, help="random seed (%(default)s)")
-    p.add_argument("-o", "--out", type=Path, default=OUT, help="folder of store and report (%(default)s)")
+    p.add_argument("-o", "--out", type=report_folder, default=OUT, help="folder of store and report (%(default)s)")
     p.add_argument("--fresh", action="store_true", help="compute stored results again")
     add_json(p)
     return p.parse_args(words)

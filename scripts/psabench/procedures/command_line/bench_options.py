@@ -8,7 +8,7 @@ from typing import Any
 
 from psabench.boards.registry import DBC_NODE
 from psabench.instruments import EXAMPLES
-from psabench.options import natural, node_id, positive
+from psabench.options import natural, node_id, positive, report_folder
 from psabench.output import FLAG
 from psabench.passport.command import STORE
 from psabench.procedures.command_line.offered import CONDITIONS, G_MPS2
@@ -65,7 +65,12 @@ COMMON: Mapping[str, Mapping[str, Any]] = {
         "help": "store the frames of the run in a log (.log .blf .asc ...) and its calls in FILE.calls.csv",
     },
     "--replay": {"type": Path, "metavar": "FILE", "help": "run on such a log instead of a bench"},
-    "--out": {"type": Path, "default": Path("build/run"), "metavar": "FOLDER", "help": "report folder (%(default)s)"},
+    "--out": {
+        "type": report_folder,
+        "default": Path("build/run"),
+        "metavar": "FOLDER",
+        "help": "report folder (%(default)s)",
+    },
     "--lcm": {
         "metavar": "URL",
         "help": "publish progress and results with LCM: udpm://GROUP:PORT, or file://PATH an event log",

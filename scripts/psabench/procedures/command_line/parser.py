@@ -25,6 +25,7 @@ Exit status: 0 done and within limits, 1 a result is off by more than its limits
 """
 
 SCRIPT = "script"  # psabench.shell.command_line has its parser
+BENCH_THERE = ("can", "control", "head", "replay")  # options with which no emulator is started
 # The options that take no value.
 FLAGS = ("-h", "--help", "--list", "--real-time", "--fresh", "--json", "-v", "--verbose")
 
@@ -34,7 +35,11 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     name, rest = words(argv)
     if name == SCRIPT:
         return command_line.parse_script(rest)
-    return (_parser_of(COMMANDS[name]) if name else _parser()).parse_args(rest)
+    args = (_parser_of(COMMANDS[name]) if name else _parser()).parse_args(rest)
+    given = vars(args)
+    if given.get("truth") and not any(given.get(way) for way in BENCH_THERE):  # an emulator of ours has its own
+        raise BadInput(expected("--control of its emulator with it", args.truth, "--truth"))
+    return args
 
 
 def _parser() -> Parser:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psabench.errors import BadInput, expected
-from psabench.options import Parser, natural, of_fields, positive
+from psabench.options import Parser, natural, of_fields, positive, report_folder
 from psabench.output import add_json, show_report
 from psabench.report import provenance
 
@@ -89,7 +89,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     p.add_argument("--seed", type=natural, default=usual.seed, help="random seed (%(default)s)")
     p.add_argument("--workers", type=natural, help="processes (one per core for long searches); 1: this process alone")
     p.add_argument("--dask", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    p.add_argument("--out", type=Path, default=usual.out, help="folder of the report (%(default)s)")
+    p.add_argument("--out", type=report_folder, default=usual.out, help="folder of the report (%(default)s)")
     add_json(p)
     return p.parse_args(words)
 
