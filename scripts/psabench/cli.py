@@ -97,8 +97,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"psabench: {e}", file=sys.stderr)
         return e.exit_status
     except ModuleNotFoundError as e:
-        if (e.name or "").partition(".")[0] == "psabench":  # an error of ours
-            raise
+        if (e.name or "").partition(".")[0] == "psabench":
+            return _show_fault()
         print(f"psabench: {no_package(e, words[0])}", file=sys.stderr)
         return BadInput.exit_status
     except BrokenPipeError:  # `| head` has seen enough
@@ -111,10 +111,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("; ".join(filter(None, ("psabench: interrupted", kept))), file=sys.stderr)
         return 130
-    except Exception:  # left alone, Python would end with 1, which is a result out of limits
-        traceback.print_exc()
-        print("psabench: the lines above show a fault of psabench itself; please report them", file=sys.stderr)
-        return PROGRAM_FAULT
+    except Exception:
+        return _show_fault()
+
+
+def _show_fault() -> int:
+    """Of an error of ours. Left alone, Python would end with 1, which is a result out of limits."""
+    traceback.print_exc()
+    print("psabench: the lines above show a fault of psabench itself; please report them", file=sys.stderr)
+    return PROGRAM_FAULT
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
