@@ -105,7 +105,7 @@ def course_table(points: tuple[Point, ...], found: tuple[Course, ...]) -> list[t
     ]
     for c in found:
         values = (with_ci(g.estimate.value, g.estimate.ci_half)[0] for g in c.found)
-        truth = "" if c.truth_per_k is None else f"{c.truth_per_k * 1e6:.3f}"
+        truth = "" if c.truth_per_k is None else f"{round(c.truth_per_k * 1e6, 3) + 0.0:.3f}"  # -0.0: none
         slope, u = with_ci(c.slope.value * 1e6, c.slope.ci_half * 1e6)
         rows.append((c.found[0].estimate.name, c.found[0].estimate.unit, *values, slope, u, truth, as_ratio(c.en, 2)))
     return rows
