@@ -154,7 +154,7 @@ e2e-san: ## end-to-end tests of bad input and broken peers, the emulator under A
 	PSA_EMU=$(CURDIR)/build-san/psa-emu $(PY) -m pytest $(SAN_E2E) -m "host and not soak"
 uml: e2e-vcan e2e-slc0 ## the end-to-end tests on a kernel's vcan0 and slc0: this kernel's, or a user-mode one's
 e2e-vcan: all
-	tests/uml/native tests/uml/job_e2e.sh --tier $(TIER)
+	tests/uml/native --timeout 2300 tests/uml/job_e2e.sh --tier $(TIER)
 e2e-slc0: all
 	tests/uml/slc0 --tier $(TIER)
 # The files by name: to collect all of tests/py for one test of it takes 45 s of CPU, of tests/e2e 20 s.

@@ -75,7 +75,7 @@ STEPS: list[Step] = [
         builds=["bench-bin"],
     ),
     Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
-    Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 1200, beside=True, builds=["all"]),
+    Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 2400, beside=True, builds=["all"]),
     Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
     Step("end to end, sanitizers", [*MAKE, "e2e-san"], 1800, beside=True, builds=[SANITIZED, "all"], tiers=REST),
     Step("end to end on slc0", [*MAKE, "e2e-slc0"], 1200, beside=True, builds=["all"], tiers=["test", "all"]),
