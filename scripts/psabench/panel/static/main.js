@@ -72,6 +72,7 @@ const HANDLERS = {
     if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
+    options($("#channel"), plots.shown().names);
   },
   update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
