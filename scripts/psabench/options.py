@@ -141,7 +141,8 @@ def report_folder(text: str) -> Path:
         if not stat.S_ISDIR(there.stat().st_mode):
             raise FileExistsError(errno.EEXIST, "") if there == path else NotADirectoryError(errno.ENOTDIR, "")
         if not os.access(there, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "")
+            read_only = os.statvfs(there).f_flag & os.ST_RDONLY
+            raise PermissionError(errno.EROFS if read_only else errno.EACCES, "")
     except OSError as e:
         raise output_error(path, e) from e
     return path

@@ -55,4 +55,4 @@ def options_of(name: str, view: BenchView) -> Sequence[str]:
 def check_free(what: str, lent: str) -> None:
     """Raises BenchError for a request that has to wait until the procedure gives the bench back."""
     if lent and what not in ASIDE:
-        raise BenchError(f"bench: the procedure {lent} has it; Stop of the card Procedures ends it and gives it back")
+        raise BenchError(f"bench: the procedure {lent} has it; Stop on the card Procedures ends it and gives it back")

@@ -103,6 +103,7 @@ class Runs:
             )
         finally:
             os.close(theirs)
+        self._changed()  # its first words take seconds
         threading.Thread(target=self._follow, args=(ours, self._process, self.progress), daemon=True).start()
 
     def stop(self) -> None:

@@ -15,6 +15,7 @@ from psabench.link.vcd import Vcd, Wire
 WIDTH, LEFT, RIGHT = 1120, 76, 18  # px: picture, column of names, margin
 ROW, HIGH, GAP = 32, 16, 22  # px: row pitch, height of a pulse, between sections
 LANE = 22  # px: pitch of intervals below the rows
+CHARACTER = 6.8  # px: width, with a margin
 
 STYLE = """
 svg{font:11px ui-monospace,SFMono-Regular,Menlo,Consolas,"DejaVu Sans Mono",monospace}
@@ -125,9 +126,9 @@ def _dim(dim: Dim, s: _Scale, y_rows: dict[str, float], y: float) -> str:
     heads = f"M{_n(x0 + 4)} {_n(y - 3)}L{_n(x0)} {_n(y)}L{_n(x0 + 4)} {_n(y + 3)}"
     heads += f"M{_n(x1 - 4)} {_n(y - 3)}L{_n(x1)} {_n(y)}L{_n(x1 - 4)} {_n(y + 3)}"
     out.append(f'<path class="dim" d="M{_n(x0)} {_n(y)}H{_n(x1)}{heads if x1 - x0 > 8 else ""}"/>\n')
-    if x1 - x0 > 6.8 * len(dim.label):
+    if x1 - x0 > CHARACTER * len(dim.label):
         out.append(_text((x0 + x1) / 2, y - 4, "dimtext", dim.label, "middle"))
-    elif x1 + 6.8 * len(dim.label) < s.x1 + RIGHT:
+    elif x1 + CHARACTER * len(dim.label) < s.x1 + RIGHT:
         out.append(_text(x1 + 5, y + 4, "dimtext", dim.label))
     else:
         out.append(_text(x0 - 5, y + 4, "dimtext", dim.label, "end"))
@@ -156,8 +157,9 @@ def _axis(s: _Scale, top: float, bottom: float) -> str:
     while t <= s.section.end_ns:
         x = _n(s.x(t))
         out.append(f'<line class="grid" x1="{x}" x2="{x}" y1="{_n(top)}" y2="{_n(bottom)}"/>\n')
-        if s.x(t) + 44 < s.x1 + GAP:
-            out.append(_text(s.x(t) + 3, bottom + 2, "note", _time_name(t - s.section.zero_ns)))
+        name = _time_name(t - s.section.zero_ns)
+        if s.x(t) + max(44, 3 + CHARACTER * len(name)) < s.x1 + RIGHT:
+            out.append(_text(s.x(t) + 3, bottom + 2, "note", name))
         t += step
     return "".join(out)
 

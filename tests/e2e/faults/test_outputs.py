@@ -420,7 +420,7 @@ def test_a_command_names_the_file_that_a_disk_does_not_take(
     line = done.stderr.splitlines()[-1]
     assert re.match(rf"psabench: (psa-emu: --resolved )?{disk}", line)
     why = "No space left on device|database or disk is full|disk I/O error"
-    assert re.search(why if status == 3 else "Read-only file system|unable to open database file", line)
+    assert re.search(why if status == 3 else "got a read-only file system|unable to open database file", line)
 
 
 def write_text(path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import panel_run as run
 import pytest
 from page_picture import looks_as
-from panel_page import LONG_MS, REBOUND, WAIT_MS, needs_browser, opened, said, until
+from panel_page import LONG_MS, REBOUND, WAIT_MS, check_repaint, needs_browser, opened, said, until
 from playwright.sync_api import Browser, Page, expect
 
 UPDATES = "panel.counts.update"
@@ -235,6 +235,7 @@ def test_statistics_of_a_channel_are_drawn(page: Page) -> None:
     page.click("#compute")
     expect(page.locator("#moments")).to_contain_text("standard deviation")
     assert page.locator("#charts canvas").count() == 3
+    check_repaint(page, "#charts canvas")
 
 
 def test_a_calibration_is_followed_to_its_report(page: Page) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import panel_run as run
 import pytest
-from panel_page import needs_browser, opened, said, until
+from panel_page import check_repaint, needs_browser, opened, said, until
 from playwright.sync_api import Browser, Page, expect
 
 pytestmark = needs_browser
@@ -64,6 +64,10 @@ def test_heading_and_drift_are_those_that_the_unit_reports(page: Page) -> None:
     heading = page.get_attribute("#gyro-pictures svg:nth-of-type(3)", "aria-label") or ""
     assert float(heading.split()[1]) == pytest.approx(shown_deg, abs=0.05)
     assert page.locator("#gyro-drift canvas").count() == 1
+    page.click("#play")
+    expect(page.locator("#play")).to_have_text("Run")  # the plot stays as it is
+    check_repaint(page, "#gyro-drift canvas")
+    page.click("#play")
 
 
 def test_a_drift_that_the_unit_compensates_is_gone(page: Page) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import panel_run as run
 import pytest
 from fake_bench import FakeBench
-from panel_page import LONG_MS, needs_browser, opened
+from panel_page import LONG_MS, check_repaint, needs_browser, opened
 from playwright.sync_api import Browser, expect
 from psabench.panel.intervals import MOST, SHOWN, Intervals
 from psabench.procedures.fourier import FourierParams, fourier
@@ -118,3 +118,4 @@ def test_intervals_are_drawn_while_they_tighten(browser: Browser, tmp_path: Path
         assert high - low == pytest.approx(8 * half, rel=0.1)  # the latest interval is a quarter of the plot
         assert (low + high) / 2 == pytest.approx(value, abs=half)
         assert page.locator("#intervals canvas").count() == SHOWN
+        check_repaint(page, "#intervals canvas")

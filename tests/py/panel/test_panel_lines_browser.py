@@ -22,7 +22,7 @@ def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[run.Running]:
     folder = tmp_path_factory.mktemp("lines")
     record_psa2(folder / "a.vcd")
     (folder / "b.vcd").write_text("nothing of the kind\n")
-    with run.running("--recording", folder, "--paused", "--out", tmp_path_factory.mktemp("out")) as p:
+    with run.running("--recording", folder, "--out", tmp_path_factory.mktemp("out")) as p:
         yield p
 
 
@@ -35,6 +35,7 @@ def page(browser: Browser, panel: run.Running) -> Iterator[Page]:
 
 def test_frames_are_gone_through_with_their_words(page: Page) -> None:
     expect(page.locator("#recording-about")).to_contain_text("PSA-2: 16 lines")
+    expect(page.locator("#play")).to_have_text("Run")  # else the window would be at the end of it
     expect(page.locator("#lines-said")).to_have_text("100 frames, errors 30, torn 30")
     expect(page.locator("#lines-at")).to_contain_text("frame 1 of 100")
     picture = page.locator("#lines-picture")
@@ -52,6 +53,18 @@ def test_frames_are_gone_through_with_their_words(page: Page) -> None:
     expect(page.locator("#lines-at")).not_to_have_text(torn)
     picture.press("p")
     expect(page.locator("#lines-at")).to_have_text(torn)
+
+
+def test_a_code_has_all_its_digits_and_a_later_page_its_channels(page: Page) -> None:
+    said(page, "at 0")
+    said(page, "wait 1")
+    expect(page.locator("#recording-ended")).to_have_text("end")
+    page.reload()
+    until(page, "panel.shown().points > 0")
+    expect(page.locator("#channel option")).to_have_text(["x", "y", "z", "t"])
+    code = round(page.evaluate("panel.shown().last[0]"))
+    expect(page.locator("#plots")).to_contain_text(f"x  {code} LSB")
+    assert page.evaluate("import('/static/page.js').then((m) => m.digits(534436974))") == "534436974"
 
 
 def test_the_window_is_moved_and_zoomed(page: Page) -> None:

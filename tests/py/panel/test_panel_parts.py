@@ -6,6 +6,7 @@ import asyncio
 import hashlib
 import math
 import os
+import shutil
 import sys
 from functools import partial
 from importlib.resources import files
@@ -141,6 +142,18 @@ def test_another_panel_in_the_same_folder_has_intervals_of_its_own(
     assert other.intervals.path.exists()
     other.close()
     assert not list(tmp_path.iterdir())
+
+
+def test_a_procedure_that_has_not_said_anything_yet_is_shown_as_running(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    runs = Runs(tmp_path, lambda: shown.append(runs.message()["state"]))
+    monkeypatch.setattr(sys, "executable", shutil.which("true"))
+    monkeypatch.setattr(Runs, "_follow", lambda _, ours, *__: os.close(ours))  # its words are never read
+    runs.start("turns")
+    assert shown == ["running"]
+    runs.close()
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -136,3 +137,12 @@ def test_sections_cut_waves_at_their_ends() -> None:
     assert "<title>a &amp; b</title>" in svg
     assert svg.count('class="wave"') == 2
     assert "V" not in svg.split('class="wave" d="')[1].split('"')[0]  # Int does not change inside
+
+
+@pytest.mark.parametrize("end_ns", range(7_000, 8_200, 100))
+def test_the_names_of_instants_are_inside_the_picture(end_ns: int) -> None:
+    section = drawing.Section(0, end_ns, -22_000)
+    svg = drawing.render(parse_vcd(FILE), [drawing.Panel(("Int", "CLK"), (section,))], "")
+    names = re.findall(r'<text class="note" x="([\d.]+)" y="[\d.]+">([^<]+)<', svg)
+    assert len(names) > 5
+    assert all(float(x) + drawing.CHARACTER * len(name) < drawing.WIDTH for x, name in names), names

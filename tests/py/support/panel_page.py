@@ -61,3 +61,14 @@ def said(page: Page, line: str) -> None:
     page.fill("#line input", line)
     page.press("#line input", "Enter")
     expect(page.locator("#log")).to_contain_text(f"> {line}", timeout=LONG_MS)
+
+
+def check_repaint(page: Page, canvases: str) -> None:
+    """They have other colours after a change of the system's setting, and their own again by the page's button."""
+    drawn = f"[...document.querySelectorAll('{canvases}')].map((c) => c.toDataURL())"
+    assert page.evaluate(f"(self.light = {drawn}).length")
+    page.emulate_media(color_scheme="dark")
+    until(page, f"{drawn}.every((c, k) => c !== light[k])")
+    page.click("#theme")
+    expect(page.locator("#theme")).to_have_text("Theme: light")
+    until(page, f"{drawn}.every((c, k) => c === light[k])")

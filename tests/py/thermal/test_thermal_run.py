@@ -270,7 +270,7 @@ def test_a_position_that_is_missing_is_named(short: list[Recording]) -> None:
 def test_an_axis_that_does_not_see_gravity_is_named(axis: str, left_v: float, short: list[Recording]) -> None:
     """Left of its readings: nothing, or a little of 1 V/g."""
     name = f"{axis}_v"
-    dead = [replace(r, **{name: left_v * getattr(r, name)}) for r in short]  # type: ignore[arg-type]
+    dead = [replace(r, **{name: left_v * getattr(r, name)}) for r in short]
     with pytest.raises(BadInput, match=rf"accelerometer {axis}: expected more than .* V/g, what its readings scatter"):
         points_of(dead)
 

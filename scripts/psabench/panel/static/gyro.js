@@ -91,6 +91,12 @@ function drift() {
   else chart.setData([t, moved]);
 }
 
+export function repaint() { // in the colours of another theme
+  chart?.destroy();
+  chart = null;
+  drift();
+}
+
 // Least squares: arc minutes a second are degrees a minute.
 function slope(t, moved) {
   const mean = (x) => x.reduce((a, b) => a + b, 0) / x.length, t0 = mean(t), m0 = mean(moved);

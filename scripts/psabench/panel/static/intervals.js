@@ -3,9 +3,10 @@
 import { $, digits, make } from "./page.js";
 import { css, size } from "./plots.js";
 
-let charts = [], shown = "";
+let charts = [], shown = "", latest = [];
 
 export function follow(intervals) {
+  latest = intervals;
   const key = intervals.map((e) => e.name).join();
   if (key !== shown) build(intervals, key);
   intervals.forEach((e, k) => {
@@ -15,6 +16,11 @@ export function follow(intervals) {
     box.setAttribute("aria-label", words);
     chart.setData([readings, values.map((v, i) => v - halves[i]), values.map((v, i) => v + halves[i]), values]);
   });
+}
+
+export function repaint() { // in the colours of another theme
+  build(latest, shown);
+  follow(latest);
 }
 
 function build(intervals, key) {

@@ -11,6 +11,7 @@ import * as gyro from "./gyro.js";
 import { instruments, readings, turn } from "./instruments.js";
 import * as lines from "./lines.js";
 import * as interrupt from "./interrupt.js";
+import * as intervals from "./intervals.js";
 import * as procedures from "./procedures.js";
 import * as recording from "./recording.js";
 import * as scenario from "./scenario.js";
@@ -71,6 +72,7 @@ const HANDLERS = {
     if (m.began) log(`(bench: ${m.began})`, "");
     HANDLERS.snapshots({ names: m.snapshots });
     plots.add(m.history, true);
+    options($("#channel"), plots.shown().names);
   },
   update: (m) => { time(m.time); if (m.new) { plots.add(m.new, false); gyro.feed(m.new); options($("#channel"), m.new.names); } },
   state: (m) => {
@@ -158,8 +160,13 @@ function theme(name) {
   if (name) document.documentElement.dataset.theme = name; else delete document.documentElement.dataset.theme;
   $("#theme").textContent = `Theme: ${name || "system"}`;
   localStorage.setItem("theme", name);
-  plots.build();
+  repaint();
 }
+function repaint() {
+  plots.build();
+  for (const part of [statistics, intervals, gyro]) part.repaint();
+}
+matchMedia("(prefers-color-scheme: dark)").onchange = repaint;
 $("#theme").onclick = () => theme(THEMES[(THEMES.indexOf(localStorage.getItem("theme") || "") + 1) % THEMES.length]);
 
 document.addEventListener("keydown", (event) => {

@@ -37,7 +37,7 @@ export function options(select, values, chosen) {
   select.replaceChildren(...values.map((v) => make("option", { value: v, selected: v === chosen }, v)));
 }
 
-export const digits = (x) => (x === null || x === undefined ? "-" : typeof x === "number" ? String(+x.toPrecision(7)) : String(x));
+export const digits = (x) => (x === null || x === undefined ? "-" : typeof x === "number" ? String(Math.abs(x) < 1e6 ? +x.toPrecision(7) : Math.round(x)) : String(x)); // of codes every digit
 
 let hide;
 export function complain(text) {

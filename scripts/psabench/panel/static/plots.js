@@ -1,6 +1,6 @@
 // Channels of the chosen unit as rolling plots: the band from the lowest to the highest value, and the mean.
 
-import { $, make } from "./page.js";
+import { $, digits, make } from "./page.js";
 
 const KEPT = 1800, FEW = 6;
 let unit = "", names = [], units = [], data = [], plots = [], dirty = false;
@@ -47,12 +47,15 @@ function settings(name, physical) {
     cursor: { sync: { key: "channels" } },
     legend: { show: false }, scales: { x: { time: false } },
     // 50 px, the default, cut the sign off
-    axes: [{ ...axis, size: 28 }, { ...axis, size: 80, values: (_, v) => v.map((x) => +x.toPrecision(7)) }],
+    axes: [{ ...axis, size: 28, values: marks }, { ...axis, size: 80, values: marks }],
     series: [{ label: "s" }, { ...edge, label: "min" }, { ...edge, label: "max" },
       { stroke: css("--mark"), width: 1, points: { show: false }, label: `${name}${physical ? `, ${physical}` : ""}` }],
     bands: [{ series: [2, 1], fill: css("--band") }],
   };
 }
+
+// Short enough for the axis: codes have ten digits.
+const marks = (_, values) => values.map((x) => (Math.abs(x) < 1e7 ? +x.toPrecision(7) : (+x.toPrecision(5)).toExponential()));
 
 export const size = (box) => Math.max(200, box.clientWidth);
 const width = () => size($("#plots"));
@@ -65,7 +68,7 @@ export function draw() {
     const t = data[k][0];
     if (!t.length) return;
     const first = t.findIndex((x) => x >= t.at(-1) - span);
-    plot.root.previousSibling.textContent = `${names[k]}  ${+(data[k][3].at(-1) ?? NaN).toPrecision(7)} ${units[k]}`;
+    plot.root.previousSibling.textContent = `${names[k]}  ${digits(data[k][3].at(-1))} ${units[k]}`;
     plot.setData(data[k].map((column) => column.slice(first)));
   });
 }

@@ -20,7 +20,7 @@ export function offer(hello, link) {
 
 function choose() {
   const here = $("#procedure-here").checked;
-  options($("#procedure"), here ? fits : Object.keys(offered));
+  options($("#procedure"), here ? fits : Object.keys(offered), $("#procedure").value);
   $("#procedure-what").textContent = offered[$("#procedure").value] || "";
 }
 
@@ -29,7 +29,7 @@ const HELD = "#controls, #until-event, #snapshot, #back, #forks, #start-stream, 
 let lent = "";
 export function hold(name) {
   $("#lent").hidden = !name;
-  $("#lent").textContent = name ? `The procedure ${name} has this bench: it moves the time, the instruments and the unit. Stop of the card Procedures ends it and gives the bench back.` : "";
+  $("#lent").textContent = name ? `The procedure ${name} has this bench: it moves the time, the instruments and the unit. Stop on the card Procedures ends it and gives the bench back.` : "";
   if (name === lent) return;
   lent = name;
   for (const element of document.querySelectorAll(HELD)) element.inert = Boolean(name);

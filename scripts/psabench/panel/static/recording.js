@@ -20,4 +20,5 @@ export function offer(about, link, say, now) {
 
 export function state(m) {
   $("#recording-ended").textContent = m.ended || "";
+  $("#recording-ended").className = m.ended === "end" ? "quiet" : "bad";
 }

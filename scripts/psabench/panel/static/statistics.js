@@ -8,9 +8,10 @@ const KINDS = {
   allan: { title: (m) => `Allan deviation, ${m.unit}, against s`, log: true },
   spectrum: { title: (m) => `amplitude density, ${m.unit}/\u221aHz, against Hz`, log: true },
 };
-let charts = [];
+let charts = [], latest = null;
 
 export function show(message) {
+  latest = message;
   for (const chart of charts) chart.destroy();
   $("#moments").textContent = `${message.count} samples at ${digits(1 / message.step_s)} Hz: mean ${digits(message.mean)} ${message.unit}, standard deviation ${digits(message.std)} ${message.unit}`;
   $("#charts").replaceChildren();
@@ -19,6 +20,8 @@ export function show(message) {
   $("#charts").append(...boxes); // all of them, so that each has its width
   charts = Object.entries(KINDS).map(([name, kind], i) => chart(name, kind, message, boxes[i]));
 }
+
+export const repaint = () => latest && show(latest); // in the colours of another theme
 
 function chart(name, kind, message, box) {
   const { x, y } = message[name];
