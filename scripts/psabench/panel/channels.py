@@ -140,9 +140,10 @@ def unit_message(name: str, c: Channels, buckets: list[Envelope]) -> dict[str, A
 
 def channel_figures(c: Channels, channel: str) -> dict[str, Any]:
     """Statistics of one channel. Raises BenchError."""
+    if not c.names:
+        raise BenchError(expected("samples", "none yet", "statistics"))
     if channel not in c.names:
-        known = ", ".join(c.names) or "a channel: no sample has come"
-        raise BenchError(expected(known, repr(channel[:40]), "channel"))
+        raise BenchError(expected(", ".join(c.names), repr(channel[:40]), "channel"))
     return channel_statistics(*c.latest(channel), c.units[c.names.index(channel)])
 
 

@@ -23,7 +23,7 @@ from psabench.errors import BenchError
 from psabench.link.signals import Floats
 from psabench.panel import bench_view, prompt_http
 from psabench.panel.bench_view import BenchView
-from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, split_envelopes
+from psabench.panel.channels import MOST_BUCKETS, Channels, Samples, channel_figures, split_envelopes
 from psabench.panel.guard import Allowance, Door, Log
 from psabench.panel.hub import UPDATES, Client
 from psabench.panel.procedures import Progress, Runs
@@ -298,3 +298,8 @@ def test_without_the_extra_one_line_says_what_to_install(
     assert capsys.readouterr().err == (
         "psabench: panel: expected the extra 'panel', got none; pip install 'psabench[panel]'\n"
     )
+
+
+def test_statistics_without_a_sample_say_so() -> None:
+    with pytest.raises(BenchError, match="^statistics: expected samples, got none yet$"):
+        channel_figures(Channels(), "")
