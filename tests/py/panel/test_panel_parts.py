@@ -301,5 +301,5 @@ def test_without_the_extra_one_line_says_what_to_install(
 
 
 def test_statistics_without_a_sample_say_so() -> None:
-    with pytest.raises(BenchError, match="^statistics: expected samples, got none yet$"):
+    with pytest.raises(BenchError, match=r"^statistics: expected samples, got none yet$"):
         channel_figures(Channels(), "")
