@@ -64,6 +64,24 @@ def test_our_own_host_conforms(tmp_path: Path) -> None:
     assert (told["requirements"]["HOST-VALUE-01"], told["requirements"]["HOST-CAN-09"]) == ("passed", "passed")
 
 
+SLOW = """
+import runpy, sys, time
+from psabench.link.canopen_host import CanopenNode
+read = CanopenNode.read
+CanopenNode.read = lambda *args: (time.sleep(0.1), read(*args))[1]
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@pytest.mark.host
+def test_a_slow_host_has_the_time_to_read_the_set_up(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(SLOW)
+    command = f"{sys.executable} {tmp_path / 'slow.py'} {PYTHON_HOST} socketcand:{{can}} {{node}} {{form}}"
+    status, told = judged(tmp_path / "out", "--command", command, "--case", "setup_order")
+    assert status == 0, told["tests"]
+
+
 @pytest.mark.host
 def test_over_slcan_nothing_is_lost_at_the_end(tmp_path: Path) -> None:
     command = f"{sys.executable} {PYTHON_HOST} slcan:{{pty}} {{node}}"

@@ -249,6 +249,13 @@ class HostBench:
                 return True
         return False
 
+    def await_report(self) -> None:
+        """Until the host has reported something, for so long as another has to start the stream."""
+        for _ in range(round(READY_S / 0.05)):
+            if self.host.results.exists() and self.host.results.stat().st_size:
+                return
+            self.run(0.05, speed=1.0)
+
     def await_read(self) -> None:
         """Until the host has read what was sent, if it is on a pseudo-terminal; simulated time stands still."""
         if self.pty:
