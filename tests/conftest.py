@@ -36,9 +36,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def signals_are_heard() -> Iterator[None]:
     """What a test starts inherits ignored signals: a test that leaves one ignored makes another one hang."""
     yield
-    ignored = [s.name for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is signal.SIG_IGN]
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    assert not ignored, f"left ignored: {', '.join(ignored)}"
+    ignored = [s for s in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(s) is signal.SIG_IGN]
+    for s in ignored:
+        signal.signal(s, signal.default_int_handler)
+    assert not ignored, f"left ignored: {', '.join(s.name for s in ignored)}"
 
 
 class Budget:

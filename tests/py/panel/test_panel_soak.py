@@ -211,7 +211,7 @@ def cpu_s() -> Counter[str]:
 
 
 def sizes(panel: run.Running, tabs: list[Tab]) -> dict[str, float]:
-    """Of the panel, and of the largest page; all in front, for a hidden one keeps what it has not drawn."""
+    """Of the panel, and of the largest page; all in front, so that all have drawn what they know."""
     all_in_front(tabs)
     rss = int(Path(f"/proc/{panel.process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024
     pages = [tab.sizes() for tab in tabs]
