@@ -71,6 +71,10 @@ class BenchView:
         return self.bench.pace
 
     @property
+    def opens_paused(self) -> bool:
+        return False
+
+    @property
     def unit(self) -> str:
         return self.session.dut_name
 

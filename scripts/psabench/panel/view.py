@@ -15,6 +15,11 @@ class View(Protocol):
     def pace(self) -> str: ...
 
     @property
+    def opens_paused(self) -> bool:
+        """What it shows takes milliseconds, and would be over before a page is there."""
+        ...
+
+    @property
     def unit(self) -> str:
         """The chosen one's name; "": there is none."""
         ...

@@ -19,7 +19,6 @@ from psabench.panel.converter import describe_converters
 from psabench.panel.inbox import Asked, Inbox
 from psabench.panel.lending import check_free, fitting_procedures, options_of
 from psabench.panel.procedures import OFFERED, Runs
-from psabench.panel.recorded.lines_view import LinesView
 from psabench.panel.recorded.opening import Opening
 from psabench.panel.recorded.source import RecordingSource
 from psabench.panel.source import bench_view
@@ -154,7 +153,7 @@ class Worker:
     def _open(self) -> View:
         source = self.source
         view = self.opened(source) if isinstance(source, RecordingSource) else source.open()
-        self.playing = self.playing and not isinstance(view, LinesView)  # milliseconds, which would be over at once
+        self.playing = self.playing and not view.opens_paused
         return self._prepared(view)
 
     def opened(self, source: RecordingSource) -> View:

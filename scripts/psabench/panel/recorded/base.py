@@ -22,6 +22,7 @@ class PlayedView(ABC):
     """See `view.View`. titles: board and node by unit; channels: by unit, as far as they have been played."""
 
     pace = "step"
+    opens_paused = False
 
     def __init__(self, path: Path, files: Mapping[str, Path]) -> None:
         self.path, self.files = path, files

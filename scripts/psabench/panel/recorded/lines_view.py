@@ -29,6 +29,8 @@ READ, DECODED = 0.9, 0.95  # parts of the work
 class LinesView(PlayedView):
     """See `view.View`. Raises BadInput for a file that cannot be read. Time is that of the recording."""
 
+    opens_paused = True
+
     def __init__(self, path: Path, files: Mapping[str, Path], look: Callable[[float], None]) -> None:
         super().__init__(path, files)
         part = _read_lines(path, look)
