@@ -75,6 +75,10 @@ class BenchView:
         return False
 
     @property
+    def is_over(self) -> bool:
+        return False
+
+    @property
     def unit(self) -> str:
         return self.session.dut_name
 

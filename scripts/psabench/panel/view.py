@@ -20,6 +20,11 @@ class View(Protocol):
         ...
 
     @property
+    def is_over(self) -> bool:
+        """A recording's end: time stands still until it is set back."""
+        ...
+
+    @property
     def unit(self) -> str:
         """The chosen one's name; "": there is none."""
         ...

@@ -266,6 +266,7 @@ class Worker:
             return
         passed_s, self._moved_s = min(now_s - self._moved_s, 2 * UPDATE_S), now_s
         view.wait(passed_s * self.speed)
+        self.playing = not view.is_over
         self._wait_request(self._updates.left_s)
 
     def _wait_request(self, for_s: float) -> None:

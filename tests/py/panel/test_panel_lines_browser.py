@@ -67,6 +67,15 @@ def test_a_code_has_all_its_digits_and_a_later_page_its_channels(page: Page) -> 
     assert page.evaluate("import('/static/page.js').then((m) => m.digits(534436974))") == "534436974"
 
 
+def test_at_the_end_it_pauses(page: Page) -> None:
+    said(page, "at 0")
+    expect(page.locator("#recording-ended")).to_have_text("")
+    page.click("#play")
+    expect(page.locator("#recording-ended")).to_have_text("end")
+    expect(page.locator("#play")).to_have_text("Run")
+    assert page.get_attribute("#line input", "placeholder").startswith("at 0.")
+
+
 def test_the_window_is_moved_and_zoomed(page: Page) -> None:
     page.click("#lines-all")
     until(page, "panel.lines().seen === 100")

@@ -66,6 +66,10 @@ class PlayedView(ABC):
 
     # ---- of both
 
+    @property
+    def is_over(self) -> bool:
+        return bool(self.ended())
+
     def receive(self, for_s: float) -> None:
         raise AssertionError("a recording moves in steps")
 
