@@ -60,7 +60,10 @@ OBJ      := $(patsubst %.c,$(BUILD)/obj/%.o,$(SRC) $(GEN_SRC))
 LIB_OBJ  := $(filter-out $(BUILD)/obj/emu/app/main.o,$(OBJ))
 API_OBJ  := $(filter $(BUILD)/obj/emu/api/%,$(OBJ))
 CORE_OBJ := $(filter-out $(API_OBJ) $(foreach d,link command fault control scpi scenario bench telemetry app,$(BUILD)/obj/emu/$(d)/%),$(OBJ))
-NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(sort $(wildcard nav/*/*.cpp))) $(BUILD)/obj/emu/base/detmath.o
+NAV_SRC  := $(sort $(wildcard nav/*/*.cpp))
+# For sanitizers, clang and clang-tidy each folder of nav is one file: Eigen once a folder, not once a file, is half of their time.
+NAV_UNIT := $(patsubst nav/%/,build/unity/nav_%.cpp,$(sort $(dir $(NAV_SRC))))
+NAV_OBJ  := $(patsubst %.cpp,$(BUILD)/obj/%.o,$(if $(SAN)$(filter clang%,$(notdir $(CC))),$(NAV_UNIT),$(NAV_SRC))) $(BUILD)/obj/emu/base/detmath.o
 INSTALL  = BUILD='$(BUILD)' DESTDIR='$(DESTDIR)' PREFIX='$(PREFIX)' LIBDIR='$(LIBDIR)' VERSION='$(VERSION)' ABI=$(ABI_psabench) NAV_ABI=$(ABI_psabench-nav) tools/install
 UNIT_BIN := $(patsubst %,$(BUILD)/tests/%,$(basename $(notdir $(UNIT))))
 FUZZ_SRC  := $(sort $(wildcard tests/fuzz/fuzz_*.c tests/fuzz/*/fuzz_*.c))
@@ -98,6 +101,9 @@ $(BUILD)/libpsabench.a $(BUILD)/libpsabench-nav.a: $(BUILD)/lib%.a: $(BUILD)/lib
 	$(Q)rm -f $@ && $(AR) rcs $@ $^
 $(BUILD)/%.pc: FORCE
 	@$(INSTALL) pc $* $@
+$(NAV_UNIT): build/unity/nav_%.cpp: FORCE
+	@mkdir -p $(@D) && printf '#include "%s" // NOLINT(bugprone-suspicious-include)\n' $(filter nav/$*/%,$(NAV_SRC)) > $@.new && \
+	    if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
 $(BUILD)/obj/%.o: %.cpp Makefile
 	$(call say,CXX)
 	$(Q)$(CXXCOMPILE) -MMD -MP -c -o $@ $<
@@ -188,7 +194,7 @@ fuzz-long: ## each target for an hour of CPU in all, a target per core; earlier 
 fuzz-bin: $(FUZZ_BIN)
 fuzz-each: $(FUZZ_BIN)
 	@tests/fuzz/run $(FUZZ_S) $(FUZZ_BIN)
-lint: all ## formats, warnings of gcc and clang, clang-tidy, includes, generated files, ruff, mypy (a part: LINT=test, LINT=rest)
+lint: all $(NAV_UNIT) ## formats, warnings of gcc and clang, clang-tidy, includes, generated files, ruff, mypy (a part: LINT=test, LINT=rest)
 	@FLAGS='$(FLAGS)' CXXLINT='$(CXXSTD) $(CXXWARN) -I. $(EIGEN)' tools/lint $(LINT)
 format: ## rewrite C and Python in the project's format
 	find emu nav tests examples docs/examples -name '*.[ch]' -o -name '*.[ch]pp' | xargs clang-format -i

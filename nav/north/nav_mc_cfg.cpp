@@ -69,7 +69,7 @@ constexpr const char *WANT_CHOICE = "one of its enum";
 constexpr const char *WANT_YES_NO = "0 or 1";
 constexpr const char *WANT_ANGLE = "an angle of at most 45 deg";
 
-static const struct check_rule cfg_rules[] = {
+static const struct check_rule mc_rules[] = {
     CHECK_DOUBLE(nav_mc_cfg, latitude_rad, -CHECK_ANY, CHECK_ANY, "at most 85 deg of latitude"),
     CHECK_DOUBLE(nav_mc_cfg, latitude_error_rad, -NAV_PI / 4, NAV_PI / 4, WANT_ANGLE),
     CHECK_DOUBLE(nav_mc_cfg, tilt_rad, -30 * NAV_DEG, 30 * NAV_DEG, "a tilt of at most 30 deg"),
@@ -127,7 +127,7 @@ int mc_refusal(const struct nav_mc_cfg *c, struct nav_refusal *why)
 {
     if (c->count < 3) return check_refuse(why, NAV_TOO_FEW, "count", c->count, "3 positions at least");
     if (c->count > NAV_MAX_POSITIONS) return check_refuse(why, NAV_TOO_FEW, "count", c->count, "64 positions at most");
-    int refused = check_all(c, cfg_rules, why);
+    int refused = check_all(c, mc_rules, why);
     if (!refused) refused = angles_refusal(c, why);
     if (refused) return refused;
     if (!(c->window_s >= c->sample_s && c->window_s / c->sample_s < 1e7))

@@ -17,7 +17,7 @@ struct samples_plan {
 };
 
 /* One virtual instrument: what it drew for good. */
-struct instrument {
+struct sampled_instrument {
     struct random_stream rnd;
     double alpha1_rad, psi_rad, pitch_rad, roll_rad;
     double q1_rad; /* gimbal angle of position 1 */
@@ -53,9 +53,9 @@ static int plan_make(const struct nav_mc_cfg *cfg, struct samples_plan *plan)
     return NAV_OK;
 }
 
-static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t start)
+static struct sampled_instrument draw_sampled(const struct nav_mc_cfg *cfg, uint64_t start)
 {
-    struct instrument u = {random_stream(start), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    struct sampled_instrument u = {random_stream(start), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     u.alpha1_rad = mc_alpha1(cfg, &u.rnd);
     u.angle_sys_rad = mc_signed(cfg, cfg->angle_sys_rad, &u.rnd);
     u.gamma_sys_rad = mc_signed(cfg, cfg->gamma_sys_rad, &u.rnd);
@@ -69,7 +69,7 @@ static struct instrument instrument_draw(const struct nav_mc_cfg *cfg, uint64_t 
     return u;
 }
 
-static double alpha_at(const struct nav_mc_cfg *cfg, const struct instrument *u, int i, double error_rad)
+static double alpha_at(const struct nav_mc_cfg *cfg, const struct sampled_instrument *u, int i, double error_rad)
 {
     const double turn = cfg->angle_rad[i] - cfg->angle_rad[0];
     if (cfg->cardan == NAV_CARDAN_ALPHA) return u->alpha1_rad + turn + error_rad;
@@ -135,7 +135,7 @@ static double drift_sum(const struct samples_plan *plan, const double *noise, in
 }
 
 /* Mean of the random drift over a window, sample by sample; the gap before it is one exact step. */
-static double drift_mean(const struct samples_plan *plan, struct instrument *u, int i)
+static double drift_mean(const struct samples_plan *plan, struct sampled_instrument *u, int i)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
     if (cfg->gm_sigma_radps == 0.0) return 0.0;
@@ -154,7 +154,7 @@ static double drift_mean(const struct samples_plan *plan, struct instrument *u, 
 }
 
 /* A window in position i: settled algebra with the means of all errors, which enter S to first order. */
-static struct nav_position measure_position(const struct samples_plan *plan, struct instrument *u, int i)
+static struct nav_position measure_position(const struct samples_plan *plan, struct sampled_instrument *u, int i)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
     const uint64_t draws = cfg->per_sample ? plan->per_window : 1;
@@ -206,7 +206,7 @@ static int correct_gimbal(const struct nav_mc_cfg *cfg, double q1_rad, struct na
 static int run_samples(const struct samples_plan *plan, uint64_t start, const struct nav_mc_out *out, uint64_t k)
 {
     const struct nav_mc_cfg *cfg = plan->cfg;
-    struct instrument u = instrument_draw(cfg, start);
+    struct sampled_instrument u = draw_sampled(cfg, start);
     struct nav_position p[NAV_MAX_POSITIONS];
     for (int i = 0; i < cfg->count; i++) p[i] = measure_position(plan, &u, i);
     if (cfg->cardan == NAV_CARDAN_CORRECTED) {

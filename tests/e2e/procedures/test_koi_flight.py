@@ -114,7 +114,10 @@ def test_a_second_without_increments_costs_the_weight(tmp_path: Path, capsys: Li
         (("--latitude-deg", "55"), "place: expected latitude_deg and longitude_deg, or neither, got one of them"),
         (("--flight-s", "5"), "flight_s: expected 10 to 36000, got 5"),
         (("--scenario", str(SHORT), "--flight-s", "30"), "flight: expected 120 s of increments at rest, got 30.2"),
-        (("--scenario", str(SHORT), "--receiver", "/dev/none"), "--receiver /dev/none: expected a serial port, got no such file"),
+        (
+            ("--scenario", str(SHORT), "--receiver", "/dev/none"),
+            "--receiver /dev/none: expected a serial port, got no such file",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line(words: tuple[str, ...], said: str, tmp_path: Path, capsys: Lines) -> None:

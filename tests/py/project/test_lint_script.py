@@ -18,7 +18,7 @@ PROGRAMS = ("gcc", "clang", "g++", "clang++", "clang-format", "clang-tidy", "pyt
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A project of two C files and one of C++ whose programs find nothing."""
-    for name in ("emu/base/a.c", "emu/base/b.c", "nav/north/n.cpp", "tools/lint"):
+    for name in ("emu/base/a.c", "emu/base/b.c", "nav/north/n.cpp", "build/unity/nav_north.cpp", "tools/lint"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     (tmp_path / "tools/lint").write_bytes(LINT.read_bytes())
@@ -83,7 +83,7 @@ def test_what_a_check_says_without_failing_is_shown(tree: Path) -> None:
             "clang-tidy",
             '[ "$4" != -Wextra ] || exit 1',
             "clang-tidy of C++",
-            "nav/north/n.cpp: clang-tidy ended with status 1",
+            "build/unity/nav_north.cpp: clang-tidy ended with status 1",
         ),
         (
             "clang-format",
