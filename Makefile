@@ -152,8 +152,9 @@ check: $(TESTS:%=$(BUILD)/tests/%) ## the C unit tests (one: make check T=test_s
 PYTESTS = $(if $(T),$(foreach t,$(T),$(or $(shell find tests -name '$(t).py'),$(error no file $(t).py in tests))),tests/py tests/conform tests/golden)
 pytest: $(if $(T),all,bench-bin) ## the Python tests, golden traces included (a file: make pytest T=test_frames)
 	$(PY) -m pytest --tier $(TIER) $(PYTESTS) $(if $(T),,-m "not soak")
+E2E ?= tests/e2e
 e2e: all ## the end-to-end tests over the transports of the host (socketcand, slcan on a pty)
-	$(PY) -m pytest --tier $(TIER) tests/e2e -m "host and not soak"
+	$(PY) -m pytest --tier $(TIER) $(E2E) -m "host and not soak"
 e2e-san: ## end-to-end tests of bad input and broken peers, the emulator under AddressSanitizer and UBSan
 	@$(MAKE) --no-print-directory SAN=address,undefined all
 	PSA_EMU=$(CURDIR)/build-san/psa-emu $(PY) -m pytest $(SAN_E2E) -m "host and not soak"

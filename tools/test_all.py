@@ -54,18 +54,20 @@ class Step:
 
 TIER = "TIER={tier}"  # in a command: the tests of tests/tiers.toml that it runs
 REST = ("rest", "all")
+PROCEDURES = "tests/e2e/procedures"  # half of the end-to-end tests' time: a process of their own
 STEPS: list[Step] = [
     Step("build", [*STRICT, "all"], 600),
     # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
     Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
     Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
-    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check"], 1200, tiers=REST),
-    # gcc's sanitizers run every C test; clang's run the fuzz targets, and an emulator of `builds` beside the others.
+    # Longer runs of the same code, which the rest of the tier is, are not repeated under sanitizers.
+    Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check", "TIER=test"], 1200, tiers=REST),
+    # clang's sanitizers run the fuzz targets, and an emulator of `builds` beside the others.
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: all lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 3000, beside=True, waits=True, builds=["all"], tiers=REST),
-    Step("end to end on the host", [*MAKE, "e2e", TIER], 3600, beside=True, builds=["all"]),
+    Step("end to end, procedures", [*MAKE, "e2e", f"E2E={PROCEDURES}", TIER], 3600, beside=True, builds=["all"]),
     Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step(
         "Python tests and golden traces",
@@ -73,6 +75,13 @@ STEPS: list[Step] = [
         3600,
         beside=True,
         builds=["bench-bin"],
+    ),
+    Step(
+        "end to end on the host",
+        [*MAKE, "e2e", f"E2E=tests/e2e --ignore={PROCEDURES}", TIER],
+        3600,
+        beside=True,
+        builds=["all"],
     ),
     Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
     Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 2400, beside=True, builds=["all"]),

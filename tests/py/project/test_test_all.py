@@ -277,6 +277,9 @@ def test_the_steps_of_pytest_have_each_folder_once(tool: ModuleType) -> None:
     settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["pytest"]
     assert folders == sorted(set(settings["ini_options"]["testpaths"]) - {"tests/e2e"})
     assert "),tests/py tests/conform tests/golden)" in (root / "Makefile").read_text(encoding="utf-8")
+    e2e = [word.removeprefix("E2E=") for step in tool.STEPS for word in step.command if word.startswith("E2E=")]
+    assert e2e == [tool.PROCEDURES, f"tests/e2e --ignore={tool.PROCEDURES}"]
+    assert (root / tool.PROCEDURES).is_dir()
 
 
 def test_the_rest_adds_to_the_total_what_ran_before(
