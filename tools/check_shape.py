@@ -170,7 +170,7 @@ RULES = {
     # 65,414, 74,878 and 2,392 before JSON of every command, the panel's forks, scenarios, recordings and drawn views.
     # 65,738, 76,853 and 2,451 before recorded lines in the panel, decoded rows in GTKWave and one form for bad paths.
     "lines-emu": Rule(lambda root: lines_of(root, "emu", SOURCES), 65_803, 65_803),
-    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 78_550, 78_550),
+    "lines-scripts": Rule(lambda root: lines_of(root, "scripts", (".py",)), 78_564, 78_564),
     "tracked-files": Rule(lambda root: len(tracked(root)), 2_486, 2_486),
 }
 
