@@ -54,7 +54,12 @@ class Step:
 
 TIER = "TIER={tier}"  # in a command: the tests of tests/tiers.toml that it runs
 REST = ("rest", "all")
-PROCEDURES = "tests/e2e/procedures"  # half of the end-to-end tests' time: a process of their own
+# What pages print, and the tests that look at the same runs of a minute (tests/e2e/conftest.py): half of the end-to-end
+# tests' time, so a process of their own.
+PAGES = [
+    f"tests/e2e/{name}.py"
+    for name in ("bench/test_docs", "procedures/test_calibration", "procedures/test_compare_chamber")
+]
 STEPS: list[Step] = [
     Step("build", [*STRICT, "all"], 600),
     # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
@@ -67,8 +72,6 @@ STEPS: list[Step] = [
     Step("other builds of the emulator", [*STRICT, "builds"], 1200, tiers=REST),
     # The long ones first, and what fits beside them last: all lanes end at about the same time.
     Step("real time, a minute each", [*MAKE, "soak"], 3000, beside=True, waits=True, builds=["all"], tiers=REST),
-    Step("end to end, procedures", [*MAKE, "e2e", f"E2E={PROCEDURES}", TIER], 3600, beside=True, builds=["all"]),
-    Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step(
         "Python tests and golden traces",
         [*MAKE, "pytest", "PYTESTS=tests/py tests/golden", TIER],
@@ -76,9 +79,11 @@ STEPS: list[Step] = [
         beside=True,
         builds=["bench-bin"],
     ),
+    Step("end to end, pages", [*MAKE, "e2e", f"E2E={' '.join(PAGES)}", TIER], 3600, beside=True, builds=["all"]),
+    Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step(
         "end to end on the host",
-        [*MAKE, "e2e", f"E2E=tests/e2e --ignore={PROCEDURES}", TIER],
+        [*MAKE, "e2e", " ".join(["E2E=tests/e2e", *(f"--ignore={name}" for name in PAGES)]), TIER],
         3600,
         beside=True,
         builds=["all"],

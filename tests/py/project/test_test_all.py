@@ -277,9 +277,15 @@ def test_the_steps_of_pytest_have_each_folder_once(tool: ModuleType) -> None:
     settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["pytest"]
     assert folders == sorted(set(settings["ini_options"]["testpaths"]) - {"tests/e2e"})
     assert "),tests/py tests/conform tests/golden)" in (root / "Makefile").read_text(encoding="utf-8")
-    e2e = [word.removeprefix("E2E=") for step in tool.STEPS for word in step.command if word.startswith("E2E=")]
-    assert e2e == [tool.PROCEDURES, f"tests/e2e --ignore={tool.PROCEDURES}"]
-    assert (root / tool.PROCEDURES).is_dir()
+    one, other = (word.removeprefix("E2E=").split() for step in tool.STEPS for word in step.command if "E2E=" in word)
+    assert other == ["tests/e2e", *(f"--ignore={name}" for name in one)]
+    assert all((root / name).is_file() for name in one)
+    shared = [
+        p
+        for p in root.glob("tests/e2e/*/test_*.py")
+        if {"main_job", "chamber_job"} & set(re.findall(r"\w+", p.read_text()))
+    ]
+    assert {str(p.relative_to(root)) for p in shared} == set(one)
 
 
 def test_the_rest_adds_to_the_total_what_ran_before(
