@@ -80,7 +80,6 @@ STEPS: list[Step] = [
         builds=["bench-bin"],
     ),
     Step("end to end, pages", [*MAKE, "e2e", f"E2E={' '.join(PAGES)}", TIER], 3600, beside=True, builds=["all"]),
-    Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step(
         "end to end on the host",
         [*MAKE, "e2e", " ".join(["E2E=tests/e2e", *(f"--ignore={name}" for name in PAGES)]), TIER],
@@ -88,6 +87,7 @@ STEPS: list[Step] = [
         beside=True,
         builds=["all"],
     ),
+    Step("conformance", [*MAKE, "pytest", "PYTESTS=tests/conform", TIER], 3600, beside=True, builds=["bench-bin"]),
     Step("lint", [*MAKE, "lint", "LINT=test"], 600, beside=True, builds=["all"], tiers=["test"]),
     Step("end to end on vcan0", [*MAKE, "e2e-vcan", TIER], 2400, beside=True, builds=["all"]),
     Step("fuzz targets, a short run", [*STRICT, "fuzz-check"], 1800, beside=True, tiers=REST),
