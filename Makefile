@@ -101,9 +101,10 @@ $(BUILD)/libpsabench.a $(BUILD)/libpsabench-nav.a: $(BUILD)/lib%.a: $(BUILD)/lib
 	$(Q)rm -f $@ && $(AR) rcs $@ $^
 $(BUILD)/%.pc: FORCE
 	@$(INSTALL) pc $* $@
+# Another make may be at it: a draft of its own each.
 $(NAV_UNIT): build/unity/nav_%.cpp: FORCE
-	@mkdir -p $(@D) && printf '#include "%s" // NOLINT(bugprone-suspicious-include)\n' $(filter nav/$*/%,$(NAV_SRC)) > $@.new && \
-	    if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+	@mkdir -p $(@D) && new=$@.$$$$ && printf '#include "%s" // NOLINT(bugprone-suspicious-include)\n' $(filter nav/$*/%,$(NAV_SRC)) > $$new && \
+	    if cmp -s $$new $@; then rm $$new; else mv $$new $@; fi
 $(BUILD)/obj/%.o: %.cpp Makefile
 	$(call say,CXX)
 	$(Q)$(CXXCOMPILE) -MMD -MP -c -o $@ $<

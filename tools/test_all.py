@@ -65,7 +65,7 @@ STEPS: list[Step] = [
     # The steps below compile everything with WERROR=1 and both compilers: lint does not look for their warnings again.
     Step("lint", [*MAKE, "lint", "LINT={tier}", "BUILT=1"], 1200, tiers=REST),
     Step("C tests, gcc", [*STRICT, "check", TIER], 600, tiers=["test", "all"]),
-    # Longer runs of the same code, which the rest of the tier is, are not repeated under sanitizers.
+    # Without those that only the rest has: an hour, or many units, of what the others run too. clang's step has them.
     Step("C tests, gcc, sanitizers", [*STRICT, SANITIZED, "check", "TIER=test"], 1200, tiers=REST),
     # clang's sanitizers run the fuzz targets, and an emulator of `builds` beside the others.
     Step("C tests, clang", [*STRICT, "CC=clang", "check"], 600, tiers=REST),
