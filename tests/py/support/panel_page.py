@@ -49,9 +49,9 @@ def own(url: str, panel: run.Running) -> bool:
     return url.startswith((f"http://127.0.0.1:{panel.port}/", f"blob:http://127.0.0.1:{panel.port}/"))
 
 
-def until(page: Page, expression: str) -> None:
+def until(page: Page, expression: str, wait_ms: float = WAIT_MS) -> None:
     """Wait until it is true. Not wait_for_function, which evaluates in the page, where its own policy forbids that."""
-    deadline_s = time.monotonic() + WAIT_MS / 1000
+    deadline_s = time.monotonic() + wait_ms / 1000
     while not page.evaluate(expression):
         assert time.monotonic() < deadline_s, expression
         page.wait_for_timeout(20)
