@@ -87,6 +87,8 @@ def listen(rig: Rig, data_hz: float) -> None:
     assert counters.torn <= losses
     assert samples - counters.torn <= len(frames) <= samples  # halves of two samples are found when they are decoded
     if (frames.seq >= 0).all():  # pairs; of the last one no next one tells whether its halves are of one sample
+        # Of at most two lost samples for each torn one a half came; any other lost one is two lost frames.
+        assert counters.lost + max(0, counters.lost - 2 * counters.torn) <= losses
         assert np.abs(halves_apart_s(frames, data_hz)[:-1]).max() < 0.5 / data_hz
     periods = (frames.t_sample_s[-1] - frames.t_sample_s[0]) * data_hz  # not a number in the fast form
     # A torn sample is among the lost ones: its number is missing from the sequence. A long loss hides wraps of TSTAMP.
