@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import panel_run as run
@@ -15,11 +15,13 @@ from psabench.boards.psa2.device import CODE_V
 from psabench.boards.psa2.frames import Frames
 from psabench.errors import BadInput
 from psabench.link.vcd import Wire, read_vcd
+from psabench.panel.handlers import HANDLERS
 from psabench.panel.recorded import line_words, lines_view
 from psabench.panel.recorded.line_window import COLUMNS, MOST_LINES, line_part
 from psabench.panel.recorded.lines_view import LinesView
 from psabench.panel.recorded.opening import Opening
 from psabench.panel.recorded.source import RecordingSource
+from psabench.panel.worker import Worker
 from psabench.places import find_emulator
 from psabench.shell.lexer import Wrong
 from recorded_lines import record_psa2
@@ -308,6 +310,15 @@ def test_it_is_read_in_pieces_that_can_be_stopped(recorded: tuple[Path, Frames])
         opening.follow(enough)
     opening._thread.join(run.WAIT_S)
     assert not opening._thread.is_alive()
+
+
+def test_a_page_that_comes_while_a_recording_is_read_sees_how_much(recorded: tuple[Path, Frames]) -> None:
+    source = RecordingSource(recorded[0])
+    worker = Worker(source, cast(Any, None), cast(Any, None), HANDLERS)
+    worker._opening = Opening(source)
+    assert worker.hello() == {"kind": "opening", "name": recorded[0].name, "done": 0.0}
+    worker._opening.done = 0.4
+    assert worker.hello()["done"] == 0.4
 
 
 def test_a_panel_shows_lines_and_a_bad_file_is_its_error_line(recorded: tuple[Path, Frames], tmp_path: Path) -> None:
