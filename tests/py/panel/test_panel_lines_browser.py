@@ -73,7 +73,10 @@ def test_at_the_end_it_pauses(page: Page) -> None:
     page.click("#play")
     expect(page.locator("#recording-ended")).to_have_text("end")
     expect(page.locator("#play")).to_have_text("Run")
-    assert (page.get_attribute("#line input", "placeholder") or "").startswith("at 0.")
+    example, length = page.get_attribute("#line input", "placeholder"), page.inner_text("#recording-about")
+    length_s, end_s = float(length.split()[0]), float(page.inner_text("#time").split()[0])
+    assert example is not None
+    assert end_s - length_s < float(example.removeprefix("at ")) < end_s
 
 
 def test_the_window_is_moved_and_zoomed(page: Page) -> None:

@@ -6,7 +6,7 @@ export function offer(about, link, say, now) {
   $("#recording").hidden = !about;
   document.body.classList.toggle("recording", Boolean(about));
   if (!about) return;
-  $("#line").elements.line.placeholder = `at ${(about.length_s / 2).toPrecision(3)}`;
+  $("#line").elements.line.placeholder = `at ${((about.start_ns || 0) / 1e9 + about.length_s / 2).toFixed(4)}`;
   options($("#recording-file"), about.files, about.file);
   $("#recording-file").value = about.file;
   const length = `${about.whole ? "" : "more than "}${about.length_s.toFixed(3)} s`;
